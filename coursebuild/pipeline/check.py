@@ -80,7 +80,7 @@ def check(
         remarks: list[str] = []
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
-            from coursebuild.core.scripts.sensitivity import noise_warnings
+            from coursebuild.core.scripts.noise_warnings import noise_warnings
 
             runs, selected = verification.results.runs, checked_course.documents
             sensitivities = measure_sensitivity(

@@ -22,7 +22,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import FileChange, change_files, check_writable
-from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.scripts.edit import edited_texts
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge, read_and_verify
@@ -266,10 +266,8 @@ class _Fixer:
         return (not self.names or path in self.paths) and may_edit(self.options.root, path)
 
     def _texts_with(self, fixes: Iterable[Diagnostic]) -> dict[str, str]:
-        edits: dict[Source, list[Edit]] = {}
-        for edit in (edit for diagnostic in fixes for edit in diagnostic.edits):
-            edits.setdefault(edit.span.source, []).append(edit)
-        return self.texts | {s.path: apply_edits(s.text, changes) for s, changes in edits.items()}
+        edits = (edit for diagnostic in fixes for edit in diagnostic.edits)
+        return self.texts | {s.path: text for s, text in edited_texts(edits).items()}
 
     def _select_harmless(
         self, fixes: list[Diagnostic], selection: list[Diagnostic], before: Collection[Diagnostic]

@@ -12,7 +12,7 @@ from __future__ import annotations
 import difflib
 import functools
 import time
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 from msgspec.structs import replace
 
@@ -25,16 +25,15 @@ from coursebuild.core.model import Course, Document
 from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.model.results import Outcome, ScriptRun, TrialLine, Verdict
 from coursebuild.core.registry import feature_trials
-from coursebuild.core.scripts.bindings import check_bindings
-from coursebuild.core.scripts.bound_places import carried_addresses, document_values, follow_outputs
+from coursebuild.core.scripts.bindings import update_outputs
+from coursebuild.core.scripts.bound_places import carried_addresses, document_values
 from coursebuild.core.scripts.compare import verify as compare_all
-from coursebuild.core.scripts.edit import adopt_file, apply_edits, block_text, update_body
+from coursebuild.core.scripts.edit import adopt_file, block_text, edited_texts
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.extract import extract as extract_course
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
-from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_key
-from coursebuild.core.scripts.printed_text import PrintedText
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge
@@ -102,7 +101,6 @@ class _Updater:
     def update(self, began: float) -> Report:
         runs = run(self.course, self.scripts, self.options)
         edits, refusals = self._make_edits(runs)
-        self._add_source_parts(edits)
         remarks, failures = self._write(edits)
         figure_remarks, figure_failures = write_figures(
             self.course, self.documents, runs, self.options, dry_run=self.dry_run
@@ -149,45 +147,23 @@ class _Updater:
 
     # --- edits
 
-    def _make_edits(
-        self, runs: Sequence[ScriptRun]
-    ) -> tuple[dict[Source, list[Edit]], list[Diagnostic]]:
+    def _make_edits(self, runs: Sequence[ScriptRun]) -> tuple[list[Edit], list[Diagnostic]]:
         # Of paths that several scripts have, nobody knows whose output is recorded.
         repeated_paths = {
             d.span.text.strip("\"'")
             for d in self.extracted_scripts.diagnostics
             if d.rule == "script-repeated"
         }
-        good_runs = {
-            r.path: r for r in runs if r.outcome is Outcome.OK and r.path not in repeated_paths
-        }
-        edits: dict[Source, list[Edit]] = {}
-        refusals: list[Diagnostic] = []
-        refused_outputs: set[tuple[str, int]] = set()
+        good_paths = {run.path for run in runs if run.outcome is Outcome.OK} - repeated_paths
         outputs = self._outputs(self.course, runs)
         documents = self._chosen_documents(self.course)
-        for verdict in (v for document in documents for v in outputs.of_document(document)):
-            recording, good_run = verdict.recording, good_runs.get(verdict.recording.script or "")
-            if good_run is None or not recording.readable:
-                continue
-            printed = good_run.output_of(recording.part)
-            edit = update_body(recording, verdict.comparison, printed, verdict.row_addresses)
-            if isinstance(edit, Edit):
-                edits.setdefault(recording.span.source, []).append(edit)
-            elif edit is not None:
-                refusals.append(edit)
-                refused_outputs.add(recording_key(recording))
-
-        def text_after(verdict: Verdict) -> PrintedText | None:
-            is_refused = recording_key(verdict.recording) in refused_outputs
-            return None if is_refused else outputs.updated_text(verdict)
-
-        for document in documents:
-            check_bindings(document, outputs, self.addresses)
-            followers = list(follow_outputs(document, outputs, self.addresses, text_after))
-            if followers:
-                edits.setdefault(document.source, []).extend(followers)
-        return edits, refusals
+        verdicts = [
+            verdict
+            for document in documents
+            for verdict in outputs.of_document(document)
+            if verdict.recording.script in good_paths and verdict.recording.readable
+        ]
+        return update_outputs(verdicts, documents, outputs, self.addresses)
 
     def _outputs(self, course: Course, runs: Sequence[ScriptRun]) -> PrintedOutputs:
         paths = (e.path for e in self.extracted_scripts.extractions)
@@ -200,30 +176,26 @@ class _Updater:
             if self.documents is None or document.source.path in self.documents
         ]
 
-    def _add_source_parts(self, edits: dict[Source, list[Edit]]) -> None:
-        """Add the edits of parts of files; leave out lessons that are not to be written over."""
-        for diagnostic in self.diagnostics:
-            path = diagnostic.span.path
-            if diagnostic.rule == "source-part" and path in (self.documents or [path]):
-                edits.setdefault(diagnostic.span.source, []).extend(diagnostic.edits)
-        doubtful = ("file-encoding", "merge-conflict")
-        doubtful_paths = {d.span.path for d in self.diagnostics if d.rule in doubtful}
-        for source in [source for source in edits if source.path in doubtful_paths]:
-            del edits[source]
-
-    def _write(self, edits: Mapping[Source, list[Edit]]) -> tuple[list[str], list[Diagnostic]]:
+    def _write(self, edits: Iterable[Edit]) -> tuple[list[str], list[Diagnostic]]:
+        """Make these edits, and those of parts of files, where a text is what its file holds."""
         root, verb = self.options.root, "would update" if self.dry_run else "updated"
         remarks: list[str] = []
         failures: list[Diagnostic] = []
-        for source, changes in edits.items():
-            new = apply_edits(source.text, changes)
+        doubtful = ("file-encoding", "merge-conflict")
+        doubtful_paths = {d.span.path for d in self.diagnostics if d.rule in doubtful}
+        parts = [d for d in self.diagnostics if d.rule == "source-part"]
+        stale = [d for d in parts if self.documents is None or d.span.path in self.documents]
+        all_edits = [*edits, *(edit for d in stale for edit in d.edits)]
+        all_edits = [edit for edit in all_edits if edit.span.path not in doubtful_paths]
+        for source, new in edited_texts(all_edits).items():
             try:
                 if self.dry_run:
                     check_writable(root, source.path)
                 else:
                     write_atomic(root, source.path, new.encode(), expected=source.text.encode())
             except EffectError as error:
-                span = min((edit.span for edit in changes), key=lambda span: span.start)
+                spans = (edit.span for edit in all_edits if edit.span.source is source)
+                span = min(spans, key=lambda span: span.start)
                 failures.append(
                     diagnose("output-not-updatable", span, error.message, help=error.help)
                 )
@@ -366,7 +338,7 @@ def _adopt(
 ) -> tuple[list[str], list[Diagnostic], dict[str, bytes]]:
     """Write the edited files into their lessons' blocks; also return what these files held."""
     by_path = {e.path: e for e in extracted_scripts.extractions}
-    edits: dict[Source, list[Edit]] = {}
+    edits: list[Edit] = []
     refusals: list[Diagnostic] = []
     files_read: dict[str, bytes] = {}
     for example in extracted_scripts.files.blocked:
@@ -380,14 +352,13 @@ def _adopt(
         if isinstance(adoption, Diagnostic):
             refusals.append(adoption)
         else:
-            edits.setdefault(extraction.script.span.source, []).extend(adoption)
+            edits += adoption
             files_read[example.path] = data
     remarks: list[str] = []
-    for source in edits:  # all or none
+    texts = edited_texts(edits)
+    for source in texts:  # all or none
         check_writable(options.root, source.path)
-    for source, changes in edits.items():
-        new = apply_edits(source.text, changes)
-        if new != source.text:
-            write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
-            remarks.append(changed_text("updated", source, new))
+    for source, new in texts.items():
+        write_atomic(options.root, source.path, new.encode(), expected=source.text.encode())
+        remarks.append(changed_text("updated", source, new))
     return remarks, refusals, files_read

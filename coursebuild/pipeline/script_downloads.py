@@ -1,8 +1,9 @@
 """What readers are handed over of each script, and whether it runs alone.
 
-A script becomes one file with all that it needs of the course; where that cannot be, or its fence
-says `download=zip`, it becomes an archive, in which everything lies as in the course. Both say
-which packages they need. Run in an empty folder, they have to print what the page shows.
+1. A script becomes one file with all that it needs of the course; where that cannot be, or its
+   fence says `download=zip`, it becomes an archive, in which everything lies as in the course. Both
+   say which packages they need. Run in an empty folder, they have to print what the page shows.
+2. The scripts of a lesson, and those of the course, come in archives of the same kind.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ import ast
 import functools
 import platform
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from msgspec.structs import replace
 
@@ -20,18 +22,22 @@ from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import (
     CompileResult,
+    ModelFacts,
     Outcome,
     ScriptRun,
     Verdict,
 )
 from coursebuild.core.model.script_download import DownloadState, ScriptDownload
-from coursebuild.core.pages.library import models_named
+from coursebuild.core.pages import urls
+from coursebuild.core.pages.library import Library, models_named
+from coursebuild.core.pages.listings import find_imports
+from coursebuild.core.pages.zips import Archive
 from coursebuild.core.run.alone import AloneJob, AloneRun, Runner
 from coursebuild.core.run.packages import distributions, module_files
 from coursebuild.core.scripts.compare import verify
-from coursebuild.core.scripts.extract import Extraction
+from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.module_code import CourseModule, NotOneFileError, is_text
-from coursebuild.core.scripts.single_file import Belongings, foreign_modules, single_file
+from coursebuild.core.scripts.single_file import Belongings, single_file
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.options import Options
 
@@ -44,8 +50,19 @@ _MOST_DATA = 1 << 16
 class _Course:
     """What scripts of a course may take from it."""
 
-    def __init__(self, course: Course, scripts: Iterable[Extraction], options: Options) -> None:
+    def __init__(
+        self,
+        course: Course,
+        scripts: Iterable[Extraction],
+        options: Options,
+        runs: Iterable[ScriptRun],
+        facts: Iterable[tuple[str, ModelFacts | None]],
+        imports: Mapping[str, frozenset[str]] = {},
+    ) -> None:
+        """`facts` are those of models, by name; `imports`: see `verify`."""
         self.root, self.options = options.root, options
+        self.runs, self._imports = {run.path: run for run in runs}, imports
+        self._includes = {f"{_MODELS}{name}.xml": f.includes for name, f in facts if f is not None}
         self._folders = [options.root / package.path for package in course.packages]
         self._prefixes = tuple(f"{package.path.rstrip('/')}/" for package in course.packages)
         self._models = {model.source.path: model.source.text for model in course.models}
@@ -58,8 +75,14 @@ class _Course:
         )
         self.read = functools.cache(functools.partial(read_bytes, options.root))
 
-    def find_module(self, folder: str, name: str) -> CourseModule | None:
-        """The module that a script in a folder of `examples/` gets by this name."""
+    def imports(self, extraction: Extraction) -> frozenset[str]:
+        """The top-level modules that a script imports."""
+        modules = self._imports.get(extraction.path)
+        return find_imports(extraction.text) if modules is None else modules
+
+    def find_module(self, script: str, name: str) -> CourseModule | None:
+        """The module that the script at a path in `examples/` gets by this name."""
+        folder = _dotted(script.removeprefix(_EXAMPLES)).rpartition(".")[0]
         top = name.partition(".")[0]
         for prefix in dict.fromkeys((folder, "")):
             module = self.modules.get(f"{prefix}.{name}" if prefix else name)
@@ -74,18 +97,18 @@ class _Course:
             if file.path.endswith(".py")
         }
 
-    def files_of(
-        self, extraction: Extraction, run: ScriptRun | None, includes: Mapping[str, Sequence[str]]
-    ) -> dict[str, bytes]:
+    def files_of(self, extraction: Extraction) -> dict[str, bytes]:
         """The models and data that a script reads, by path; if it did not run, what it names."""
         paths: set[str] = set()
+        run = self.runs.get(extraction.path)
         if run is not None and run.trace is not None:
             paths = {p for p in run.trace.files if (self.root / p).is_file()}
             paths = {p for p in paths if not p.startswith((_EXAMPLES, _LIBRARY, *self._prefixes))}
         else:
             for name in models_named(extraction.script):
                 path = f"{_MODELS}{name}.xml"
-                paths |= {path, *includes.get(path, ())} if path in self._models else set()
+                if path in self._models:
+                    paths |= {path, *self._includes.get(path, ())}
         return {path: self.read(path) for path in sorted(paths - {_STYLE, "content/course.toml"})}
 
     @functools.cached_property
@@ -120,71 +143,91 @@ def find_downloads(
     options: Options,
 ) -> tuple[ScriptDownload, ...]:
     """What is handed over of these scripts; nothing of those that fail as they are."""
-    course_files = _Course(course, scripts, options)
-    by_path = {run.path: run for run in runs}
-    facts = {f"{_MODELS}{name}.xml": result.facts for name, result in models}
-    includes = {path: fact.includes for path, fact in facts.items() if fact is not None}
+    facts = ((name, result.facts) for name, result in models)
+    course_files = _Course(course, scripts, options, runs, facts)
     downloads = []
     for extraction in scripts:
-        run = by_path.get(extraction.path)
+        run = course_files.runs.get(extraction.path)
         if run is None or run.outcome in (Outcome.OK, Outcome.SKIPPED, Outcome.NORUN):
-            files = course_files.files_of(extraction, run, includes)
-            downloads.append(_make_download(course_files, extraction, files))
+            downloads.append(_make_download(course_files, extraction))
     return tuple(downloads)
 
 
-def _make_download(
-    course_files: _Course, extraction: Extraction, files: Mapping[str, bytes]
-) -> ScriptDownload:
+def make_archives(
+    library: Library, options: Options, imports: Mapping[str, frozenset[str]]
+) -> Iterator[Archive]:
+    """The archives of the course and of each lesson with scripts; `imports`: see `verify`."""
+    scripts = extract(library.course).value
+    runs, facts = library.results.runs, library.facts.items()
+    course_files = _Course(library.course, scripts, options, runs, facts, imports)
+
+    def archive(path: str, folder: str, of: Sequence[Extraction]) -> Archive:
+        files = _find_members(course_files, of)[0]
+        readme = library.words("zip.readme", title=library.course.title, script=of[0].path)
+        files["README.md"] = f"{readme.strip()}\n".encode()
+        return Archive(path, {f"{folder}/{name}": data for name, data in files.items()})
+
+    if scripts:
+        folder = re.sub(r"[^a-z0-9]+", "-", library.course.title.lower()).strip("-") or "course"
+        yield archive(urls.EXAMPLES_ZIP, folder, scripts)
+    for lesson in library.order:
+        if of_lesson := [script for script in scripts if script.document == lesson.path]:
+            folder = f"{lesson.id}-{lesson.slug}"
+            yield archive(urls.lesson_zip_path(lesson), folder, of_lesson)
+
+
+def _make_download(course_files: _Course, extraction: Extraction) -> ScriptDownload:
     path, name = extraction.path, extraction.path.rpartition("/")[2]
-    folder = _dotted(path.removeprefix(_EXAMPLES)).rpartition(".")[0]
-    find_module = functools.partial(course_files.find_module, folder)
+    find_module = functools.partial(course_files.find_module, path)
     if not extraction.script.archive:
         try:
-            belongings = _belongings(files)
+            belongings = _belongings(course_files.files_of(extraction))
             text = single_file(_dotted(name), extraction.text, find_module, belongings)
-            if "matplotlib" in foreign_modules(text) and course_files.style:
+            if "matplotlib" in find_imports(text) and course_files.style:
                 belongings = replace(belongings, style=course_files.style)
                 text = single_file(_dotted(name), extraction.text, find_module, belongings)
         except (NotOneFileError, RecursionError, SyntaxError):
             pass
         else:
-            modules = foreign_modules(text)
+            modules = tuple(sorted(find_imports(text) - sys.stdlib_module_names))
             packages, unknown = course_files.packages(modules)
             text = _metadata(packages, unknown, course_files.options) + _rename(text, path, name)
             files_of_one = ((name, text.encode()),)
             return ScriptDownload(path, files_of_one, name, packages, modules, unknown)
-    members, modules = _members(course_files, extraction, find_module)
+    members, modules = _find_members(course_files, [extraction])
     packages, unknown = course_files.packages(modules)
-    members |= files
-    if "matplotlib" in modules and course_files.style:
+    files = tuple(sorted(members.items()))
+    return ScriptDownload(path, files, path, packages, modules, unknown, archive=True)
+
+
+def _find_members(
+    course_files: _Course, scripts: Iterable[Extraction]
+) -> tuple[dict[str, bytes], tuple[str, ...]]:
+    """The files of an archive of scripts, by path, and the modules of others that these import."""
+    members: dict[str, bytes] = {}
+    foreign = set[str]()
+    for extraction in scripts:
+        members |= {extraction.path: extraction.data, **course_files.files_of(extraction)}
+        folder = extraction.path.rpartition("/")[0]
+        imports, visited = [course_files.imports(extraction)], set[str]()
+        for names in imports:
+            for name in names - visited - sys.stdlib_module_names:
+                visited.add(name)
+                module = course_files.find_module(extraction.path, name)
+                if module is not None and module.path.startswith(_EXAMPLES):
+                    members[module.path] = module.text.encode()
+                    imports.append(find_imports(module.text))
+                    continue
+                files = course_files.files_of_module(name)
+                members |= {f"{folder}/{file.path}": file.data for file in files}
+                texts = [file.data.decode() for file in files if file.path.endswith(".py")]
+                imports += map(find_imports, texts)
+                foreign |= set() if files else {name}
+    if "matplotlib" in foreign and course_files.style:
         members[_STYLE] = course_files.read(_STYLE)
+    packages, unknown = course_files.packages(foreign)
     lines = (*packages, *map(_unknown_package, unknown))
     members["requirements.txt"] = "".join(f"{line}\n" for line in lines).encode()
-    return ScriptDownload(
-        path, tuple(sorted(members.items())), path, packages, modules, unknown, archive=True
-    )
-
-
-def _members(
-    course_files: _Course, extraction: Extraction, find_module: Callable[[str], CourseModule | None]
-) -> tuple[dict[str, bytes], tuple[str, ...]]:
-    """A script and the course's modules that it imports, by path, and the modules of others."""
-    folder = extraction.path.rpartition("/")[0]
-    members = {extraction.path: extraction.data}
-    texts, visited, foreign = [extraction.text], set[str](), set[str]()
-    for text in texts:
-        for name in set(foreign_modules(text)) - visited:
-            visited.add(name)
-            module = find_module(name)
-            if module is not None and module.path.startswith(_EXAMPLES):
-                members[module.path] = module.text.encode()
-                texts.append(module.text)
-                continue
-            files = course_files.files_of_module(name)
-            members |= {f"{folder}/{file.path}": file.data for file in files}
-            texts += [file.data.decode() for file in files if file.path.endswith(".py")]
-            foreign |= set() if files else {name}
     return members, tuple(sorted(foreign))
 
 

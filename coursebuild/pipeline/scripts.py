@@ -30,6 +30,7 @@ from coursebuild.core.scripts.findings import count_unproven
 from coursebuild.core.scripts.sensitivity import (
     FINER_RUNS,
     RUNS,
+    SHIFTED_RUNS,
     Sensitivity,
     is_worth_moving,
     sensitivity,
@@ -364,7 +365,8 @@ def measure_sensitivity(
 
     Scripts that use MuJoCo and print what is recorded run four times with their initial states
     moved (`core.run.perturbation`), each with three times the time limit; if `halve`, twice more
-    with a half and a quarter of the timestep. All runs are remembered like others.
+    with a half and a quarter of the timestep, and twice with shifted steps. All runs are remembered
+    like others.
     `documents`: only recorded outputs in documents with these paths count.
     """
     recordings: dict[str, list[Recording]] = {}
@@ -378,7 +380,7 @@ def measure_sensitivity(
         for script, base in pairs
         if is_worth_moving(course, recordings.get(script.path, ()), base)
     ]
-    numbers = (*range(1, RUNS + 1), *(FINER_RUNS if halve else ()))
+    numbers = (*range(1, RUNS + 1), *((*FINER_RUNS, *SHIFTED_RUNS) if halve else ()))
     perturbed_runs = _run_perturbed(course, moved_scripts, options, numbers)
     return tuple(
         sensitivity(
@@ -388,7 +390,8 @@ def measure_sensitivity(
             recordings.get(script.path, ()),
             base,
             perturbed_runs.get(script.path, ())[:RUNS],
-            perturbed_runs.get(script.path, ())[RUNS:],
+            perturbed_runs.get(script.path, ())[RUNS : RUNS + len(FINER_RUNS)],
+            perturbed_runs.get(script.path, ())[RUNS + len(FINER_RUNS) :],
         )
         for script, base in pairs
     )
@@ -409,6 +412,8 @@ def _run_perturbed(
             stage = f"moving initial states, {number} of {RUNS}"
             if number in FINER_RUNS:
                 stage = "halving timesteps" + (" twice" if number == FINER_RUNS[1] else "")
+            elif number in SHIFTED_RUNS:
+                stage = f"shifting steps, {SHIFTED_RUNS.index(number) + 1} of {len(SHIFTED_RUNS)}"
             for script_run in run(
                 course, scripts, server_options, stage, run_store, perturbation=number
             ):

@@ -42,6 +42,7 @@ from coursebuild.core.pages.frame import (
     versions,
 )
 from coursebuild.core.pages.library import Library
+from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import in_language
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import (
@@ -115,7 +116,7 @@ class Site:
         """
         self._library = library
         self._reader = reader
-        self._root, self._store = options.root, options.store
+        self._options, self._store = options, options.store
         self._has_all_pages, self._whole_fonts = entries is None, whole_fonts
         self._mistakes = mistakes or {}
         self._latest: tuple[str, DrawnPage] | None = None
@@ -252,8 +253,7 @@ class Site:
 
     @functools.cached_property
     def _downloads(self) -> Downloads:
-        library = self._library
-        return Downloads.of(library, library.assets, self._reader, self._root, self._store)
+        return Downloads.of(self._library, self._reader, self._options)
 
     @functools.cached_property
     def _added_files(self) -> tuple[list[SiteFile], FileList | None]:
@@ -283,7 +283,7 @@ class Site:
             lambda path: self._load(path).notes[feature],
             functools.partial(self._store.get_or_make, "parts"),
             self._downloads.archives,
-            self._downloads.imports,
+            find_imports,
         )
 
     # --- what is wrong with them

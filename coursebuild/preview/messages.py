@@ -30,20 +30,18 @@ from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.pages.library import Library
-from coursebuild.core.scripts.bindings import check_bindings
+from coursebuild.core.scripts.bindings import check_bindings, update_outputs
 from coursebuild.core.scripts.bound_places import (
     carried_addresses,
     document_bindings,
     document_values,
-    follow_outputs,
 )
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.diff import diff_rows
-from coursebuild.core.scripts.edit import apply_edits, update_body
+from coursebuild.core.scripts.edit import apply_edits, edited_texts
 from coursebuild.core.scripts.figures import figure_difference, prepare_figure
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge
@@ -136,13 +134,9 @@ def changes_of(
     session: Session, edits: Iterable[Edit], drawings: Iterable[FileChange] = ()
 ) -> list[FileChange]:
     """The changes of files by what is accepted, and of those that say what it was recorded with."""
-    by_source: dict[Source, list[Edit]] = {}
-    for edit in edits:  # two outputs of a script may offer the same number
-        edits_there = by_source.setdefault(edit.span.source, [])
-        edits_there += [] if edit in edits_there else [edit]
     changes = [
-        FileChange(s.path, s.text.encode(), apply_edits(s.text, edits_there).encode())
-        for s, edits_there in by_source.items()
+        FileChange(source.path, source.text.encode(), text.encode())
+        for source, text in edited_texts(edits).items()  # two outputs may offer the same number
     ]
     changes += drawings
     with session.condition:
@@ -303,26 +297,15 @@ def new_output(
 
     The first is of the output, the others of numbers that are bound to it.
     """
-    recording = verdict.recording
-    run = library.runs[recording.script or ""]
+    run = library.runs[verdict.recording.script or ""]
     unstable_output = find_instability(verdict, run, session.runs.other_runs())
-    edit = unstable_output or update_body(
-        recording, verdict.comparison, run.output_of(recording.part), verdict.row_addresses
-    )
-    if not isinstance(edit, Edit):
-        return edit or ()
+    if unstable_output is not None:
+        return unstable_output
     results, addresses = library.results, dict(session.runs.addresses)
     outputs = PrintedOutputs(results.verdicts, results.runs, library.scripts)
-
-    def text_after(output: Verdict) -> PrintedText:
-        is_new = output.recording == recording
-        return outputs.updated_text(output) if is_new else outputs.text(output)
-
-    edits = [edit]
-    for _, document in course.shown_texts:
-        check_bindings(document, outputs, addresses)
-        edits += follow_outputs(document, outputs, addresses, text_after)
-    return tuple(edits)
+    documents = [document for _, document in course.shown_texts]
+    edits, refusals = update_outputs([verdict], documents, outputs, addresses)
+    return refusals[0] if refusals else tuple(edits)
 
 
 # --- figures

@@ -26,7 +26,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.run.script_server import RunAll, RunStoppedError, ScriptServer
 from coursebuild.core.scripts.extract import extract
-from coursebuild.core.scripts.sensitivity import noise_warnings
+from coursebuild.core.scripts.noise_warnings import noise_warnings
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.options import Progress
 from coursebuild.pipeline.scripts import measure_sensitivity, run

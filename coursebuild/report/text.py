@@ -102,16 +102,14 @@ class Column(Struct, frozen=True):
 def table(columns: Sequence[Column]) -> list[str]:
     """The titles and rows of columns with text as lines."""
     padded_columns = []
-    for column in filter(_is_filled, columns):
+    for column in columns:
+        if not any(map(str.strip, column.cells)):
+            continue
         texts = [column.title, *map(visible, column.cells)]
         width = max(map(cells, texts))
         pairs = [(text, " " * (width - cells(text))) for text in texts]
         padded_columns.append([text + pad if column.left else pad + text for text, pad in pairs])
     return [_GAP.join(row).rstrip() for row in zip(*padded_columns, strict=True)]
-
-
-def _is_filled(column: Column) -> bool:
-    return any(cell.strip() for cell in column.cells)
 
 
 # --- the terminal
@@ -292,6 +290,8 @@ def _row_text(row: Doubt | Flip) -> str:
                 measured_values.append(
                     f"half the timestep: {row.halved}, a quarter: {row.quartered}"
                 )
+                if row.sampled:
+                    measured_values.append(f"looked for at every step: known to {row.sampled}")
             text += f", print {row.instead}" if row.instead else ""
             text += f"  ({'; '.join(measured_values)})"
             is_allowed = row.repeat < row.digits and not row.compared

@@ -27,6 +27,7 @@ from mjbench.declarations import (
 from mjbench.derive import derive_sweep, known_cases
 from mjbench.fair import fair_declarations
 from mjbench.host import Host
+from mjbench.loop import Loop, LoopError
 from mjbench.machine import one_processor, this_machine
 from mjbench.problem import Array
 from mjbench.pruning.comparison import watch
@@ -134,19 +135,71 @@ class CompiledModel(Struct, frozen=True):
     """Its `mjSpec`, from which it can be compiled with other parameters; `None` without source."""
 
 
-def compile_subject(subject: Subject, host: Host, *, quick: bool) -> CompiledModel:
-    """Compile a model and find its scenarios; a `CannotMeasureError` where it cannot be done."""
+def compile_subject(
+    subject: Subject, host: Host, *, quick: bool, loop: Loop | None = None, task: str = ""
+) -> CompiledModel:
+    """Compile a model and find its scenarios; a `CannotMeasureError` where it cannot be done.
+
+    `loop`: the controller in all of them; sweeps have none, and are left out. `task`: the sensor,
+    site or body whose reading or place counts besides coordinates.
+    """
     declarations = subject.read_declarations()
     with report_errors(subject, "the model `{}` does not compile", ValueError):
         model = subject.compile()
     with report_errors(subject):
         if subject.fair and not subject.declarations_path:
             declarations = fair_declarations(model, subject.path, quick=quick)
+        if loop is not None:
+            declarations = _under_control(declarations, loop, is_fair=not subject.declarations_path)
+        if task:
+            declarations = _with_task(model, declarations, task, loop)
         exact = _exact_motion(subject, host)
         found_scenes = scenes(model, declarations, quick=quick)
-        found_scenes = tuple(replace(scene, exact=exact) for scene in found_scenes)
+        found_scenes = tuple(
+            replace(scene, exact=exact, scenario=replace(scene.scenario, loop=loop))
+            for scene in found_scenes
+        )
         spec = None if subject.is_binary else mujoco.MjSpec.from_file(subject.file)
         return CompiledModel(subject, model, declarations, found_scenes, spec)
+
+
+def _under_control(declarations: Declarations, loop: Loop, *, is_fair: bool) -> Declarations:
+    """Scenarios in which a controller commands; those `is_fair` made become one."""
+    scenarios = declarations.scenarios
+    if is_fair:
+        words = f"under the controller {Path(loop.path).name}"
+        scenarios = tuple(
+            replace(s, name="loop", title=f"{(s.title or '').partition(', then')[0]}, {words}")
+            for s in scenarios[:1]
+        )
+        scenarios = tuple(replace(s, controls=(), hold=None) for s in scenarios)
+    for scenario in scenarios:
+        if scenario.controls:
+            message = "it has commands of its own, and a controller is to give them"
+            raise SceneError(message, scenario.place("controls"))
+    return replace(declarations, scenarios=scenarios, sweeps=())
+
+
+def _with_task(
+    model: Any, declarations: Declarations, task: str, loop: Loop | None
+) -> Declarations:
+    kinds = ("sensor", "site", "body")
+    names = {
+        kind: {str(getattr(model, kind)(n).name) for n in range(int(getattr(model, f"n{kind}")))}
+        for kind in kinds
+    }
+    kind, _, name = task.rpartition(":")
+    kind = kind or next((kind for kind in kinds if name in names[kind]), "")
+    if name not in names.get(kind, ()):
+        raise SceneError(f"the model has no sensor, site or body `{task}`")
+    needs_commands = int(mujoco.mjtStage.mjSTAGE_ACC)
+    if loop and kind == "sensor" and model.sensor(name).needstage[0] == needs_commands:
+        raise SceneError(
+            f"the sensor `{name}` reads what commands do, which are not kept of a controller",
+            help="measure a place or a velocity",
+        )
+    scenarios = [replace(s, measure=f"{kind}:{name}") for s in declarations.scenarios]
+    return replace(declarations, scenarios=tuple(scenarios))
 
 
 def run_scenario(
@@ -241,6 +294,8 @@ def report_errors(
     except SceneError as error:
         place = error.place or Place(subject.declarations_path or subject.path)
         raise CannotMeasureError(error.message, place, error.help, "scenario") from None
+    except LoopError as error:
+        raise CannotMeasureError(str(error), subject.place) from None
     except (mujoco.FatalError, *errors) as error:
         message = f"{failure.format(subject.name)}: {' '.join(str(error).split())}"
         raise CannotMeasureError(message, subject.place) from None
@@ -288,7 +343,7 @@ def _card(compiled_model: CompiledModel, host: Host) -> SceneCard:
     with silent():  # MuJoCo would write its warnings into the working directory
         touching_pairs = {
             pair
-            for scene in scenes(model, compiled_model.declarations)
+            for scene in compiled_model.scenarios
             for pair in watch(model, scene).touching_pairs
         }
     first = compiled_model.scenarios[0].scenario

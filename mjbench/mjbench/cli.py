@@ -23,6 +23,7 @@ from mjbench.bench import CannotMeasureError, Subject
 from mjbench.cases import DisagreementError, measure_case
 from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measure_engines
 from mjbench.host import LocalHost
+from mjbench.loop import LoopError, read_loop
 from mjbench.machine import one_processor, package_version, this_machine
 from mjbench.parts import Parts
 from mjbench.problems import all_problems
@@ -64,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     namespace = _parser().parse_args(words)
     try:
         status: int = namespace.run(namespace)
-    except (_UsageError, UnknownEngineError, RecordError, OSError) as error:
+    except (_UsageError, LoopError, UnknownEngineError, RecordError, OSError) as error:
         print(f"mjbench: error: {error}", file=sys.stderr)
         return 2
     except (CannotMeasureError, DisagreementError) as error:
@@ -90,6 +91,17 @@ def _parser() -> argparse.ArgumentParser:
     command = add("bench", _bench, "measure speed against error")
     help = "MJCF, URDF, MJB, or Python with `spec`; MODEL.toml beside it has scenarios"
     command.add_argument("model", type=Path, help=help)
+    help = "Python with `control(model, data)`, which gives the commands, and its `period` in s"
+    command.add_argument("--control", type=Path, metavar="FILE", help=help)
+    help = "how often it is asked; how much later its commands act"
+    for name in ("--period", "--delay"):
+        command.add_argument(name, type=float, metavar="SECONDS", help=help)
+    help = "the standard deviation of its commands, relative to their range"
+    command.add_argument("--noise", type=float, metavar="SHARE", help=help)
+    help = (
+        "what the task is about: errors are also of this sensor, or the place of this site or body"
+    )
+    command.add_argument("--task", default="", metavar="NAME", help=help)
     help = "measure other engines instead: all, or some, as in mjx,warp"
     command.add_argument("--engines", nargs="?", const="", metavar="NAMES", help=help)
     command.add_argument("--quick", action="store_true", help="fewer settings and rough times")
@@ -191,7 +203,16 @@ def _bench(arguments: argparse.Namespace) -> int:
     host, quick = _host(subject), arguments.quick
     if quick and (arguments.record or arguments.check):
         raise _UsageError("--quick measures only a part, which is not recorded or compared")
+    loop, options = None, (arguments.period, arguments.delay, arguments.noise)
+    if arguments.control is not None:
+        loop = read_loop(arguments.control, options[0], options[1] or 0.0, options[2] or 0.0)
+        code = f"{subject.digest} {options}".encode() + arguments.control.read_bytes()
+        subject = msgspec.structs.replace(subject, digest=hashlib.sha256(code).hexdigest())
+    elif options != (None, None, None):
+        raise _UsageError("--period, --delay and --noise are of a controller: --control FILE")
     if arguments.engines is not None:
+        if loop or arguments.task:
+            raise _UsageError("other engines are measured without controller and task")
         if arguments.check:
             raise _UsageError("32 bits do not repeat from one device to the next: no --check")
         names = [name.strip() for name in arguments.engines.split(",") if name.strip()]
@@ -201,7 +222,9 @@ def _bench(arguments: argparse.Namespace) -> int:
         return _record(arguments, ENGINES.encode(report))
     timed = arguments.check is None
     recorded = None if timed else BENCH.decode(arguments.check.read_bytes())
-    compiled_model = bench.compile_subject(subject, host, quick=quick)
+    compiled_model = bench.compile_subject(
+        subject, host, quick=quick, loop=loop, task=arguments.task
+    )
     scene, is_stopped = _measure_scene(compiled_model, host, quick=quick, timed=timed)
     if recorded is not None:
         departures = scene_departures(recorded, scene, compiled_model.declarations.bench)

@@ -12,6 +12,7 @@ The clock is best the processor time of the thread, which stands still while oth
 
 from __future__ import annotations
 
+import copy
 import gc
 from collections.abc import Callable, Sequence
 from typing import Any, TypeAlias
@@ -25,7 +26,7 @@ from mjbench.problem import Array, Scenario
 from mjbench.reports import Interval
 from mjbench.reports.scene_report import MeasuredSetting
 from mjbench.scene import Scene
-from mjbench.simulation import STATE, full_state, initial_data, silent
+from mjbench.simulation import STATE, advance, full_state, initial_data, silent
 
 Clock: TypeAlias = Callable[[], int]
 """Time so far, in ns."""
@@ -131,6 +132,7 @@ def costs(
     variant = with_setting(model, settings[baseline])
 
     def job(setting: MeasuredSetting) -> Job:
+        apply(variant, setting, model)  # under which a controller is asked
         run = scenario_job(variant, [scene.scenario], setting.timestep)
 
         def work() -> None:
@@ -161,10 +163,13 @@ def scenario_job(
         states = [full_state(model, initial_data(scenario, model)) for scenario in scenarios]
     runs = []
     for scenario, state in zip(scenarios, states, strict=True):
-        parts = [
-            (np.array(command)[commanded] if command else None, round((end - begin) / timestep))
+        commands: list[tuple[Array | None, int]] = [
+            (np.array(command) if command else None, round((end - begin) / timestep))
             for begin, end, command in scenario.holds()
         ]
+        if scenario.loop is not None:
+            commands = [*_loop_commands(model, scenario, timestep)]
+        parts = [(None if c is None else c[commanded], steps) for c, steps in commands]
         runs.append((state, parts))
 
     def job() -> None:
@@ -178,3 +183,20 @@ def scenario_job(
                 mujoco.mj_step(model, data, steps)
 
     return job
+
+
+def _loop_commands(model: Any, scenario: Scenario, timestep: float) -> list[tuple[Array, int]]:
+    """What a controller commands, each with the number of steps for which that holds.
+
+    What is timed is the engine under the same commands: the controller takes the same in all.
+    """
+    model = copy.copy(model)
+    model.opt.timestep = timestep
+    data, commands = initial_data(scenario, model), list[tuple[Array, int]]()
+    for _ in range(round(scenario.duration / timestep)):
+        advance(model, data)
+        if commands and np.array_equal(commands[-1][0], data.ctrl):
+            commands[-1] = commands[-1][0], commands[-1][1] + 1
+        else:
+            commands.append((data.ctrl.copy(), 1))
+    return commands

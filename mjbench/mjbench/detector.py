@@ -282,9 +282,8 @@ def deepest_contact(data: Any) -> float:
 
 def driving_force(model: Any, scenario: Scenario) -> str:
     """What may raise the energy of a motion, or store some that is not counted; "" for nothing."""
-    has_commands = np.any(scenario.controls) or (
-        scenario.keyframe >= 0 and np.any(model.key_ctrl[scenario.keyframe])
-    )
+    has_commands = np.any(scenario.controls) or scenario.loop is not None
+    has_commands |= bool(scenario.keyframe >= 0 and np.any(model.key_ctrl[scenario.keyframe]))
     has_actuators = model.nu and not model.opt.disableflags & int(
         mujoco.mjtDisableBit.mjDSBL_ACTUATION
     )

@@ -140,7 +140,10 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         setup=setup,
         contact=look.contact,
         constrained=look.constrained,
-        jumps=look.jumps(variant),
+        jumps=(
+            *(() if scenario.loop is None else ("a controller in the loop",)),
+            *look.jumps(variant),
+        ),
         horizons=(min(horizons), max(horizons)),
         lyapunov=float(np.median(growth_rates)) if growth_rates else None,
         settles=float(data.energy[1]) < _SETTLED * peaks.kinetic,

@@ -18,6 +18,7 @@ from msgspec.structs import astuple
 from numpy.typing import NDArray
 
 from mjbench.declarations import is_multiple
+from mjbench.loop import Loop
 from mjbench.reports.shown_errors import INTEGRATORS
 
 Array: TypeAlias = NDArray[np.float64]
@@ -61,6 +62,8 @@ class Scenario(Struct, frozen=True):
     """Seconds, a multiple of `sample`: commands change on a grid that all timesteps share."""
     keyframe: int = -1
     """The keyframe of the model in which it begins, by number; -1: in none."""
+    loop: Loop | None = None
+    """The controller that commands it, in place of `controls`."""
 
     @property
     def times(self) -> Array:

@@ -27,6 +27,7 @@ from mjbench.detector import (
     judge,
     update_peaks,
 )
+from mjbench.loop import close_loop, step
 from mjbench.problem import Array, Integrator, Motion, Scenario, Setup
 
 _CODE = {
@@ -134,7 +135,7 @@ class silent:  # noqa: N801 - used as a function, and quicker than a generator
 def advance(model: Any, data: Any, steps: int = 1) -> None:
     """Make so many steps; MuJoCo's warnings are counted in `data.warning`, and not printed."""
     with silent():
-        mujoco.mj_step(model, data, steps)
+        step(model, data, steps)
 
 
 def watch_steps(model: Any, data: Any, steps: int, passages: Passages) -> None:
@@ -144,7 +145,7 @@ def watch_steps(model: Any, data: Any, steps: int, passages: Passages) -> None:
         return
     with silent():
         for _ in range(steps):
-            mujoco.mj_step(model, data)
+            step(model, data, 1)
             passages.look(data)
 
 
@@ -185,6 +186,8 @@ def initial_data(scenario: Scenario, model: Any) -> Any:
         data.qvel[:] = scenario.qvel
     if scenario.controls:
         data.ctrl[:] = scenario.controls[0]
+    if scenario.loop is not None:
+        close_loop(scenario.loop, model, data)
     return data
 
 
@@ -268,8 +271,8 @@ class Run(Struct, frozen=True):
 
 def simulate(setup: Setup, model: Any) -> Run:
     """Run a scenario with a model under its own options."""
-    scenario, step = setup.scenario, float(model.opt.timestep)
-    steps_per_sample, times = scenario.steps(step), scenario.times
+    scenario, timestep = setup.scenario, float(model.opt.timestep)
+    steps_per_sample, times = scenario.steps(timestep), scenario.times
     data, scratch = initial_data(scenario, model), initial_data(scenario, model)
     qpos, qvel, act = (np.full((len(times), n), np.nan) for n in (model.nq, model.nv, model.na))
     table = np.full((len(times) + 1, 5), np.nan)
@@ -287,7 +290,7 @@ def simulate(setup: Setup, model: Any) -> Run:
         table[index + 1] = invariants(model, scratch, data.qpos, data.qvel)
         # Where a step ends, its contacts are still those of its beginning.
         peaks = replace(peaks, penetration=max(peaks.penetration, deepest_contact(scratch)))
-    judgement = judge(model, data, steps * step, peaks, setup, passages.texts())
+    judgement = judge(model, data, steps * timestep, peaks, setup, passages.texts())
     states = EngineStates(times, qpos, qvel, act)
     return Run(
         states,

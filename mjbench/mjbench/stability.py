@@ -34,8 +34,6 @@ from mjbench.linearization import Theory, find_theory
 from mjbench.parts import Parts
 from mjbench.pilot import (
     Pilot,
-    horizon_error,
-    horizon_errors,
     longer_setup,
     position_distances,
 )
@@ -51,7 +49,7 @@ from mjbench.reports import Reach, reach
 from mjbench.reports.case_report import BoundaryLine
 from mjbench.reports.limits import limit_text, map_text
 from mjbench.reports.scene_report import StableRow
-from mjbench.reports.shown_errors import FEWEST_STEPS, horizon_error_text
+from mjbench.reports.shown_errors import FEWEST_STEPS
 from mjbench.simulation import (
     EngineStates,
     compile_model,
@@ -63,6 +61,7 @@ from mjbench.stability_runs import (
     STARTS,
     KeptMotion,
     StabilityTrial,
+    kept_motion,
     run_trial,
     step_count,
 )
@@ -202,15 +201,15 @@ def search_row(
     resolution = _COARSE if quick else _FINE
     largest = _look_closer(partial(laboratory.is_lost, 0), grid, resolution, quick)
     near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
-    estimates = [_bisect(partial(laboratory.is_lost, 0, spans=2), near, resolution, _NEAR)]
+    estimates = [bisect(partial(laboratory.is_lost, 0, spans=2), near, resolution, _NEAR)]
     by_start = {
-        n: _bisect(partial(laboratory.is_lost, n, spans=2), near, math.inf, _NEAR)
+        n: bisect(partial(laboratory.is_lost, n, spans=2), near, math.inf, _NEAR)
         for n in range(1, laboratory.starts)
     }
     if by_start:
         worst = min(by_start, key=lambda n: by_start[n])
         is_lost = partial(laboratory.is_lost, worst, spans=2)
-        estimates.append(_bisect(is_lost, near, resolution, _NEAR))
+        estimates.append(bisect(is_lost, near, resolution, _NEAR))
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
     limit, orbital = theory.limit(integrator, search), theory.orbital(integrator)
     gain = _first_gain(laboratory, grid, setup)
@@ -262,12 +261,12 @@ def _limit_of(
     def is_lost(step: float) -> bool:
         return bool(getattr(laboratory.trial(0, step), kind))
 
-    largest = _bisect(is_lost, steps, max(resolution, _COARSE), math.inf)
+    largest = bisect(is_lost, steps, max(resolution, _COARSE), math.inf)
     lost = [h for h in laboratory.own_steps() if h > largest and is_lost(h)]
     return reach(largest), getattr(laboratory.trial(0, lost[0]), kind) if lost else ""
 
 
-def _bisect(
+def bisect(
     is_lost: Callable[[float], bool],
     grid: Sequence[float],
     resolution: float,
@@ -297,8 +296,8 @@ def _bisect(
 def _look_closer(
     is_lost: Callable[[float], bool], grid: list[float], resolution: float, quick: bool
 ) -> float:
-    """`_bisect`, until none of many timesteps below is lost: with impacts islands are narrow."""
-    largest = _bisect(is_lost, grid, resolution)
+    """`bisect`, until none of many timesteps below is lost: with impacts islands are narrow."""
+    largest = bisect(is_lost, grid, resolution)
     while largest:
         top = min(largest, grid[-1])
         closer = np.geomspace(top / _NEAR, top, _QUICK_CLOSER if quick else _CLOSER).tolist()
@@ -306,7 +305,7 @@ def _look_closer(
         if lost is None:
             break
         grid = [*(step for step in grid if step < lost), lost]
-        largest = _bisect(is_lost, grid, resolution)
+        largest = bisect(is_lost, grid, resolution)
     return largest
 
 
@@ -327,7 +326,7 @@ def _first_gain(
         trial = laboratory.trial(0, step)
         return trial.energy - setup.energy
 
-    lossless = _bisect(lambda h: not gain(h) <= least, grid, _GAIN_RESOLUTION, _NEAR)
+    lossless = bisect(lambda h: not gain(h) <= least, grid, _GAIN_RESOLUTION, _NEAR)
     if math.isinf(lossless):
         return None
     first = min(h for h in laboratory.own_steps() if h > lossless and not gain(h) <= least)
@@ -365,9 +364,7 @@ def stable_rows(
     low, high = sorted(scene.declaration.search or [part * scene.timestep for part in _SEARCH])
     limits = scene.declaration.limits
     setup_over = cache(partial(longer_setup, model, pilot))
-    far = horizon_error_text(horizon_error(model, scene))
-    states = reference.head(int(np.sum(reference.times <= pilot.horizon * (1 + 1e-9))))
-    motion = KeptMotion(states, horizon_errors(model, scene), far)
+    motion = kept_motion(model, pilot, reference)
 
     def declared_limit(integrator: Integrator) -> Limit | None:
         step = limits.get(integrator.value)  # type: ignore[call-overload]
@@ -375,12 +372,16 @@ def stable_rows(
 
     theory = parts.run(
         f"{scene.name}: theory of stability",
-        lambda: find_theory(
-            model,
-            scene.scenario,
-            declared_limit if limits else None,
-            smooth=pilot.smooth,
-            visits=partial(_comes_near, motion, model),
+        lambda: (
+            Theory(declared_limit if limits else None)
+            if scene.scenario.loop is not None  # which no linearization of the engine knows
+            else find_theory(
+                model,
+                scene.scenario,
+                declared_limit if limits else None,
+                smooth=pilot.smooth,
+                visits=partial(_comes_near, motion, model),
+            )
         ),
         Theory(declared_limit if limits else None),
     )

@@ -6,12 +6,14 @@ import math
 from typing import Any
 
 import mujoco
+import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench.detector import Passages, Peaks, RunStatus, has_bad_state, judge, update_peaks
-from mjbench.pilot import nudges, position_distance
+from mjbench.pilot import Pilot, horizon_error, horizon_errors, nudges, position_distance
 from mjbench.problem import Array, Setup
+from mjbench.reports.shown_errors import horizon_error_text
 from mjbench.simulation import EngineStates, initial_data, watch_steps
 
 STARTS, QUICK_STARTS, NEARBY = 5, 3, 1e-4
@@ -64,6 +66,13 @@ class KeptMotion(Struct, frozen=True, eq=False):
         qpos, qvel = self.states.qpos[number].copy(), self.states.qvel[number]
         mujoco.mj_integratePos(model, qpos, qvel, data.time - float(self.states.times[number]))
         return position_distance(model, qpos, data.qpos, self.units)
+
+
+def kept_motion(model: Any, pilot: Pilot, reference: EngineStates) -> KeptMotion:
+    """The reference of a scene as the motion that runs are compared with."""
+    far = horizon_error_text(horizon_error(model, pilot.scene))
+    states = reference.head(int(np.sum(reference.times <= pilot.horizon * (1 + 1e-9))))
+    return KeptMotion(states, horizon_errors(model, pilot.scene), far)
 
 
 def step_count(span: float, timestep: float) -> int:

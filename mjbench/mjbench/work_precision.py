@@ -20,6 +20,7 @@ from msgspec.structs import replace
 from mjbench import known_motion, measure, simulation
 from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
 from mjbench.costs import Clock, costs
+from mjbench.delays import loop_note
 from mjbench.derive import derive_scenario
 from mjbench.detector import driving_force, pair_names
 from mjbench.measured_setting import Basis, measure_setting
@@ -87,6 +88,10 @@ def measure_scenario(
     error_parts = parts.run(f"{scene.name}: errors apart", partial(_error_parts, basis), None)
     states = reference.states
     largest = stable_rows(model, pilot, states, parts, quick=quick)
+    notes = list(_notes(basis, largest, rows, cost_of))
+    if scene.scenario.loop is not None:
+        delays = partial(loop_note, model, pilot, states)
+        notes.append(parts.run(f"{scene.name}: delays", delays, ""))
     figures = partial(measure_expected, model, scene, baseline)
     expected = parts.collect(f"{scene.name}: what theory knows", figures())
     report = scene_report.ScenarioReport(
@@ -104,7 +109,7 @@ def measure_scenario(
         lyapunov=pilot.lyapunov,
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
-        notes=_notes(basis, largest, rows, cost_of),
+        notes=tuple(filter(None, notes)),
         figure=measure.quantity_name(model, scene),
         rows=tuple(rows),
         orders=measure.fit_scene_orders(model, rows, baseline, states, reference.floor)
@@ -336,7 +341,7 @@ def _notes(
         notes.append(
             f"beyond {refsafe_limit:.6g} s refsafe softens constraints: stable, but another model"
         )
-    return tuple(note for note in notes if note)
+    return tuple(notes)
 
 
 def _with_costs(

@@ -7,6 +7,7 @@
  *   boot('')            → ''             compiles and starts the engine; ends before the next call
  *   booted('')          → version        or throws why it did not start
  *   trial(requestJson)  → replyJson
+ *   judge(requestJson)  → replyJson      an attempt at an exercise (exercise/judge.js): `{refused, verdicts}` of `{config, code}`
  *   lookUp(pathsJson)   → JSON           which of `data.qpos` and the like exist, with the model in 'mjb'
  *   trying('')          → JSON           for a trial that was stopped from outside: `stuck`, the entry whose code may never return, or
  *                                        `null`, and `trying`, the entry that was tried
@@ -14,6 +15,7 @@
 
 import './lab/trial/shims.js'
 import loadMujoco from '@mujoco/mujoco'
+import { judge } from './exercise/judge.js'
 import { createEngine } from './lab/core/engine.js'
 import { current } from './lab/core/piece.js'
 import { fromBase64 } from './lab/trial/base64.js'
@@ -67,6 +69,22 @@ globalThis.trial = (json) => {
   }
   const reply = runTrial(engine, request, bytes, now, guard)
   return JSON.stringify({ ...reply, printed: output.slice(0, 100) })
+}
+
+globalThis.judge = (json) => {
+  const { config, code } = JSON.parse(json)
+  const bytes = new Uint8Array(buffers.get('mjb'))
+  guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
+  const verdicts = []
+  let refused = ''
+  try {
+    const functions = new Function(`"use strict"; return ${code}`)()
+    for (const verdict of judge(engine, config, functions, bytes, () => beats[0]++)) verdicts.push(verdict)
+  } catch (error) {
+    refused = error.message ?? String(error)
+  }
+  guard.repair()
+  return JSON.stringify({ refused, verdicts: refused === '' ? verdicts : [] })
 }
 
 globalThis.lookUp = (json) => JSON.stringify(lookUp(engine, new Uint8Array(buffers.get('mjb')), JSON.parse(json)))

@@ -3,6 +3,7 @@
  */
 
 import loadMujoco from '@mujoco/mujoco'
+import { judgeHere } from './exercise/worker.js'
 import { Host } from './lab/worker/host.js'
 import { createLater } from './lab/worker/later.js'
 
@@ -30,4 +31,4 @@ async function get(url) {
   return response
 }
 
-self.onmessage = ({ data }) => host.receive(data)
+self.onmessage = ({ data }) => void (data.type === 'judge' ? judgeHere(host, data) : host.receive(data))

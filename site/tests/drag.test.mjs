@@ -85,3 +85,47 @@ test('a drag shows its spring, and ends with a reset', (t) => {
   assert.equal(lab.drag.active, false)
   assert.equal(lab.frame()[1], 0)
 })
+
+const held = (lab) => {
+  const { xpos, xmat } = lab.data
+  return [0, 1, 2].map((i) => xpos[3 + i] - 0.4 * xmat[9 + 3 * i + 2]) // of the arm: 0.4 m below its joint
+}
+
+test('while time stands still, the pose follows the hand as far as joints allow', (t) => {
+  const limited = PENDULUM.replace('damping=".01"', 'range="-90 90" limited="true"')
+  const lab = labOf(t, engine, limited)
+  lab.start()
+  lab.data.qvel[0] = 2
+  lab.perturb({ body: 1, point: [0, 0, -0.4], target: [0.4 * Math.sin(1), 0, -0.4 * Math.cos(1)] }, true)
+  assert.ok(Math.abs(lab.data.qpos[0] + 1) < 1e-3, `${lab.data.qpos[0]}: a positive angle turns it towards -x`)
+  assert.deepEqual(held(lab).map((x) => x.toFixed(3)), ['0.337', '0.000', '-0.216'])
+  assert.deepEqual([lab.data.qvel[0], lab.time], [2, 0])
+  lab.perturb({ target: [9, 0, 0] }, true)
+  assert.ok(Math.abs(lab.data.qpos[0] + Math.PI / 2) < 1e-3, 'it points to where it cannot reach')
+  lab.perturb({ target: [0.1, 0, 0.4] }, true)
+  assert.ok(lab.data.qpos[0] >= -Math.PI / 2 - 1e-12, 'within its range')
+  assert.ok(!lab.log, 'no control did this')
+  lab.perturb(null)
+  lab.step(1)
+  assert.ok(Number.isFinite(lab.data.qpos[0]))
+})
+
+test('what floats is moved as a whole, as by MuJoCo', (t) => {
+  const xml = WEIGHTLESS.replace('<site', '<body pos="0 0 .2"><joint axis="0 1 0"/><geom size=".1"/></body><site')
+  const lab = labOf(t, engine, xml)
+  lab.start()
+  lab.perturb({ body: 2, point: [0, 0, 1.2], target: [0.5, 0.25, 2] }, true)
+  assert.deepEqual([...lab.data.qpos].map((x) => Number(x.toFixed(12))), [0.5, 0.25, 1.8, 1, 0, 0, 0, 0])
+  assert.deepEqual([...lab.data.xfrc_applied], new Array(18).fill(0), 'no spring pulls')
+})
+
+test('an arm of three joints reaches a point that it can reach', (t) => {
+  const link = (inner) => `<body pos=".3 0 0"><joint axis="0 1 0"/><joint axis="0 0 1"/><geom type="capsule" size=".02" fromto="0 0 0 .3 0 0"/>${inner}</body>`
+  const lab = labOf(t, engine, `<mujoco><worldbody>${link(link(link('')))}</worldbody></mujoco>`)
+  lab.start()
+  const target = [0.5, 0.3, 0.4]
+  lab.perturb({ body: 3, point: [1.2, 0, 0], target }, true)
+  const { xpos, xmat } = lab.data
+  const end = [0, 1, 2].map((i) => xpos[9 + i] + 0.3 * xmat[27 + 3 * i])
+  assert.ok(Math.hypot(...end.map((x, i) => x - target[i])) < 1e-3, `${end}`)
+})

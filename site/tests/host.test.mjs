@@ -385,3 +385,50 @@ test('an engine that cannot be had is told, and tried again for the next lab', a
   await bench.load('b')
   assert.equal(bench.of('ready').length, 1)
 })
+
+test('time goes back and on, and the page is told what no longer belongs to the run', async () => {
+  const bench = new Bench({ codes: { plain: code({ plots: [[({ data }) => data.time]] }) } })
+  await bench.load('a', { plots: [plot(1)] })
+  const last = () => {
+    bench.run(20)
+    return bench.of('frame').at(-1)
+  }
+  bench.send({ type: 'play', lab: 'a' })
+  bench.run(500)
+  bench.send({ type: 'seek', lab: 'a', time: 0.1 })
+  assert.equal(bench.of('paused').at(-1).reason, 'user')
+  const back = last()
+  assert.ok(Math.abs(back.time - 0.1) < 1e-9)
+  const { end } = back.tape
+  assert.ok(end > 0.4)
+  for (const [n, time] of [[-1, 0.098], [1, 0.1], [-1000, 0]]) {
+    bench.send({ type: 'step', lab: 'a', n })
+    const frame = last()
+    assert.deepEqual([frame.time.toFixed(6), frame.tape.end, frame.samples.from], [time.toFixed(6), end, Infinity])
+  }
+  bench.send({ type: 'seek', lab: 'a', time: 0.1 })
+  bench.messages.length = 0
+  bench.send({ type: 'play', lab: 'a' })
+  bench.run(100)
+  const frames = bench.of('frame')
+  assert.ok(frames.at(-1).tape.end < 0.3)
+  assert.ok(frames.some(({ samples }) => Math.abs(samples.from - 0.1) < 1e-9))
+  const times = frames.flatMap(({ samples }) => [...samples.times])
+  assert.ok(times.every((time, i) => time > (times[i - 1] ?? 0.1)))
+})
+
+test('a model without code starts from its first keyframe, and says what it offers while it is inspected', async () => {
+  const bench = new Bench()
+  await bench.load('a', {}, '', 'pendulum')
+  bench.run(20)
+  assert.equal(bench.of('frame').at(-1).panel, null)
+  bench.send({ type: 'inspect', lab: 'a', on: true })
+  bench.send({ type: 'actuate', lab: 'a', index: 0, value: 0.5 })
+  bench.run(40)
+  assert.deepEqual(bench.of('model')[0].model.keys, ['up'])
+  assert.deepEqual([...bench.of('frame').at(-1).panel.ctrl], [0.5])
+  bench.send({ type: 'state', lab: 'a' })
+  assert.ok([...bench.of('state')[0].state.physics].includes(3))
+  bench.send({ type: 'keyframe', lab: 'a', index: 4 })
+  assert.equal(bench.of('error').at(-1).kind, 'refused')
+})

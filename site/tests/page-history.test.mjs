@@ -2,6 +2,7 @@
 
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
+import { curvesText } from '../js/lab/page/csv.js'
 import { History } from '../js/lab/page/history.js'
 
 const filled = (history, count, dt = 0.01) => {
@@ -59,4 +60,34 @@ test('a value that is no finite number interrupts its line', () => {
   const history = new History(2, null)
   ;[[1, 2], [NaN, 3], [Infinity, 4]].forEach((values, i) => history.push(i, values, 0))
   assert.deepEqual(history.data(), [[0, 1, 2], [1, null, null], [2, 3, 4]])
+})
+
+test('what comes after a time is dropped, and a window is filled again from the whole run', () => {
+  const whole = filled(new History(2, null), 1000)
+  const recent = filled(new History(2, 2), 1000)
+  whole.cut(4.005)
+  recent.refill(whole, 4.005 - 2)
+  for (const history of [whole, recent]) assert.ok(Math.abs(history.last - 4) < 1e-9)
+  assert.ok(Math.abs(recent.data()[0][0] - 2.01) < 1e-9)
+  recent.push(4.01, [9, 7, 8], 1)
+  assert.deepEqual(recent.at(4.01), [7, 8])
+  whole.cut(-1)
+  assert.equal(whole.length, 0)
+})
+
+test('between two samples a value lies on a straight line, and a gap stays a gap', () => {
+  const history = new History(1, null)
+  for (const [time, value] of [[0, 1], [1, 3], [2, NaN]]) history.push(time, [value], 0)
+  assert.deepEqual([history.at(0), history.at(0.25), history.at(1)], [[1], [1.5], [3]])
+  assert.ok(Number.isNaN(history.at(1.5)[0]))
+  assert.ok(Number.isNaN(history.at(9)[0]))
+})
+
+test('curves are written as a table that programs read', () => {
+  const columns = [[0, 0.5], [1, NaN], [-2e-20, 3]].map((column) => Float64Array.from(column))
+  const curves = [
+    { ylabel: 'angle (rad)', labels: ['left', 'a "b", c'], columns },
+    { ylabel: 'energy', labels: ['energy'], columns: [columns[0], columns[2]] },
+  ]
+  assert.equal(curvesText(curves), 'time (s),left: angle (rad),"a ""b"", c: angle (rad)",energy\r\n0,1,-2e-20,-2e-20\r\n0.5,,3,3\r\n')
 })

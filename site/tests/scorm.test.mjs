@@ -2,6 +2,7 @@ import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { grade, interaction } from '../js/scorm/answers.js'
 import { findApi } from '../js/scorm/find.js'
+import { questionsOf } from '../js/scorm/frame.js'
 import { clock, decimal, identifier, shortText, signOf, timespan } from '../js/scorm/formats.js'
 import { beginSession } from '../js/scorm/session.js'
 import { pack, unpack } from '../js/scorm/suspend.js'
@@ -106,6 +107,19 @@ test('what is kept comes back', () => {
   const sorted = (all) => [...all].sort((a, b) => (a.key < b.key ? -1 : 1))
   assert.deepEqual(sorted(back.answers), sorted(answers))
   assert.equal(back.read, true)
+})
+
+test('an exercise that is solved counts, is recorded, and comes back', () => {
+  const document = { querySelectorAll: (selector) => (selector === '[data-exercise]' ? [{ dataset: { exercise: '{"id":"1.1-a"}' } }] : []) }
+  const [exercise] = questionsOf(document)
+  const answer = { ...kept(1, 'solved'), quiz: '1.1-a', key: '1.1-a', kind: 'exercise' }
+  assert.deepEqual(unpack(pack([answer], false)).answers, [answer])
+  const record = Object.fromEntries(interaction(exercise, answer, new Date()))
+  assert.equal(record.type, 'fill-in')
+  assert.equal(record.student_response, 'solved')
+  assert.equal(record.result, 'correct')
+  assert.equal(grade([exercise], () => null, true).status, 'incomplete')
+  assert.equal(grade([exercise], () => answer, false).status, 'passed')
 })
 
 test('it has room in 4096 characters, and the verdicts stay longest', () => {

@@ -9,7 +9,17 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
-from support.lab_page import EDITED_LAB, PAGE, lab, press, until, watch_page
+from support.lab_page import (
+    EDITED_LAB,
+    PAGE,
+    SWING,
+    lab,
+    press,
+    until,
+    wait_for_change,
+    wait_until_still,
+    watch_page,
+)
 
 pytestmark = pytest.mark.browser
 
@@ -71,6 +81,53 @@ def test_mistakes_are_told_at_their_lines_and_a_mended_model_runs(page: Page) ->
     expect(lab_element).to_have_attribute("data-state", "playing")
 
 
+CART = """<mujoco>
+  <worldbody>
+    <camera name="behind" pos="0 -3 0" xyaxes="1 0 0 0 0 1"/>
+    <body><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1"/></body>
+  </worldbody>
+  <actuator><motor name="push" joint="slide" ctrllimited="true" ctrlrange="-4 8"/></actuator>
+  <sensor><jointpos name="place" joint="slide"/></sensor>
+  <keyframe><key name="near" qpos="0"/><key name="far" qpos="3"/></keyframe>
+</mujoco>"""
+
+
+def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: Page) -> None:
+    lab_element, text = editor_of(page)
+    text.fill(CART)
+    press(lab_element, "Compile and run")
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    push = lab_element.get_by_label("push")
+    expect(push).to_have_count(0)
+    lab_element.get_by_text("Model", exact=True).click()
+    expect(push).to_have_attribute("min", "-4")
+    expect(push).to_have_attribute("max", "8")
+    place = lab_element.locator(".lab-model dd")
+    expect(place).to_have_text(re.compile(r"^\s0\.000$"))
+    push.fill("4")
+    expect(place).to_have_text(re.compile(r"^\s[1-9]\d*\.\d{3}$"))
+    assert violations(page, ".lab") == []
+    press(lab_element, "Pause")
+    expect(lab_element).to_have_attribute("data-state", "paused")
+    press(lab_element, "far")
+    expect(place).to_have_text(re.compile(r"^\s3\.000$"))
+    expect(push).to_have_attribute("aria-valuetext", "0.000")
+    view = lab_element.locator(".lab-view")
+    free = wait_until_still(page, view)
+    lab_element.get_by_label("Camera", exact=True).select_option(label="behind")
+    wait_for_change(page, view, free)
+    view.press("ArrowLeft")  # which shows the focus, too
+    rear_view = wait_until_still(page, view)
+    view.press("ArrowLeft")
+    assert wait_until_still(page, view) == rear_view, "no hand turns a camera of the model"
+    lab_element.get_by_label("Camera", exact=True).select_option(label="free")
+    wait_for_change(page, view, rear_view)
+    text.fill("<mujoco/>")
+    press(lab_element, "Compile and run")
+    expect(lab_element.locator(".lab-model")).to_have_text(re.compile("no actuators, sensors"))
+    lab_element.get_by_text("Model", exact=True).click()
+
+
 def test_link_carries_the_edited_model(page: Page, base: str) -> None:
     lab_element, text = editor_of(page)
     mine = '<mujoco>\n  <worldbody><geom name="μ" size="0.3"/></worldbody>\n</mujoco>'
@@ -87,6 +144,35 @@ def test_link_carries_the_edited_model(page: Page, base: str) -> None:
     text.fill("".join(str(i**0.5) for i in range(3000)))
     press(lab_element, "Copy link to this model")
     expect(lab_element.get_by_role("alert").filter(has_text="too long for a link")).to_be_visible()
+
+
+def test_every_lab_opens_its_model_in_the_editor(page: Page) -> None:
+    swing = lab(page, SWING)
+    press(swing, "Open in the editor")
+    text = swing.get_by_label("The model, as MJCF")
+    expect(text).to_be_focused()
+    lesson = text.input_value()
+    assert '<body name="arm"' in lesson
+    expect(swing.get_by_role("button", name="Push")).to_be_hidden()
+    mine = lesson.replace("</worldbody>", '<geom name="mine" size="0.1"/></worldbody>')
+    text.fill(mine)
+    text.press("Control+Enter")
+    expect(swing).to_have_attribute("data-state", "playing")
+    assert violations(page, ".lab") == []
+    press(swing, "Copy link to this model")
+    expect(page).to_have_url(re.compile("#lab=1.1-lab-1&z="))
+    second_page = page.context.new_page()
+    second_page.goto(page.url)
+    linked_lab = lab(second_page, SWING, None)
+    expect(linked_lab.get_by_label("The model, as MJCF")).to_have_value(mine)
+    second_page.close()
+    press(swing, "Back to the lab")
+    expect(text).to_have_count(0)
+    expect(swing).to_have_attribute("data-state", "paused")
+    press(swing, "Push")
+    press(swing, "Play")
+    expect(swing).to_have_attribute("data-state", "playing")
+    press(swing, "Pause")
 
 
 def test_model_that_never_comes_to_an_end_holds_nothing_up(page: Page) -> None:

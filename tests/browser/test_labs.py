@@ -225,6 +225,75 @@ def test_keys_on_the_picture(lesson: Lesson, swing: Locator) -> None:
     expect(swing.locator(".lab-live dd").first).to_contain_text("2.500")
 
 
+def test_time_goes_back_and_on_to_the_last_bit(
+    lesson: Lesson, swing: Locator, course: Site
+) -> None:
+    page = lesson.page
+    bar = swing.get_by_label("Time of the run")
+    expect(bar).to_be_disabled()
+    press(swing, "Play")
+    wait_for_condition(page, lambda: time_of(swing) > 1)
+    press(swing, "Pause")
+    reach(page, SWING, "paused")
+    swing.get_by_label("gravity").fill("15")
+    expect(swing.locator(".lab-value").first).to_contain_text("15.0")
+    press(swing, "One step")
+    last = state_of(page, swing)
+    bar.fill("0.5")
+    expect(swing.locator(".lab-time")).to_have_text("0.50 s")
+    expect(swing.get_by_label("gravity")).to_have_value("9.8")
+    expect(bar).to_have_attribute("aria-valuetext", "0.50 s")
+    press(swing, "One step back")
+    bar.press("ArrowLeft")
+    swing.locator(".lab-view").press(",")
+    swing.locator(".lab-view").press(".")
+    expect(bar).to_have_value(re.compile(r"^0\.49[56]"))
+    earlier = state_of(page, swing)
+    steps = int(str(earlier["n"]))
+    assert steps == 248
+    np.testing.assert_allclose(floats(earlier)[:3], native(course, steps, 2.5), rtol=1e-9)
+    bar.press("End")
+    expect(swing.get_by_label("gravity")).to_have_value("15")
+    assert state_of(page, swing) == last
+    # A control that is used at an earlier time drops what came after.
+    bar.fill("0.5")
+    expect(swing.get_by_label("gravity")).to_have_value("9.8")
+    press(swing, "Push")
+    expect(swing.locator(".lab-time")).to_have_text("0.50 s")
+    bar.press("End")
+    expect(swing.locator(".lab-time")).to_have_text("0.50 s")
+
+
+def test_pointer_on_a_curve_sets_the_time_and_curves_are_downloaded(
+    lesson: Lesson, swing: Locator
+) -> None:
+    page = lesson.page
+    press(swing, "Play")
+    wait_for_condition(page, lambda: time_of(swing) > 1)
+    press(swing, "Pause")
+    reach(page, SWING, "paused")
+    plot = swing.locator(".lab-live .lab-plot")
+    before = wait_until_still(page, plot)
+    plot.hover(position={"x": 60, "y": 60})
+    wait_for_change(page, plot, before)  # values are shown
+    end = time_of(swing)
+    plot.click(position={"x": 60, "y": 60})
+    wait_for_condition(page, lambda: 0 < time_of(swing) < end)
+    with page.expect_download() as download:
+        press(swing, "Curves as CSV")
+    rows = download.value.path().read_text().splitlines()
+    assert rows[:2] == ["time (s),angle: angle (rad)", "0,2.5"]
+    assert float(rows[-1].split(",")[0]) == pytest.approx(end, abs=0.1)
+    press(swing, "Keep this run")
+    press(swing, "Reset")
+    expect(swing.locator(".lab-time")).to_have_text("0.00 s")
+    page.mouse.move(0, 0)
+    kept_picture = wait_until_still(page, plot)
+    press(swing, "Drop the kept run")
+    wait_for_change(page, plot, kept_picture)
+    expect(swing.get_by_role("button", name="Keep this run")).to_be_visible()
+
+
 def test_body_is_pulled_by_a_spring(lesson: Lesson, swing: Locator) -> None:
     page = lesson.page
     swing.get_by_label("gravity").fill("0")
@@ -256,6 +325,36 @@ def test_body_is_pulled_by_a_spring(lesson: Lesson, swing: Locator) -> None:
 
     wait_for_condition(page, stays)
     page.mouse.up()
+
+
+def test_body_of_a_paused_lab_is_moved_by_the_hand_alone(lesson: Lesson, swing: Locator) -> None:
+    page = lesson.page
+    view = swing.locator(".lab-view")
+    view.scroll_into_view_if_needed()
+    box = view.bounding_box()
+    assert box is not None
+    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    scale = box["height"] / (2 * 2.5 * np.tan(np.pi / 8))
+    end = (middle[0] - 0.4 * np.sin(2.5) * scale, middle[1] + 0.4 * np.cos(2.5) * scale)
+    hand = swing.get_by_role("button", name="Grab bodies")
+    hand.click()
+    expect(hand).to_have_attribute("aria-pressed", "true")
+    page.mouse.move(*end)
+    page.mouse.down()
+    page.mouse.move(middle[0], middle[1] + 0.45 * scale, steps=3)
+    page.mouse.up()
+    wait_for_condition(page, lambda: abs(float(readout(swing, "angle"))) < 0.1)
+    expect(swing.locator(".lab-time")).to_have_text(re.compile(r"^0\.00"))
+    expect(swing).to_have_attribute("data-state", "paused")
+    before = wait_until_still(page, view)
+    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 60, box["y"] + 20)
+    page.mouse.up()
+    wait_for_change(page, view, before)  # where nothing is, the hand turns the view
+    view.press("0")
+    hand.click()
+    expect(hand).to_have_attribute("aria-pressed", "false")
 
 
 def test_lab_out_of_sight_waits_and_goes_on_when_it_is_back(lesson: Lesson, swing: Locator) -> None:

@@ -211,7 +211,7 @@ def test_two_fingers_zoom_and_move(phone: Phone, sideways: bool) -> None:
 
 def test_finger_that_rests_on_a_body_pulls_it(phone: Phone) -> None:
     page, fingers, _ = phone
-    page.locator("#tried input[type=range]").fill("0")  # no gravity; it begins to move
+    page.locator("#tried .lab-slider input").fill("0")  # no gravity; it begins to move
     until(page, "() => window.made.state === 'playing'")
     page.evaluate("() => window.made.view.element.scrollIntoView({ block: 'center' })")
     page.evaluate(RESTS, 10)
@@ -246,7 +246,7 @@ def test_finger_that_rests_where_nothing_is_turns_as_ever(phone: Phone) -> None:
 
 def test_buttons_sliders_and_lists_by_touch(phone: Phone) -> None:
     page, fingers, _ = phone
-    slider = page.locator("#tried input[type=range]")
+    slider = page.locator("#tried .lab-slider input")
     slider.scroll_into_view_if_needed()
     page.evaluate(RESTS, 10)
     box = slider.bounding_box()

@@ -166,7 +166,7 @@ def test_every_callout_kind_is_named() -> None:
 
 PAGE_OF_KIND = {
     "python": "scripts", "io": "scripts", "text": "outputs", "mjcf": "models", "bench": "models",
-    "lab": "labs", "lab mjcf": "labs", "quiz": "quizzes",
+    "lab": "labs", "lab mjcf": "labs", "quiz": "quizzes", "exercise": "exercises",
 }  # fmt: skip
 
 

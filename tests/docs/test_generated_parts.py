@@ -230,7 +230,7 @@ def test_generated_parts_are_in_step(request: pytest.FixtureRequest) -> None:
 
 def test_every_field_has_its_table() -> None:
     headings = {" ".join(words.split()[:2]) for words in generated("fields")}
-    for schema in ("course", "model", "lab", "quiz"):
+    for schema in ("course", "model", "lab", "quiz", "exercise"):
         names = set(json.loads(json_schema(schema))["$defs"]) - TOLD_OTHERWISE
         missing = {name for name in names if not {f"{schema} {name}", f"lab {name}"} & headings}
         assert missing == set(), schema

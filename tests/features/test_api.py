@@ -212,7 +212,7 @@ def test_every_public_name_has_its_subject_and_is_there() -> None:
         _ = api.nothing
 
 
-LESSON = "## Fall\n\n```exercise points=4\nHow *fast* does it fall?\n```\n"
+LESSON = "## Fall\n\n```assignment points=4\nHow *fast* does it fall?\n```\n"
 
 
 @pytest.fixture(scope="module")
@@ -245,11 +245,11 @@ def test_a_distribution_brings_a_fence_a_page_texts_and_a_command(
     result = run(course, plugin, "build")
     assert result.status == 0, result.out
     html = course.text("public/lessons/1.1-one.html")
-    assert '<div class="exercise"><p>4 Punkte</p>\n<p>How <em>fast</em> does it fall?</p>' in html
+    assert '<div class="assignment"><p>4 Punkte</p>\n<p>How <em>fast</em> does it fall?</p>' in html
     assert "**4 Punkte**" in course.text("public/lessons/1.1-one.md")
-    page = course.text("public/exercises/index.html")
+    page = course.text("public/assignments/index.html")
     assert re.search(r'<li><a href="\.\./lessons/1\.1-one\.html">[^<]+</a>: 4</li>', page)
-    assert "Exercises" in html, "the foot of every page leads to the page, in English if need be"
+    assert "Assignments" in html, "the foot of every page leads to the page, in English if need be"
     assert run(course, plugin, "points") == CommandResult(0, "4 points\n", "")
     assert run(course, plugin, "points", "--least", "5").out == "0 points\n"
     refusal = CommandResult(2, "", "coursebuild: `--least` is a number of points\n")
@@ -259,13 +259,14 @@ def test_a_distribution_brings_a_fence_a_page_texts_and_a_command(
 
 @pytest.mark.site
 def test_a_distribution_brings_rules(course: Folder, plugin: Path) -> None:
-    course.write(course.lesson(), LESSON.replace("=4", "=8") * 2 + "\n```exercise\nWhy?\n```\n")
+    course.write(course.lesson(), LESSON.replace("=4", "=8") * 2 + "\n```assignment\nWhy?\n```\n")
     result = run(course, plugin, "check")
     assert result.status == 1
-    assert "error[exercise-points]: it has no points" in result.out
-    assert "warning[exercise-sum]: this lesson has more than ten points" in result.out
+    assert "error[assignment-points]: it has no points" in result.out
+    assert "warning[assignment-sum]: this lesson has more than ten points" in result.out
     assert (
-        "A lesson gives more than ten points." in run(course, plugin, "explain", "exercise-sum").out
+        "A lesson gives more than ten points."
+        in run(course, plugin, "explain", "assignment-sum").out
     )
 
 
@@ -275,7 +276,7 @@ def test_a_feature_for_a_newer_interface_is_refused(
 ) -> None:
     newer = tmp_path / "newer"
     shutil.copytree(plugin, newer)
-    code = newer / "exercise_plugin/__init__.py"
+    code = newer / "assignment_plugin/__init__.py"
     text = code.read_text(encoding="utf-8")
     for old, new, reason in (
         ("api=1", "api=99", f"it needs version 99 of `coursebuild.api`, and this is {api.API}: "),
@@ -284,6 +285,6 @@ def test_a_feature_for_a_newer_interface_is_refused(
         code.write_text(text.replace(old, new), encoding="utf-8")
         result = run(course, newer, "check")
         assert result.status == 1
-        assert f"the entry point exercise_plugin:FEATURE cannot be used: {reason}" in result.err
+        assert f"the entry point assignment_plugin:FEATURE cannot be used: {reason}" in result.err
         assert "install a newer coursebuild" in result.err
         assert "Traceback" not in result.err

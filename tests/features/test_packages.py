@@ -196,7 +196,10 @@ def test_a_course_is_built_without_a_feature(feature: str, tmp_path: Path, store
                 (
                     "schema",
                     "quiz",
-                ): "there is no schema 'quiz': choose from course, lab, lab-ode, lab-plot, model",
+                ): (
+                    "there is no schema 'quiz': choose from course, exercise, lab, lab-ode, "
+                    "lab-plot, model"
+                ),
             }
             for arguments, reason in messages.items():
                 assert run(*arguments) == CommandResult(2, "", f"coursebuild: {reason}\n")

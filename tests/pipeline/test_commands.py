@@ -109,7 +109,8 @@ WRONG_USAGE = [
     ("serve --port http", "'http' is not a port"),
     (
         "schema nosuch",
-        "there is no schema 'nosuch': choose from course, lab, lab-ode, lab-plot, model, quiz",
+        "there is no schema 'nosuch': choose from course, exercise, lab, lab-ode, lab-plot, model, "
+        "quiz",
     ),
     ("-C", "`-C` takes a folder"),
     ("check -C", "expected one argument"),

@@ -74,3 +74,65 @@ def test_what_a_page_hands_over_runs_alone_or_has_no_button(make: Make, tmp_path
     mended = folder.main("build")
     assert mended.status == 0, mended.out
     assert 'astray.py" download' in folder.text("public/lessons/1.1-one.html")
+
+
+STYLED = """\
+import matplotlib
+import mujoco
+import yaml.nodes
+
+from mjcourse import model_path, spatial
+
+path = (lambda name: model_path(name))("arm")
+model = mujoco.MjModel.from_xml_path(str(path))
+print(model.ngeom, spatial.__name__, matplotlib.rcParams["font.size"])
+"""
+ABSENT = "import os.path\nimport torch.nn\n"
+ARM = "<mujoco><include file='part.xml'/></mujoco>\n"
+PART = "<mujocoinclude><worldbody><geom size='.1'/></worldbody></mujocoinclude>\n"
+IN_ARCHIVE = """
+README.md examples/helped.py examples/names.py examples/styled.py matplotlibrc models/arm.xml
+models/ball.xml models/part.xml requirements.txt runs/data.csv
+"""
+
+
+def test_an_archive_of_a_lesson_holds_what_its_scripts_need(make: Make, tmp_path: Path) -> None:
+    name = block("names.py", 'NAME = "a ball"\n') + block("absent.py", ABSENT, info="norun")
+    styled = block("styled.py", STYLED, "1 mjcourse.spatial 11.0")
+    helped = block("helped.py", HELPED, "a ball 7 1,2")
+    folder = make(f"## One\n\n{helped}{styled}", f"## Two\n\n{name}")
+    for path, text in {
+        "models/ball.xml": MODEL,
+        "models/arm.xml": ARM,
+        "models/part.xml": PART,
+        "models/box.xml": MODEL,
+        "runs/data.csv": "1,2",
+        "matplotlibrc": "font.size: 11\n",
+    }.items():
+        folder.write(path, text)
+    build = folder.main("build")
+    assert build.status == 0, build.out
+    data = folder.read("public/lessons/1.1-one.zip")
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        paths = [path for path in archive.namelist() if "/mjcourse/" not in path]
+        assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        assert {entry.external_attr >> 16 for entry in archive.infolist()} == {0o100644}
+        archive.extractall(tmp_path)
+    unpacked = tmp_path / "1.1-one"
+    assert paths == [f"1.1-one/{path}" for path in IN_ARCHIVE.split()]
+    assert run(unpacked, "examples/helped.py") == "a ball 7 1,2\n"
+    assert run(unpacked, "examples/styled.py") == "1 mjcourse.spatial 11.0\n"
+    requirements = (unpacked / "requirements.txt").read_text().splitlines()
+    assert [line.partition("==")[0] for line in requirements] == [
+        *("matplotlib", "mujoco", "numpy", "PyYAML"),
+    ]
+    assert "python examples/helped.py\n" in (unpacked / "README.md").read_text()
+
+    with zipfile.ZipFile(io.BytesIO(folder.read("public/lessons/1.2-two.zip"))) as archive:
+        unknown = archive.read("1.2-two/requirements.txt").decode()
+    assert unknown == "# the package of the module torch was not known\n"
+    with zipfile.ZipFile(io.BytesIO(folder.read("public/examples.zip"))) as archive:
+        paths = {path.partition("/")[2] for path in archive.namelist()}
+    assert paths >= {"examples/absent.py", "examples/helped.py", "runs/data.csv"}
+    assert folder.main("build", "--no-cache", "--out", "again").status == 0
+    assert folder.read("again/lessons/1.1-one.zip") == data

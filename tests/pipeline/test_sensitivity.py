@@ -81,6 +81,33 @@ while data.time < 1.98:
     steps += 1
 print(f"{data.qpos[0]:.7f} rad after {steps} steps of {1000 * model.opt.timestep:.1f} ms")
 """
+TIMES = """
+import mujoco
+
+XML = '''
+<mujoco>
+  <option timestep="0.004" integrator="RK4"/>
+  <worldbody>
+    <body>
+      <joint axis="0 1 0"/>
+      <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
+    </body>
+  </worldbody>
+</mujoco>
+'''
+model = mujoco.MjModel.from_xml_string(XML)
+data = mujoco.MjData(model)
+data.qpos[0] = 1.5
+turns = []
+while data.time < 4.9999:
+    before, speed = data.time, data.qvel[0]
+    mujoco.mj_step(model, data)
+    if speed * data.qvel[0] < 0:
+        turns.append(data.time)
+print(f"turns after {turns[0]:.3f} s, again {turns[1] - turns[0]:.4f} s later")
+print(f"at {data.time:.3f} s {data.qpos[0]:.3f} rad, {data.qvel[0]:.3f} rad/s")
+print(f"within 1 step, {1000 * turns[0]:.0f} ms or {turns[0]:.1f} s")
+"""
 LIMIT = """
 import mujoco
 
@@ -116,6 +143,7 @@ def course(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     """A course with all of the scripts, whose sensitivity was measured once."""
     folder = Folder(tmp_path_factory.mktemp("sensitivity") / "course")
     scripts = [("double", DOUBLE_PENDULUM), ("fall", FALL), ("limit", LIMIT), ("plain", PLAIN)]
+    scripts += [("times", TIMES)]
     scripts += [(name, SWING.replace("INTEGRATOR", name)) for name in ("Euler", "RK4")]
     blocks = [block(f"{name}.py", code, "?") for name, code in scripts]
     blocks.append(block("loose.py", DOUBLE_PENDULUM, "?", "rtol=1e-9 atol=29"))
@@ -178,6 +206,20 @@ def test_digits_that_are_converged_are_right(course: Folder, by_path: dict[str, 
         assert least <= doubt["converged"] < doubt["digits"], name
         decimals = len(doubt["instead"].partition(".")[2])
         assert abs(float(doubt["instead"]) - exact) < 10**-decimals, name
+
+
+def test_times_looked_for_at_every_step_are_known_to_a_step(by_path: dict[str, Any]) -> None:
+    """Exact is 1.16549 s, by an elliptic integral, which shorter steps within those do not show.
+
+    Neither the time of the end nor the state there is looked for.
+    """
+    doubts = by_path["examples/times.py"]["doubts"]
+    assert [(d["printed"], d["converged"], d["instead"], d["sampled"]) for d in doubts] == [
+        ("1.168", 3, "1.17", "0.004"),
+        ("1.1640", 3, "1.16", "0.004"),
+        ("1168", 3, "", "4"),
+    ]
+    assert all(d["printed"] == d["halved"] == d["quartered"] for d in doubts)
 
 
 def test_report_as_text(course: Folder, by_path: dict[str, Any]) -> None:

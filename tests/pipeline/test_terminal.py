@@ -394,6 +394,7 @@ def test_words_are_completed_by_where_they_stand(course: Folder, tmp_path: Path)
     assert complete(course, "explain", "output-d") == ["output-drift"]
     assert complete(course, "schema", "") == [
         "course",
+        "exercise",
         "lab",
         "lab-ode",
         "lab-plot",

@@ -78,7 +78,7 @@ def lab(page: Page, number: int = SWING, state: str | None = "paused") -> Locato
 
 
 WAKE = """(lab) => {
-  if (lab.dataset.state === 'asleep') lab.querySelectorAll('.lab-transport .lab-icon')[1].click()
+  if (lab.dataset.state === 'asleep') lab.querySelector('.lab-transport .lab-icon').click()
 }"""
 
 

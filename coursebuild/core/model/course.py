@@ -182,6 +182,14 @@ class Lesson(LessonTable, frozen=True, kw_only=True):
         return f"content/lessons/{self.id}-{self.slug}.md"
 
 
+class CoursePath(Struct, frozen=True, forbid_unknown_fields=True):
+    """A way through the course, for one kind of reader."""
+
+    title: Annotated[fields.Text, describe("plain text")]
+    lessons: Annotated[tuple[fields.Text, ...], describe("ids of lessons in the order of reading")]
+    summary: Annotated[fields.Summary, describe("for whom it is, or where it leads")] = ""
+
+
 class Level(Struct, frozen=True):
     """A level of the map."""
 
@@ -321,6 +329,8 @@ class Course(Struct, frozen=True):
     levels: tuple[Level, ...]
     pages: tuple[Page, ...]
     models: tuple[MjcfModel, ...]
+    paths: tuple[CoursePath, ...] = ()
+    """Ways through it, which the home page shows."""
     files: tuple[str, ...] = ()
     """Other files in `content/` that a page may show or link to (pictures, data), by path relative
     to the root."""

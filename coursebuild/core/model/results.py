@@ -44,7 +44,7 @@ class ScriptJob(Struct, frozen=True):
     """Seconds."""
     requires: tuple[str, ...]
     perturbation: int = 0
-    """From 1 on, the direction in which initial states are moved a little; −1 halves timesteps."""
+    """From 1 on, the direction in which initial states are moved; below 0, steps change."""
     packages: tuple[str, ...] = ()
     environment: tuple[tuple[str, str], ...] = ()
     writes: tuple[str, ...] = ()
@@ -132,16 +132,16 @@ class Trace(Struct, frozen=True, rename={"is_perturbed": "moved"}):
     divergences: tuple[Divergence, ...] = ()
     """The simulations that diverged, in the order in which that was noticed, without repeats."""
     is_perturbed: bool = False
-    """Of a run with a `ScriptJob.perturbation`: whether a state was moved, or a step halved."""
+    """Of a run with a `ScriptJob.perturbation`: whether a state or a step was changed."""
     states: tuple[EndState, ...] = ()
     """Of such a run, for each `MjData`, separated by blanks: its number in the order of first use,
     the length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest
     since its simulation began), and the final `qpos` and `qvel`, as hexadecimal numbers."""
+    timesteps: tuple[float, ...] = ()  # of a run with shifted steps, s
     effects: tuple[Effect, ...] = ()
     """What it wrote outside its temporary folder and what it connected to, once for each line."""
     sought: tuple[str, ...] = ()
-    """Modules that it looked for in a folder of the project but did not find, such as those that
-    would replace Python's own: `folder/{one,two}`."""
+    """Modules that it looked for in a folder of the project in vain: `folder/{one,two}`."""
     existence: tuple[tuple[str, str], ...] = ()
     """Paths of the project where it looked whether something is there, each with the answer."""
     statuses: tuple[tuple[str, str], ...] = ()

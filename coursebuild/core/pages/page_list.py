@@ -6,12 +6,13 @@ same as long as the course map does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
 from coursebuild.core.features import ModelPart
 from coursebuild.core.model import (
+    CoursePath,
     Document,
     FeatureBlock,
     Lesson,
@@ -150,6 +151,14 @@ class LessonCard(Struct, frozen=True):
     picture: PictureLink | None
 
 
+class CardGroup(Struct, frozen=True):
+    """Lessons of a path, or all that are in none."""
+
+    title: str
+    summary: str
+    cards: tuple[LessonCard, ...]
+
+
 class Gallery(Struct, frozen=True):
     """A page with several pictures."""
 
@@ -173,12 +182,12 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
     course = library.course
     place = urls.Place(urls.HOME)
     written_lessons = [lesson for lesson in library.order if lesson.document is not None]
-    cards, galleries = [], []
+    cards, galleries = {}, []
     for lesson in written_lessons:
         pictures = _pictures_of(library, place, lesson)
         link = lesson_link(library, place, lesson, whole=True)
         level = library.levels[lesson.level].title
-        cards.append(LessonCard(link, level, pictures[0] if pictures else None))
+        cards[lesson.id] = LessonCard(link, level, pictures[0] if pictures else None)
     for page in library.menu:
         pictures = _pictures_of(library, place, page)
         if len(pictures) > 1:
@@ -186,7 +195,7 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
     values = {
         "title": course.title,
         "summary": course.summary,
-        "cards": tuple(cards),
+        "card_groups": tuple(_card_groups(course.paths, cards)),
         "galleries": tuple(galleries),
         "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
         "start": lesson_link(library, place, written_lessons[0]) if written_lessons else None,
@@ -201,6 +210,21 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
     head = PageHead(urls.HOME, "home", course.title, course.summary, course_data(library))
     inputs = None if document is None else document_inputs(library, place, document)
     return PageInputs(head, "home.html", values, inputs)
+
+
+def _card_groups(
+    paths: Iterable[CoursePath], cards: Mapping[str, LessonCard]
+) -> Iterator[CardGroup]:
+    """Yield the cards of each path, then of the lessons in none."""
+    rest = dict(cards)
+    for path in paths:
+        steps = [name for name in path.lessons if name in cards]
+        if steps:
+            yield CardGroup(path.title, path.summary, tuple(cards[name] for name in steps))
+        for name in steps:
+            rest.pop(name, None)
+    if rest:
+        yield CardGroup("", "", tuple(rest.values()))
 
 
 def _pictures_of(library: Library, place: urls.Place, owner: Owner) -> tuple[PictureLink, ...]:

@@ -246,9 +246,7 @@ def state_changes(
         if now == before and now != SPECIAL:  # a device may give something else each time
             continue
         match dependency.kind:
-            case Kind.FILE | Kind.OUTSIDE:
-                yield f"{name} {_became(before, now)}"
-            case Kind.EXISTENCE:
+            case Kind.FILE | Kind.OUTSIDE | Kind.EXISTENCE:
                 yield f"{name} {_became(before, now)}"
             case Kind.STATUS if now == ABSENT or before == ABSENT:
                 yield f"{name} {_became(before, now)}"

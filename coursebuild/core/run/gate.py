@@ -152,14 +152,12 @@ def start(
     stderr: Stream | None = NOTHING,
     pass_fds: Sequence[int] = (),
     bound: bool = True,
-    session: bool = True,
     enclose: Enclose | None = None,
 ) -> Process:
     """Start a process; an `OSError` says why it cannot be.
 
     `folder` is a private one of the caller, for a process that writes; `bound` lets it end with the
-    thread that starts it; without `session` it gets the signals of the terminal; `enclose` puts it
-    into a sandbox.
+    thread that starts it; `enclose` puts it into a sandbox.
     """
     if enclose is not None:
         command, environment = enclose(command, environment)
@@ -171,7 +169,7 @@ def start(
         stdout=stdout,
         stderr=stderr,
         pass_fds=pass_fds,
-        start_new_session=session,
+        start_new_session=True,  # the signals of the terminal are not for it
     )
 
 

@@ -1,6 +1,6 @@
-"""Run a script with slightly moved initial states or half steps: which printed digits hold?
+"""Run a script with slightly moved initial states: which printed digits hold?
 
-`perturb` or `DividedSteps` changes the process of such a run. Of moved states:
+`perturb` changes the process of such a run:
 
 1. What the script has put into `qpos`, `qvel` and `act` since MuJoCo last computed anything from
    them is an initial state: all of it for new data and after the clock went back. Before MuJoCo
@@ -25,9 +25,8 @@ The model, the time, controls and forces stay as they are.
 from __future__ import annotations
 
 import contextlib
-import threading
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -87,7 +86,7 @@ class _Perturbation:
     # --- before and after MuJoCo computes
 
     def _before(self, args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        model, data = _model_and_data(args, keywords)
+        model, data = model_and_data(args, keywords)
         extent = self._extents.get(id(data))
         if extent is None or extent.of() is not data:
             extent = self._extents[id(data)] = _Extent(data, self._count)
@@ -97,7 +96,7 @@ class _Perturbation:
         self._move(model, data, extent)
 
     def _after(self, args: tuple[Any, ...], keywords: Mapping[str, Any], result: Any) -> None:
-        data = _model_and_data(args, keywords)[1]
+        data = model_and_data(args, keywords)[1]
         extent = self._extents.get(id(data))
         if extent is not None and extent.of() is data:
             extent.cover(data)
@@ -302,110 +301,7 @@ def _states(data: Any) -> tuple[bytes, ...]:
     return data.qpos.tobytes(), data.qvel.tobytes(), data.act.tobytes()
 
 
-def _model_and_data(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple[Any, Any]:
+def model_and_data(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple[Any, Any]:
+    """The `MjModel` and the `MjData` in the arguments of one of MuJoCo's functions."""
     model = args[0] if args else keywords["m"]
     return model, args[1] if len(args) > 1 else keywords["d"]
-
-
-# --- shorter steps
-
-_INTEGRATORS = ("mj_Euler", "mj_implicit", "mj_RungeKutta")
-"""Integrators; a script has computed the accelerations itself before it calls one."""
-
-
-class DividedSteps:
-    """Makes each step of this process from now on as so many, with that part of the timestep.
-
-    1. All parts have the commands and forces that the script has set for the whole. Then the
-       clock is set to what it would have been, so that a script that counts steps, or looks at the
-       clock, makes as many calls as before.
-    2. The model's timestep is divided only during the step: the script reads and sets its own.
-    3. Rollouts are made with each row of controls repeated, and give the state after all parts.
-
-    What a script integrates itself, without a function of MuJoCo's that makes a step, stays whole.
-    """
-
-    def __init__(self, mujoco: Any, numpy: Any, parts: int) -> None:
-        self._mujoco = mujoco
-        self._numpy = numpy
-        self._parts = parts
-        self._step, self._forward = mujoco.mj_step, mujoco.mj_forward
-        self._lock = threading.RLock()  # threads may share a model
-        self._replace("mj_step", self._whole)
-        self._replace("mj_step1", lambda real, model, data: real(model, data))
-        self._replace("mj_step2", self._second)
-        for name in _INTEGRATORS:
-            self._replace(name, self._integrate)
-        mujoco_tracing.replace_rollout(self._mujoco, self._rollout)
-
-    def _replace(self, name: str, divided: Callable[..., None]) -> None:
-        real = getattr(self._mujoco, name)
-
-        def function(m: Any, d: Any, *args: Any, **keywords: Any) -> None:
-            if not isinstance(m, self._mujoco.MjModel) or not isinstance(d, self._mujoco.MjData):
-                real(m, d, *args, **keywords)  # it says what is wrong
-                return
-            with self._part_of([m]):
-                divided(real, m, d, *args, **keywords)
-
-        new = mujoco_tracing.wrap_function(function, like=real)
-        mujoco_tracing.replace_function(self._mujoco, name, new)
-
-    def _whole(self, real: Callable[..., None], model: Any, data: Any, nstep: int = 1) -> None:
-        with self._clock(model, data, nstep):
-            real(model, data, self._parts * nstep)
-
-    def _second(self, real: Callable[..., None], model: Any, data: Any) -> None:
-        with self._clock(model, data, 1):
-            real(model, data)
-            self._step(model, data, self._parts - 1)
-
-    def _integrate(self, real: Callable[..., None], model: Any, data: Any, *stages: int) -> None:
-        with self._clock(model, data, 1):
-            real(model, data, *stages)
-            for _ in range(1, self._parts):
-                self._forward(model, data)
-                real(model, data, *stages)
-
-    @contextlib.contextmanager
-    def _part_of(self, models: Sequence[Any]) -> Iterator[None]:
-        with self._lock:
-            whole = [float(model.opt.timestep) for model in models]
-            for model, timestep in zip(models, whole, strict=True):
-                model.opt.timestep = timestep / self._parts
-            try:
-                yield
-            finally:
-                for model, timestep in zip(models, whole, strict=True):
-                    model.opt.timestep = timestep
-
-    @contextlib.contextmanager
-    def _clock(self, model: Any, data: Any, steps: int) -> Iterator[None]:
-        """Set the clock to where whole steps lead, unless MuJoCo resets it."""
-        timestep, time = self._parts * float(model.opt.timestep), float(data.time)
-        yield
-        for _ in range(steps):
-            time += timestep
-        if abs(data.time - time) < timestep / (2 * self._parts):
-            data.time = time
-        mujoco_tracing.active_tracer().note("p")
-
-    def _rollout(self, real: Callable[..., None]) -> Callable[..., None]:
-        numpy, parts = self._numpy, self._parts
-
-        def repeat_rows(array: Any) -> Any:
-            return array if array is None else numpy.repeat(array, parts, axis=1)
-
-        def rollout(of: Any, models: Any, data: Any, nstep: int, spec: int, *rest: Any) -> None:
-            """As MuJoCo's, in shorter steps."""
-            begin, warm, control, *outputs = rest[:5]
-            all_outputs = [repeat_rows(output) for output in outputs]
-            arrays = (begin, warm, repeat_rows(control), *all_outputs)
-            with self._part_of(list({id(model): model for model in models}.values())):
-                real(of, models, data, parts * nstep, spec, *arrays, *rest[5:])
-            for output, states in zip(outputs, all_outputs, strict=True):
-                if output is not None and states is not None:
-                    output[:] = states[:, parts - 1 :: parts]
-            mujoco_tracing.active_tracer().note("p")
-
-        return rollout

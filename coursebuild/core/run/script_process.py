@@ -24,7 +24,7 @@ from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from types import CodeType, ModuleType
 from typing import Any, TypedDict
 
-from coursebuild.core.run import mujoco_tracing, mujoco_watching, perturbation
+from coursebuild.core.run import mujoco_tracing, mujoco_watching, perturbation, step_changes
 from coursebuild.core.run.matplotlib_watching import FigureWatch
 from coursebuild.core.run.part_marks import PartMark, compile_parts
 from coursebuild.core.run.tracing import Tracer
@@ -68,7 +68,7 @@ class Job(TypedDict):
     """What stands in its output between two of them, in hexadecimal digits."""
     perturbation: int
     """The direction in which initial states are moved (`perturbation`); 0: none;
-    −n: each step is made as 2ⁿ."""
+    below, steps are changed (`step_changes.change_steps`)."""
 
 
 class PreloadedPackages:
@@ -227,7 +227,7 @@ class ScriptProcess:
         tracer.has_mujoco = mujoco is not None
         if job["perturbation"] and mujoco is not None:
             if job["perturbation"] < 0:
-                perturbation.DividedSteps(mujoco, numpy, 2 ** -job["perturbation"])
+                step_changes.change_steps(mujoco, numpy, job["perturbation"])
             else:
                 perturbation.perturb(mujoco, numpy, job["perturbation"])
         for name in [name for name in sys.modules if name.partition(".")[0] == "coursebuild"]:

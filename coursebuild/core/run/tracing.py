@@ -20,8 +20,8 @@ A record is a letter and a value, in bytes:
 - `d` and fields between tabs: a simulation was lost (see `mujoco_watching`)
 - `w` and a path, `c` and an address, each with a file of the project and a line between tabs: the
   line writes outside its temporary folder, or uses the network
-- `p`: an initial state was moved, or a step halved; `s` and numbers: a state at its end (see
-  `perturbation`)
+- `p`: an initial state was moved, or a step changed; `s` and numbers: a state at its end; `h` and a
+  number: a timestep of which some are shifted (see `perturbation` and `step_changes`)
 - `o` and words: why the trace may be incomplete
 
 The handlers of events use `posix` where `os` would raise an event itself, and as little else as

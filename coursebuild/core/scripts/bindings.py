@@ -33,11 +33,12 @@ from coursebuild.core.scripts.bound_places import (
     document_bindings,
     place_note,
 )
+from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body, recording_key
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, describe_line
 from coursebuild.core.scripts.tables import row_values
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose, did_you_mean
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.numbers import Number, difference
 from coursebuild.core.text.quantities import with_unit
@@ -224,6 +225,52 @@ def dependent_bindings(
             change = next(overlap, None)
             dependents += [] if change is None else [DependentBinding(binding, change)]
     return tuple(dependents)
+
+
+def update_outputs(
+    verdicts: Iterable[Verdict],
+    documents: Iterable[model.Document],
+    outputs: PrintedOutputs,
+    addresses: Addresses,
+) -> tuple[list[Edit], list[Diagnostic]]:
+    """The edits by which recorded outputs, and numbers bound to them, become what runs printed.
+
+    Also, why outputs cannot be written. `verdicts` are on the outputs, whose scripts ran well, and
+    `documents` have the bound numbers. These become what stands at their addresses; where one is
+    gone, or several of one number do not agree, nothing is written. For `addresses` see
+    `check_bindings`.
+    """
+    edits: list[Edit] = []
+    refusals: list[Diagnostic] = []
+    is_written: dict[tuple[str, int], bool] = {}
+    for verdict in verdicts:
+        recording = verdict.recording
+        printed = outputs.runs[recording.script or ""].output_of(recording.part)
+        change = update_body(recording, verdict.comparison, printed, verdict.row_addresses)
+        is_written[recording_key(recording)] = not isinstance(change, Diagnostic)
+        if isinstance(change, Diagnostic):
+            refusals.append(change)
+        elif change is not None:
+            edits.append(change)
+    for document in documents:
+        check_bindings(document, outputs, addresses)
+        for binding, value in bound_values(document, outputs):
+            bound = BoundNumber(binding, outputs, addresses.get(value, ()))
+            states = [is_written.get(recording_key(v.recording)) for v in bound.steady]
+            is_open = False in states or (bound.verdicts and not bound.steady)
+            is_known = bool(bound.addresses or binding.words)
+            if not bound.ran_well or is_open or not bound.text.numbers or not is_known:
+                continue
+            texts = [
+                outputs.updated_text(verdict) if is_new else outputs.text(verdict)
+                for verdict, is_new in zip(bound.steady, states, strict=True)
+            ]
+            places = bound.look_up([*texts, *bound.printed])
+            rewritten = {bound.text.rewrite(place) for place in places}
+            is_shown = all(map(bound.text.shows, places))
+            if not is_shown and len(rewritten) == 1 and (new := rewritten.pop()):
+                edits.append(Edit(binding.text_span, new))
+    return edits, refusals
 
 
 _QUOTIENT = Context(prec=34)

@@ -14,7 +14,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 from msgspec import Struct
@@ -214,28 +214,3 @@ _LINE_END = re.compile(r"(?<!\n)\n[ \t>]*(?!\n)")
 def _find(address: Address, outputs: Iterable[PrintedText], count: int) -> PrintedPlace | None:
     places = (output.find(address, count) for output in outputs)
     return next((place for place in places if place is not None), None)
-
-
-def follow_outputs(
-    document: model.Document,
-    outputs: PrintedOutputs,
-    addresses: Addresses,
-    text_after: Callable[[Verdict], PrintedText | None],
-) -> Iterator[Edit]:
-    """The edits by which bound numbers become what stands at their addresses in this run.
-
-    `text_after` gives the lines of a recorded output as they will be; `None` where they cannot be
-    written. Where an address is gone, or several of one number do not agree, nothing is written.
-    """
-    for binding, value in bound_values(document, outputs):
-        bound = BoundNumber(binding, outputs, addresses.get(value, ()))
-        texts = [text for v in bound.steady if (text := text_after(v)) is not None]
-        is_open = len(texts) < len(bound.steady) or (bound.verdicts and not bound.steady)
-        is_known = bool(bound.addresses or binding.words)
-        if not bound.ran_well or is_open or not bound.text.numbers or not is_known:
-            continue
-        places = bound.look_up([*texts, *bound.printed])
-        rewritten = {bound.text.rewrite(place) for place in places}
-        is_shown = all(map(bound.text.shows, places))
-        if not is_shown and len(rewritten) == 1 and (new := rewritten.pop()):
-            yield Edit(binding.text_span, new)

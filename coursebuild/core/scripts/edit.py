@@ -40,7 +40,7 @@ from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.scripts.tables import RowAddresses, TableMatcher, number_text
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import point_decimals, write_comma
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.source import Excerpt, Source, Span
 
 _FENCE = re.compile(r"`{3,}|~{3,}")
 
@@ -59,6 +59,14 @@ def apply_edits(text: str, edits: Iterable[Edit]) -> str:
             raise ValueError(f"edits overlap at offset {start} of {edit.span.path}")
         places.append((start, end, edit.text))
     return replace_ranges(text, places)
+
+
+def edited_texts(edits: Iterable[Edit]) -> dict[Source, str]:
+    """The texts that are edited, each as it becomes; the same edit may be there twice."""
+    by_source: dict[Source, dict[Edit, None]] = {}
+    for edit in edits:
+        by_source.setdefault(edit.span.source, {})[edit] = None
+    return {source: apply_edits(source.text, changes) for source, changes in by_source.items()}
 
 
 def update_body(

@@ -205,7 +205,8 @@ def _part_difference(old: DrawnPart, new: DrawnPart, axes: Axes) -> str:
         itertools.chain.from_iterable(new.paths),
         strict=True,
     )
-    moves = [(n, a, b) for n, (a, b) in enumerate(points, 1) if not _is_near(a, b, axes.ranges)]
+    pairs = enumerate(points, 1)
+    moves = [(n, a, b) for n, (a, b) in pairs if not all(map(_are_close, a, b, axes.ranges))]
     if moves:  # the farthest one says most
         number, before, now = max(moves, key=lambda move: _distance(move[1], move[2], axes.ranges))
         position = f"its point {number} of {counts[0]}" if counts[0] > 1 else "its point"
@@ -243,10 +244,6 @@ def _style_difference(old: DrawnPart, new: DrawnPart) -> str:
     if old.sizes != new.sizes:
         return "has markers of other sizes"
     return ""
-
-
-def _is_near(old: Point, new: Point, ranges: tuple[float, float]) -> bool:
-    return all(_are_close(a, b, size) for a, b, size in zip(old, new, ranges, strict=True))
 
 
 def _distance(old: Point, new: Point, ranges: tuple[float, float]) -> float:

@@ -9,20 +9,19 @@
    timesteps give two changes, of which each says what the error of a method of first order is; the
    larger one counts. Where the second is not clearly the smaller one, the values do not tend
    anywhere yet, however near the first two happen to lie: then ten times the larger one counts.
+   A time that a script finds by looking at every step is right to a timestep only, and no shorter
+   steps within its own show that. It is told by runs that look a part of a timestep later: they
+   print it alike, or exactly a timestep more or less, where a state would change little by little
+   and a time that was chosen beforehand not at all.
 3. The final states of a pair of runs, which began in opposite directions, show how fast states
    part: relative to the largest positions and velocities since the simulation began, not to those
    that it happens to end with.
-4. A warning is given where the verification would take a difference for drift: what a tolerance or
-   `digits` allows for is no mistake. Nor is a number that moved no further than its initial states
-   did: more than about twelve of its digits cannot be judged, unless it has more than the fifteen
-   that any floating-point number holds.
 """
 
 from __future__ import annotations
 
 import enum
 import math
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 from itertools import pairwise
@@ -33,10 +32,8 @@ from msgspec.structs import replace
 from coursebuild.core.model import Comparison, Course, Mode, Recording
 from coursebuild.core.model.results import Change, Outcome, ScriptRun
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.diff import quote
 from coursebuild.core.scripts.lines import same_number
 from coursebuild.core.scripts.printed_text import PrintedText
-from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.numbers import Number, difference, only_number, round_like, unit
 from coursebuild.core.text.source import Span
 
@@ -45,9 +42,9 @@ PERTURBATION = 1e-12
 RUNS = 4
 """Runs with moved states of each script: two pairs in opposite directions, the second pair half as
 far away."""
-FINER_RUNS = (-1, -2)
-"""The numbers of the runs in which each step is made as 2 and as 4: two raised to the number less
-its sign."""
+FINER_RUNS, SHIFTED_RUNS = (-1, -2), (-3, -4)
+"""The numbers of the runs in which each step is made as 2 and as 4, and of those in which a script
+sees states of a third and of two thirds of a timestep later."""
 CHAOTIC = 1e8
 """A simulation is chaotic if its states are more than this many times as far apart at the end as at
 the beginning: fewer than eight of a number's sixteen digits are left."""
@@ -85,6 +82,9 @@ class Doubt(Struct, frozen=True):
     halved: str
     """The text printed in its place with half the timestep; empty where not known."""
     quartered: str
+    sampled: str
+    """The timestep to which it is known, s, as a time that was looked for at every step; empty for
+    other numbers."""
     instead: str
     """The number with only the digits that repeat and converge; empty if none does, or a count."""
     compared: bool
@@ -121,14 +121,9 @@ class Sensitivity(Struct, frozen=True):
         return self.amplification is not None and self.amplification > CHAOTIC
 
 
-_MAX_NOTES = 20
-_AS_MOVED = 11
-"""Digits that repeat of a number that moves at most ten times as far as the initial states."""
 _SHRINKING = Decimal("0.75")
 """The part of a change that the next one may be where values tend to something: half in first
 order, and some room."""
-_EXACT_DIGITS = sys.float_info.dig
-_WIDTH = 40
 
 
 def sensitivity(
@@ -139,22 +134,26 @@ def sensitivity(
     base: ScriptRun,
     moved_runs: Sequence[ScriptRun],
     finer_runs: Sequence[ScriptRun] = (),
+    shifted_runs: Sequence[ScriptRun] = (),
 ) -> Sensitivity:
     """What runs of a script with moved states, and with shorter steps, show of its output.
 
     `base` is its ordinary run; there are no `moved_runs` where they would have no point.
-    `finer_runs`: with half and with a quarter of the timestep, or none.
+    `finer_runs`: with half and with a quarter of the timestep, or none; `shifted_runs`: with states
+    of a part of a timestep later, or none.
     """
     compared = _compared_recordings(course, recordings)
     standing = _standing(compared, base, moved_runs)
     if standing is not Standing.MEASURED:
         return Sensitivity(path, owner, standing)
     reason_unhalved = _reason_unhalved(finer_runs)
-    usable_runs = () if reason_unhalved else finer_runs
+    usable_runs = _RunsByKind(moved_runs)
+    if not reason_unhalved:
+        usable_runs = _RunsByKind(moved_runs, finer_runs, _usable_shifted(shifted_runs))
     findings = [
         finding
         for recording, comparison in compared
-        for finding in _find_doubts(recording, comparison, base, moved_runs, usable_runs)
+        for finding in _find_doubts(recording, comparison, base, usable_runs)
     ]
     numbers = sum(
         len(line.numbers)
@@ -177,6 +176,24 @@ def _reason_unhalved(runs: Sequence[ScriptRun]) -> str:
         if run.trace is None or not run.trace.is_perturbed:
             return "no step of it can be halved"
     return ""
+
+
+class _RunsByKind(Struct, frozen=True):
+    """The runs of a script beside its ordinary one."""
+
+    moved: Sequence[ScriptRun]
+    finer: Sequence[ScriptRun] = ()
+    shifted: Sequence[ScriptRun] = ()
+
+    @property
+    def timesteps(self) -> set[float]:
+        """Those of the simulations that are shifted, s."""
+        return {h for run in self.shifted if run.trace is not None for h in run.trace.timesteps}
+
+
+def _usable_shifted(runs: Sequence[ScriptRun]) -> Sequence[ScriptRun]:
+    is_usable = all(run.outcome is Outcome.OK and run.trace is not None for run in runs)
+    return runs if is_usable else ()
 
 
 def is_worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
@@ -220,10 +237,9 @@ def _find_doubts(
     recording: Recording,
     comparison: Comparison,
     base: ScriptRun,
-    moved_runs: Sequence[ScriptRun],
-    finer_runs: Sequence[ScriptRun],
+    runs: _RunsByKind,
 ) -> Iterator[Doubt | Flip]:
-    """Numbers and texts of a recording that moved states or shorter steps change, in order."""
+    """Numbers and texts of a recording that other runs change, in order."""
     exact = replace(comparison, mode=Mode.EXACT)
 
     def find_changes(run: ScriptRun) -> dict[tuple[int, int], Change]:
@@ -231,7 +247,7 @@ def _find_doubts(
         return {(change.span.start, change.span.end): change for change in changes}
 
     changes_of_base = find_changes(base)
-    changes_by_run = [find_changes(run) for run in (*moved_runs, *finer_runs)]
+    changes_by_run = [find_changes(run) for run in (*runs.moved, *runs.finer, *runs.shifted)]
     first_changes = {place: c for changes in changes_by_run[::-1] for place, c in changes.items()}
     for place, first_change in sorted(first_changes.items()):
         recorded = first_change.recorded
@@ -239,11 +255,40 @@ def _find_doubts(
             changes[place].printed if place in changes else recorded
             for changes in (changes_of_base, *changes_by_run)
         )
-        if any(value != printed for value in values):
-            count = len(moved_runs)
+        finer_end = len(runs.moved) + len(runs.finer)
+        start_values, finer = values[: len(runs.moved)], values[len(runs.moved) : finer_end]
+        tick = _sampling_step(printed, finer, values[finer_end:], runs.timesteps)
+        if tick or any(value != printed for value in values[:finer_end]):
             yield from _judge_number(
-                first_change.span, (recorded, printed), values[:count], values[count:], comparison
+                first_change.span, (recorded, printed), start_values, finer, tick, comparison
             )
+
+
+def _sampling_step(
+    printed: str, finer: Sequence[str], shifted: Sequence[str], timesteps: Iterable[float]
+) -> Decimal | None:
+    """The timestep to which a time is known that was looked for at every step, as printed.
+
+    In s or in ms. `None` where a number is none: then runs with shorter steps, or with steps that
+    are shifted, change it by anything else than whole timesteps, or not at all.
+    """
+    values = (*finer, *shifted)
+    number, numbers = only_number(printed), [n for v in values if (n := only_number(v)) is not None]
+    if number is None or len(numbers) < len(values) or not shifted:
+        return None
+    if not all(n.is_finite for n in (number, *numbers)):
+        return None
+    unit_printed = unit(number.place)
+    changes = [difference(number.value, n.value) for n in numbers]
+    for tick in (Decimal(repr(h)) * scale for h in timesteps for scale in (1, 1000) if h > 0):
+        whole = [round(change / tick) for change in changes]
+        is_whole = all(
+            abs(change - count * tick) < unit_printed
+            for change, count in zip(changes, whole, strict=True)
+        )
+        if unit_printed < tick and is_whole and max(whole[len(finer) :]) == 1:
+            return tick
+    return None
 
 
 def _judge_number(
@@ -251,12 +296,13 @@ def _judge_number(
     texts: tuple[str, str],
     values: Sequence[str],
     finer: Sequence[str],
+    tick: Decimal | None,
     comparison: Comparison,
 ) -> Iterator[Doubt | Flip]:
     """What moved states and shorter steps say of a number or text.
 
     `texts` are what is recorded and what was printed; `values` were printed with moved states,
-    `finer` with half and with a quarter of the timestep.
+    `finer` with half and with a quarter of the timestep. `tick`: see `_sampling_step`.
     """
     recorded, printed = texts
     recorded_number, number = only_number(recorded), only_number(printed)
@@ -279,6 +325,8 @@ def _judge_number(
             least, most = ordered_numbers[0].text, ordered_numbers[-1].text
             repeat = _count_repeating(number, spread)
     converged = _count_converged(number, finer) if finer else None
+    if converged is not None and tick is not None:
+        converged = min(converged, _count_repeating(number, tick))
     halved, quartered = (text.strip() for text in finer or ("", ""))
     yield Doubt(
         span,
@@ -290,7 +338,8 @@ def _judge_number(
         most,
         halved,
         quartered,
-        _round_to(number, repeat if converged is None else min(repeat, converged)),
+        "" if tick is None else f"{float(tick):.6g}",
+        round_to(number, repeat if converged is None else min(repeat, converged)),
         compared,
     )
 
@@ -326,7 +375,7 @@ def _count_repeating(number: Number, spread: Decimal) -> int:
     return min(_digits(number), max(0, number.value.adjusted() - place + 1))
 
 
-def _round_to(number: Number, digits: int) -> str:
+def round_to(number: Number, digits: int) -> str:
     """A printed number with so many significant digits; empty for no digits, and for a count."""
     if digits < 1 or number.is_integer or not number.is_finite:
         return ""
@@ -367,58 +416,3 @@ def amplification(moved_runs: Sequence[ScriptRun]) -> float | None:
                     growth = gap / (max(size, other_size, *map(abs, mine)) or 1.0)
                     factors.append(growth / initial_gap if math.isfinite(growth) else math.inf)
     return max(factors, default=None)
-
-
-# --- warnings
-
-
-def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
-    """A warning where the verification compares what moved states change."""
-    warnings: list[tuple[Span, str]] = []
-    for doubt in sensitivity.doubts:
-        if not doubt.compared or (doubt.repeat >= _AS_MOVED and doubt.digits <= _EXACT_DIGITS):
-            continue
-        text = "no digit repeats"
-        if doubt.repeat:
-            text = "1 digit repeats" if doubt.repeat == 1 else f"{doubt.repeat} digits repeat"
-            number = only_number(doubt.printed)
-            instead = "" if number is None else _round_to(number, doubt.repeat)
-            text += f", print {instead}" if instead else ""
-        warnings.append((doubt.span, f"{text}: printed from {doubt.least} to {doubt.most}"))
-    for flip in (flip for flip in sensitivity.flips if flip.compared):
-        text = f"printed as {quote(flip.other, _WIDTH)} too"
-        if not flip.other.strip():
-            text = "not always printed"
-        elif not flip.printed.strip():
-            text = f"{quote(flip.other, _WIDTH)} is printed here as well"
-        warnings.append((flip.span, text))
-    warnings.sort(key=lambda warning: (warning[0].path, warning[0].start))
-    if not warnings:
-        return
-    (span, label), *rest = warnings
-    notes = [Note(text, place) for place, text in rest[:_MAX_NOTES]]
-    if len(rest) > _MAX_NOTES:
-        notes.append(Note(f"and {len(rest) - _MAX_NOTES} more"))
-    if sensitivity.chaotic:
-        notes.append(Note(f"its simulation is chaotic: {describe_growth(sensitivity)}"))
-    yield diagnose(
-        "output-noise",
-        span,
-        f"`{sensitivity.path}` prints digits that are noise: a change of its initial states by "
-        f"{PERTURBATION:.0e} changes them",
-        label=label,
-        help=(
-            "print what holds: fewer digits, a shorter run, a mean of many runs"
-            if sensitivity.chaotic
-            else "print fewer digits, or say how to compare: `digits`, or `rtol` and `atol`"
-        ),
-        notes=notes,
-    )
-
-
-def describe_growth(sensitivity: Sensitivity) -> str:
-    """How fast the states of a script part, in words."""
-    size = sensitivity.amplification
-    if size is None or not math.isfinite(size):
-        return "its states part without bounds"
-    return f"states end {size:.0e} times as far apart as they began"

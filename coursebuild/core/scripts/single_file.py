@@ -75,18 +75,6 @@ def single_file(name: str, text: str, find_module: FindModule, belongings: Belon
     return _File(name, text, find_module).write(belongings)
 
 
-def foreign_modules(text: str) -> tuple[str, ...]:
-    """The top-level modules that a text imports and that Python does not bring."""
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and not node.level:
-            names.add(node.module or "")
-    tops = {name.partition(".")[0] for name in names}
-    return tuple(sorted(tops - sys.stdlib_module_names))
-
-
 class _File:
     """The file while it is put together."""
 

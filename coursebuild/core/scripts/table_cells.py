@@ -45,20 +45,16 @@ def table_rows(
 ) -> tuple[tuple[RowCell, ...], ...]:
     """The body rows of a table; cells without text, or left out, and rows of such are not there."""
     rules = tuple(filters)
+    with_point = point_decimals if table.comma else str
     rows = (
         tuple(
-            RowCell(cell, column, mapped, _canonical_cell(table, mapped.text))
+            RowCell(cell, column, mapped, canonicalize(with_point(mapped.text)))
             for column, cell in enumerate(row)
             if (mapped := cell_text(cell, rules)).text not in ("", *ELISIONS)
         )
         for row in table.rows
     )
     return tuple(row for row in rows if row)
-
-
-def _canonical_cell(table: model.Table, text: str) -> CanonicalText:
-    """What the text of a cell says, its decimals behind a point."""
-    return canonicalize(point_decimals(text) if table.comma else text)
 
 
 def elides_rows(table: model.Table) -> bool:

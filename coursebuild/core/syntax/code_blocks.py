@@ -61,7 +61,7 @@ def parse_python(fence: Fence) -> Parsed[Script | ScriptPart | PlainCode]:
     """A `python` fence: a script or a part of one if it has a valid `file=`, else `PlainCode`."""
     flags = (*_FLAGS, "part", *_SHOWS)
     keys = fence.keys(values=("file", "show", *_VALUES), flags=flags)
-    diagnostics = [_explain_fragment(fence, mistake) for mistake in keys.diagnostics]
+    diagnostics = list(keys.diagnostics)
     file, show = keys.value.get("file"), keys.value.get("show")
     has_file = any(word.key == "file" for word in split_words(fence.info).value)
     if file is None and not diagnostics:
@@ -95,15 +95,6 @@ def parse_python(fence: Fence) -> Parsed[Script | ScriptPart | PlainCode]:
             diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
     code = PlainCode(fence.span, fence.body, source)
     return Parsed(script or code, tuple(diagnostics))
-
-
-def _explain_fragment(fence: Fence, mistake: Diagnostic) -> Diagnostic:
-    """For one release: what takes the place of a key that blocks had which are only shown."""
-    if mistake.rule != "fence-key-unknown" or mistake.span.text != "fragment":
-        return mistake
-    removal = next(w.removal for w in split_words(fence.info).value if w.key == "fragment")
-    help = Fix("leave it out: what is only shown need not parse", edits=removal, safe=True)
-    return diagnose("fence-key-unknown", mistake.span, mistake.message, help=help)
 
 
 def _build_part(

@@ -9,7 +9,7 @@ import copy
 import re
 import unicodedata
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 from msgspec import Meta, Struct
@@ -21,7 +21,7 @@ from coursebuild.core.drawing.contrast import (
     contrast,
     legible,
 )
-from coursebuild.core.model import Filter, LessonTable, Limits, Silence
+from coursebuild.core.model import CoursePath, Filter, LessonTable, Limits, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import (
     Author,
@@ -247,10 +247,6 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
 class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     """How recorded outputs are compared where a fence says nothing."""
 
-    replaced: ClassVar = {
-        "truth": "delete it: no share is required; `check --truth` lists what nothing gives"
-    }
-
     compare: Annotated[
         Literal["exact", "digits", "rtol"] | None,
         describe("the same text, the same digits, or within rtol and atol; else exact"),
@@ -350,6 +346,7 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     ] = {}
     silence: tuple[Silence, ...] = ()
     level: tuple[LevelTable, ...] = ()
+    path: tuple[CoursePath, ...] = ()
     page: tuple[PageTable, ...] = ()
 
 

@@ -96,6 +96,7 @@ def parse_course_map(source: Source) -> Parsed[model.Course | None]:
         [lesson for level in levels for lesson in level.lessons],
         [name for node in nodes if (name := _read_id(node.get("id")))],
     )
+    diagnostics += _check_paths(root, [lesson for level in levels for lesson in level.lessons])
     if unusable or decoding.value is None:
         return Parsed(None, sort_diagnostics(diagnostics))
     prose = Prose.read(decoding.texts, NestedTextParser(ParsingState(frozenset(), False, ENGLISH)))
@@ -152,6 +153,7 @@ def _build_course(
             for node, page in zip(root.objects("page"), fields.page, strict=True)
         ),
         models=(),
+        paths=fields.path,
         features=_named_paths(table, "features", settings.features),
         packages=_named_paths(table, "packages", settings.packages),
         environment=tuple(sorted(verify.env.items())),
@@ -273,6 +275,19 @@ def _check_prerequisites(lessons: list[model.Lesson], ids: Iterable[str]) -> Ite
             help = "remove one of these prerequisites"
         place = notes[0].span or lesson_by_id[circle[0]].span
         yield diagnose("prerequisite-cycle", place, message, help=help, notes=notes[1:])
+
+
+def _check_paths(root: ObjectNode, lessons: Iterable[model.Lesson]) -> Iterator[Diagnostic]:
+    """Report lessons of paths that the map does not have, or that are named twice in one."""
+    names = [lesson.id for lesson in lessons]
+    for path in root.objects("path"):
+        items = [item for item in path.items("lessons") if isinstance(item, StringNode)]
+        steps = [(item.value, item.span) for item in items]
+        yield from check_unique(steps, "field-value", "the lesson `{}` is named twice")
+        for name, span in steps:
+            if name not in names:
+                message = f"no lesson of the map has the id `{shorten(name)}`"
+                yield diagnose("path-unknown", span, message, help=did_you_mean(name, names))
 
 
 _DIFFERENT_TEXTS = (("length 1.962 cm", "length 2.481 cm"), ("length 1.962 cm", "weight 1.962 cm"))

@@ -51,6 +51,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "lesson-empty": "A complete lesson has no text, or only headings.",
         "draft-empty": "The file of a draft is empty.",
         "prerequisite-unknown": "A prerequisite is not a lesson of the map.",
+        "path-unknown": "A path leads to what is no lesson of the map.",
         "prerequisite-cycle": "Lessons require each other in a circle.",
         "page-missing": "A page of the map has no file.",
         "engine-version": "The installed MuJoCo is not the version that the course needs.",
@@ -226,6 +227,12 @@ GROUPS: dict[str, dict[str, str]] = {
         "lab-shared": "A lab changes objects that all labs of the page share.",
         "lab-timeout": "Trying a lab takes too much time or memory.",
         "lab-engine": "An engine ended while a lab was tried, or refused its model.",
+    },
+    "Exercises": {
+        "exercise-id-repeated": "Two exercises of the course have the same id.",
+        "exercise-solution": "The solution of an exercise fails a trial, or cannot be tried.",
+        "exercise-start": "The start of an exercise passes all its trials.",
+        "exercise-wrong": "A wrong attempt passes the trial that it names, or cannot be tried.",
     },
     "Quizzes": {
         "quiz-id-repeated": "Two quizzes of the course have the same id.",

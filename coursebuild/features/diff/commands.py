@@ -330,17 +330,16 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("--site and --base-site need each other: one is compared with the other")
     code: Code = "none" if arguments.confined else "run"
     with _open_base(root, arguments.base) as (name, folder):
-        old, new = (_load_state(place, code) for place in (folder, root))
+        old, new = (
+            CourseState(load_course(place, code=code), functools.partial(read_recorded, place))
+            for place in (folder, root)
+        )
         text = report(name, old, new)
     if arguments.confined:
         text += _features_section(old.course, new.course)
     if None not in sites:
         text += f"\n{weight_section(*(root / site for site in sites))}"
     return write(text, CLEAN)
-
-
-def _load_state(root: Path, code: Code) -> CourseState:
-    return CourseState(load_course(root, code=code), functools.partial(read_recorded, root))
 
 
 def _features_section(*courses: Course) -> str:

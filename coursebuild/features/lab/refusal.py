@@ -1,4 +1,4 @@
-"""Why an engine refuses a lab's model, at the place in the model that asks for what it lacks."""
+"""What a lab's model asks for: why an engine refuses it, and whether the page's editor takes it."""
 
 from __future__ import annotations
 
@@ -8,13 +8,15 @@ from pathlib import Path
 from coursebuild.api import Diagnostic, Excerpt, Source, Span, diagnose
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.run.mjcf import existing_files, read_tags
-from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.model import MJCF, Lab
 
 _NO_PLUGIN = "invalid plugin slot"
 _NO_MEMORY = "ould not allocate memory"
 """Parts of what MuJoCo says."""
 _PART_OF_MODEL = 20
 """Engine, model and states together take up to 16 times the memory of a large compiled model."""
+_LONGEST = 100_000
+"""Characters of a model in the editor, as site/js/lab/page/share.js has it."""
 
 
 def diagnose_refusal(lab: Lab, root: Path, model: Source, message: str) -> list[Diagnostic]:
@@ -50,6 +52,16 @@ def diagnose_size(lab: Lab, mjb: bytes, memory: int) -> list[Diagnostic]:
         f"the map: {_PART_OF_MODEL} times the size of the model"
     )
     return [diagnose("lab-engine", lab.place(("model",)), message, help=help)]
+
+
+def editable_source(lab: Lab, root: Path, model: Source) -> str:
+    """The text of a model that a reader can edit; empty if it needs other files or is too long.
+
+    A lab that is an editor already needs none.
+    """
+    if lab.kind == MJCF or len(model.text) > _LONGEST:
+        return ""
+    return "" if existing_files(root, model.path, model.text) else model.text
 
 
 def _model_texts(lab: Lab, root: Path, model: Source) -> Iterator[Excerpt | Source]:

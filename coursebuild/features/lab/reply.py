@@ -232,6 +232,8 @@ class LabOutput(Struct, frozen=True):
     """Name and text of a Python script that does the same; `{{control:N}}` in it stands for the
     value of control N."""
     parity: tuple[str, dict[str, str]] = ("", {})
+    source: str = ""
+    """The model's MJCF, if a reader can edit it: it needs no other files."""
 
 
 class PublishedLab(Struct, frozen=True):
@@ -288,6 +290,9 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
             }
             addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
             config = lab.config | addresses
+            if lab.source:
+                path = publish(f"{model}.xml", lab.source.encode())
+                config["source"] = path.removeprefix(f"{_FOLDER}/")
             if lab.script is not None:
                 config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
         picture = publish(f"{name}.{ending}", lab.picture) if lab.record is not None else ""

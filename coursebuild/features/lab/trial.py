@@ -59,7 +59,7 @@ from coursebuild.features.lab.equations.equation_trial import (
 )
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
-from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size
+from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size, editable_source
 from coursebuild.features.lab.reply import LabOutput, MainRun, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 
@@ -150,7 +150,7 @@ class LabTrials:
             return self._try_equations(trial, lab)
         if lab.xml is not None:
             model = Source("models/.lab.xml", lab.xml.text)
-        elif (course_model := _find_model(context, lab.fields.model or "")) is not None:
+        elif (course_model := find_model(context, lab.fields.model or "")) is not None:
             model = course_model
         else:
             return None, []  # reported at the model or its name
@@ -215,10 +215,10 @@ class LabTrials:
             if name not in names:
                 message, help = f"no model `{name}` in models/", did_you_mean(name, names)
                 return None, [diagnose("lab-model", lab.span.first_line(), message, help=help)]
-            model = _find_model(context, name)
+            model = find_model(context, name)
             if model is None:
                 return None, []  # reported at the model
-            mjb = _save_model(context, self._engines.native, model)
+            mjb = save_model(context, self._engines.native, model)
         module = read_bytes(context.root, code).decode("utf-8", "replace")
         config = {"id": trial.name, "kind": lab.kind, "title": lab.fields.title, "data": data}
         line = TrialLine(
@@ -232,14 +232,16 @@ def _in_english(key: str, values: dict[str, str]) -> str:
     return strings_for(template_texts(), "en")(key, **values) if key else ""
 
 
-def _find_model(context: TrialContext, name: str) -> Source | None:
+def find_model(context: TrialContext, name: str) -> Source | None:
+    """A model of the course by its name, if there is one that compiles."""
     compilation = context.models.get(name)
     if compilation is None or not compilation.facts:
         return None
     return next((m.source for m in context.course.models if m.name == name), None)
 
 
-def _save_model(context: TrialContext, native: NativeEngine, model: Source) -> bytes:
+def save_model(context: TrialContext, native: NativeEngine, model: Source) -> bytes:
+    """The MJB file of a model, made now or before; a `NativeError` if it cannot be."""
     store, key = context.run_store.store, model_key(context.root, model.path, model.text)
     mjb = store.get("mjb", key, bytes)
     if mjb is None:
@@ -272,7 +274,7 @@ class _LabTrial(Struct, frozen=True):
         module = compile_lab(lab, self.trial.name)
         inputs = inputs_of(lab, module)
         try:
-            mjb = _save_model(self.context, self.engines.native, self.model)
+            mjb = save_model(self.context, self.engines.native, self.model)
             if too_large := diagnose_size(lab, mjb, self.context.course.limits.memory):
                 return self._fail(module, too_large)
             if assignments := list(verdict.assignment_diagnostics(lab)):
@@ -322,7 +324,9 @@ class _LabTrial(Struct, frozen=True):
             cached=cached_evaluation is not None,
             unexported=export.reason,
         )
-        output = replace(evaluation.output, mjb=mjb, script=export.script, parity=comparison)
+        source = editable_source(lab, self.context.root, self.model)
+        parts = {"mjb": mjb, "script": export.script, "parity": comparison, "source": source}
+        output = replace(evaluation.output, **parts)
         return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]
 
     def _export(self, main: MainRun) -> LabExport:

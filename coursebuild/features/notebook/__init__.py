@@ -238,7 +238,8 @@ def _write_notebook(
 def _setup_cells(site: SiteContext, lesson: model.Lesson, archive: zips.Archive) -> Iterator[Cell]:
     assert lesson.document is not None, "a notebook is of a written lesson"
     files = {path.partition("/")[2]: data for path, data in archive.files.items()}
-    packages = sorted(files.pop("requirements.txt", b"").decode().split())
+    requirements = files.pop("requirements.txt", b"").decode().splitlines()
+    packages = [line for line in requirements if not line.startswith("#")]
     files.pop("README.md", None)
     scripts = [script.path for script in model.document_scripts(lesson.document)]
     early = _imported_early(site, scripts, files)

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -36,12 +35,12 @@ from coursebuild.features.bench.commands.measurement import (
     file_of,
     in_words,
     measurement_json,
-    read_task,
     recorded_value,
     run_measurement,
+    task_of,
     write_records,
 )
-from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
+from coursebuild.features.bench.commands.measuring import Mjbench
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.pipeline.scenes import find_scenes, read_record
 from coursebuild.report.values import json_text
@@ -196,16 +195,14 @@ class _CaseRun(MeasuringRun[CaseReport]):
     """Measures hard cases one after the other."""
 
     report_type = CaseReport
-    function = f"{__name__}:measure_part"
 
     def measure(self, name: str) -> bytes | None:
         """Report on a case; `None` where its references disagree."""
-        data = self.results.pop((name,), b"")
         return self.load_or_measure(
             name,
             "stability",
             self._parts(name),
-            lambda: data or self.mjbench.do("case", name=name),
+            lambda: self.do_job("case", None, name=name),
         )
 
     def _parts(self, name: str) -> tuple[object, ...]:
@@ -214,19 +211,7 @@ class _CaseRun(MeasuringRun[CaseReport]):
     def tasks(self, name: str) -> Iterator[tuple[Any, ...]]:
         """The case, if it is not stored."""
         if self.load("stability", self._parts(name), bytes) is None:
-            yield (name,)
-
-
-def measure_part(root: Path, data: bytes) -> bytes:
-    """Measure a hard case, as a task of `Executor.map`."""
-    with Mjbench(root, "`coursebuild stability`") as mjbench:
-        task = read_task(data, mjbench)
-        if task is None:
-            return b""
-        try:
-            return mjbench.do("case", name=task[0])
-        except FailedJobError:  # which is found and told where the command is
-            return b""
+            yield task_of("case", None, name=name)
 
 
 def _select_problems(

@@ -19,4 +19,4 @@ QTI = Exporter(
     mark="imsmanifest.xml",
     make=export,
 )
-FEATURE = Feature(name="qti", needs=("quiz",), exporters=(QTI,))
+FEATURE = Feature(name="qti", needs=("quiz", "exercise"), exporters=(QTI,))

@@ -31,6 +31,7 @@ from coursebuild.api import (
     urls,
 )
 from coursebuild.core.pages.html_xml import element, identifier, markup, render_xml
+from coursebuild.features.exercise.model import Exercise
 from coursebuild.features.qti.flow import STRIKE_CLASS, Flow
 from coursebuild.features.quiz import model
 from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_html
@@ -233,6 +234,9 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
     quizzes: list[QuizItems] = []
     for owner in context.course.owners:
         summary = owner.document
+        for exercise in find_blocks(summary, Exercise) if summary else ():
+            message = "the QTI package has no place for an exercise, which its page alone can judge"
+            yield diagnose("package-reduced", exercise.span.first_line(), message)
         if not summary or not any(find_blocks(summary, model.Quiz)):
             continue
         page = context.page(summary)

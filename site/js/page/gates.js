@@ -23,7 +23,7 @@ function blocksBelow(quiz) {
   return start === 0 ? [] : flow.slice(start, end < 0 ? undefined : end)
 }
 
-const nextLab = (blocks) => blocks.find((block) => block.matches('[data-lab]'))
+const nextLab = (blocks) => blocks.find((block) => block.matches('[data-lab]:not([data-exercise])'))
 
 function isAnswered(quiz, progress) {
   return [...quiz.querySelectorAll('[data-gate]')].every(({ dataset }) => progress.get(quiz.dataset.quiz, dataset.question))
@@ -67,6 +67,7 @@ function close(id, text, words) {
 export function followPredictions(document, progress) {
   document.addEventListener('coursebuild:answered', ({ target }) => {
     const quiz = target.closest('[data-quiz]')
+    if (quiz === null) return // an exercise
     if (isAnswered(quiz, progress)) openers.get(quiz.dataset.quiz)?.()
     if (!('run' in target.dataset)) return
     const detail = [JSON.parse(target.dataset.run)].flat()

@@ -6,7 +6,7 @@
  * @typedef {Record<string, any>} Question as its page shows it
  * @property {string} quiz
  * @property {string} key
- * @property {string} kind mcq, several, predict, numeric, output, order, open
+ * @property {string} kind mcq, several, predict, numeric, output, order, open, exercise
  * @property {string[]} parts keys of the options in their order on the page, or of the items in a fixed order
  * @property {string | null} answer the right one: keys, a number or a text; `null` if only a person can judge
  */

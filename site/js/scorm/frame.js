@@ -28,9 +28,13 @@ export function followFrame(frame, lesson, visit, onChange) {
   frame.addEventListener('load', begin)
 }
 
-/** The questions of a page, as `answers.js` knows them. */
+/** The questions and exercises of a page, as `answers.js` knows them. */
 export function questionsOf(document) {
-  return [...document.querySelectorAll('.question[data-question]')].map((element) => {
+  const exercises = [...document.querySelectorAll('[data-exercise]')].map((element) => {
+    const { id } = JSON.parse(element.dataset.exercise)
+    return { quiz: id, key: id, kind: 'exercise', parts: [], answer: 'solved' }
+  })
+  const questions = [...document.querySelectorAll('.question[data-question]')].map((element) => {
     const { question: key, kind, answer } = element.dataset
     const quiz = element.closest('[data-quiz]')?.dataset.quiz ?? ''
     const parts = [...element.querySelectorAll('[data-key]')].map(({ dataset }) => dataset.key)
@@ -38,6 +42,7 @@ export function questionsOf(document) {
     if (kind === 'order') parts.sort()
     return { quiz, key, kind, parts, answer: kind === 'open' ? null : answer ?? null }
   })
+  return [...questions, ...exercises]
 }
 
 function watchReading(window, visit, onChange) {

@@ -7,7 +7,7 @@
 
 const LONGEST = 4096
 const VERSION = 1
-const KINDS = ['mcq', 'several', 'predict', 'numeric', 'open', 'output', 'order']
+const KINDS = ['mcq', 'several', 'predict', 'numeric', 'open', 'output', 'order', 'exercise']
 
 /**
  * @param {{quiz: string, key: string, kind: string, given: unknown, right: boolean | null, tries: number, hints: number,

@@ -283,6 +283,15 @@ PATHS = [
 ]
 
 
+def test_the_home_page_shows_paths_and_then_what_is_in_none(make: Make) -> None:
+    path = '[[path]]\ntitle = "A weekend"\nsummary = "Ends in an *arm*."\nlessons = ["0.1"]\n'
+    home = pages(make("Text.", course=MAP + path).site())["index.html"]
+    groups = re.findall(r'<h2 id="_written-\d">(.*?)</h2>(.*?)</section>', home, re.DOTALL)
+    names = [(title, re.findall(r'data-lesson="([^"]+)"', cards)) for title, cards in groups]
+    assert names == [("A weekend", ["0.1"]), ("More lessons", ["1.1"])]
+    assert "<p>Ends in an *arm*.</p>" in home
+
+
 BASES = ("https://h/", "https://h/deep/er/", "file:///home/u/site/")
 
 

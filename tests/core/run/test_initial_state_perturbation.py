@@ -209,6 +209,29 @@ def spring(timestep: float, force: float = 2.0) -> tuple[float, float]:
     return x, v
 
 
+def test_a_run_with_shifted_steps_is_ahead_of_its_clock(run: Run) -> None:
+    """By a third of a timestep whenever a simulation begins; the first states are its own."""
+    text = """
+ends = []
+for _ in range(2):
+    mujoco.mj_resetData(model, data)
+    data.qpos[:], data.ctrl[:] = 1, 2
+    mujoco.mj_forward(model, data)
+    ends += [float(data.qpos[0])]
+    mujoco.mj_step(model, data, 2)
+    ends += [float(data.qpos[0]), data.time, model.opt.timestep]
+print(json.dumps(ends))
+"""
+    x, v = 1.0, 0.0
+    for timestep in (0.1 / 3, 0.1, 0.1):
+        v += timestep * (2 - 10 * x)
+        x += timestep * v
+    result = run(SPRING_HEAD + text, perturbation=-3)
+    assert json.loads(result.stdout) == pytest.approx([1.0, x, 0.2, 0.1] * 2), result.stderr
+    assert result.trace is not None
+    assert (result.trace.is_perturbed, result.trace.timesteps) == (True, (0.1,))
+
+
 def test_steps_are_divided_however_they_are_made(run: Run) -> None:
     def run_to_end(text: str, number: int) -> tuple[bool, Any]:
         end = "print(json.dumps([*data.qpos, *data.qvel, data.time, model.opt.timestep]))\n"

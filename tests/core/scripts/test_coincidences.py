@@ -16,15 +16,12 @@ from msgspec import Struct
 
 from coursebuild.core.model import Document, Recording, find_blocks
 from coursebuild.core.model.lesson_record import Addresses
-from coursebuild.core.model.results import Verdict
-from coursebuild.core.scripts.bindings import check_bindings
-from coursebuild.core.scripts.bound_places import document_bindings, follow_outputs
+from coursebuild.core.scripts.bindings import check_bindings, update_outputs
+from coursebuild.core.scripts.bound_places import document_bindings
 from coursebuild.core.scripts.compare import verify
-from coursebuild.core.scripts.edit import apply_edits, update_body
+from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.scripts.table_cells import table_rows
-from coursebuild.core.text.diagnostics import Edit
 from support.sample_lessons import course, document, make_run
 
 PATH = "examples/a.py"
@@ -97,22 +94,8 @@ def outputs_of(page: Document, lines: list[str], addresses: Addresses) -> Printe
 def update(page: Document, lines: list[str], addresses: Addresses) -> tuple[Document, int]:
     """The lesson as `update` leaves it, and how many of its outputs were refused."""
     outputs = outputs_of(page, lines, addresses)
-    check_bindings(page, outputs, addresses)
-    edits: list[Edit] = []
-    refused: list[Recording] = []
-    for table_output in outputs.of_document(page):
-        recording, at = table_output.recording, table_output.row_addresses
-        edit = update_body(recording, table_output.comparison, "\n".join(lines), at)
-        if isinstance(edit, Edit):
-            edits.append(edit)
-        elif edit is not None:
-            refused.append(recording)
-
-    def text_after(verdict: Verdict) -> PrintedText | None:
-        return None if verdict.recording in refused else outputs.updated_text(verdict)
-
-    edits += follow_outputs(page, outputs, addresses, text_after)
-    return document(apply_edits(page.source.text, edits)), len(refused)
+    edits, refusals = update_outputs(outputs.of_document(page), [page], outputs, addresses)
+    return document(apply_edits(page.source.text, edits)), len(refusals)
 
 
 def shown_rows(page: Document) -> Iterator[list[str]]:

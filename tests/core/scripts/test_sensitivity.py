@@ -10,11 +10,11 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Filter, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
+from coursebuild.core.scripts.noise_warnings import noise_warnings
 from coursebuild.core.scripts.sensitivity import (
     Sensitivity,
     Standing,
     is_worth_moving,
-    noise_warnings,
     sensitivity,
 )
 from support.fixture_cases import fixture_tables
@@ -37,10 +37,12 @@ def measure(
     base: str | None = None,
     filters: tuple[Filter, ...] = (),
     finer: tuple[str, ...] = (),
+    shifted: tuple[str, ...] = (),
 ) -> Sensitivity:
     """What runs that printed this say of a recorded output; four runs, the last repeated.
 
-    `finer` was printed with half and with a quarter of the timestep.
+    `finer` was printed with half and with a quarter of the timestep, `shifted` with steps of 2 ms
+    and of 1/240 s shifted by a third and by two thirds.
     """
     block = recording(recorded) if isinstance(recorded, str) else recorded
     assert base is not None or isinstance(recorded, str)
@@ -51,8 +53,11 @@ def measure(
         document("", "content/lessons/1.1-a.md"), comparison=comparison, filters=filters
     )
     finer_runs = [run(text) for text in finer]
+    trace = replace(TRACE, is_perturbed=True, timesteps=(0.002, 1 / 240))
+    shifted_runs = [replace(run(text), trace=trace) for text in shifted]
     return sensitivity(
-        sample_course, "examples/a.py", "1.1", [block], run(printed), runs, finer_runs
+        *(sample_course, "examples/a.py", "1.1", [block], run(printed)),
+        *(runs, finer_runs, shifted_runs),
     )
 
 
@@ -112,6 +117,19 @@ def test_digits_that_repeat_and_digits_that_are_converged(
     assert values == ([tuple(expected)] if expected else [])
     assert result.unhalved == ""
     assert warnings(result) == warnings(measure(text.format(recorded), text.format(moved_output)))
+
+
+@pytest.mark.parametrize(("printed", "finer", "shifted", "expected"), CASES["sampled"])
+def test_a_time_that_is_looked_for_at_every_step_is_known_to_a_step(
+    printed: str, finer: str, shifted: str, expected: list[int | str]
+) -> None:
+    text = "value {}"
+    half, quarter, third, two_thirds = map(text.format, f"{finer} {shifted}".split())
+    result = measure(
+        *(text.format(printed),) * 2, finer=(half, quarter), shifted=(third, two_thirds)
+    )
+    values = [(d.converged, d.instead, d.sampled) for d in result.doubts]
+    assert values == ([tuple(expected)] if expected else [])
 
 
 def test_reasons_why_convergence_is_not_measured() -> None:

@@ -221,7 +221,7 @@ def without_page_lines(text: str) -> str:
 
 def tier(case: Case) -> str:
     """The pytest mark of a case that needs a lab's engine, MuJoCo or a whole site, or none."""
-    if "```lab" in case.input:
+    if "```lab" in case.input or "```exercise" in case.input:
         return "engine"
     is_built = command_of(case).startswith(("build", "export"))
     return "site" if is_built or COMPILED.search(case.input) else ""

@@ -9,9 +9,7 @@ from msgspec.structs import replace
 
 from coursebuild.api import (
     FAILURE,
-    Edit,
     Lesson,
-    Source,
     UsageError,
     did_you_mean,
     load_course,
@@ -21,7 +19,7 @@ from coursebuild.core.files.course_root import FOLDERS
 from coursebuild.core.files.read import read_bytes, read_sources
 from coursebuild.core.files.write import FileChange
 from coursebuild.core.model.lesson_record import record_path
-from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.scripts.edit import edited_texts
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import (
     doubtful_places,
@@ -65,14 +63,12 @@ def run(arguments: argparse.Namespace) -> int:
         help = did_you_mean(arguments.old, [lesson.id for lesson in course.lessons])
         raise UsageError(f"no lesson is called `{arguments.old}`", help=help)
     edits = rename_references(course, lesson, new)
-    by_source: dict[Source, list[Edit]] = {}
-    for edit in edits:
-        by_source.setdefault(edit.span.source, []).append(edit)
-    new_map = with_lesson_renamed(course, lesson, new, by_source.pop(course.map))
-    changes = [FileChange(course.map.path, course.map.text.encode(), new_map.encode())]
-    for source, source_edits in by_source.items():
-        text = apply_edits(source.text, source_edits)
-        changes.append(FileChange(source.path, source.text.encode(), text.encode()))
+    in_map = [edit for edit in edits if edit.span.source == course.map]
+    texts = edited_texts(edits) | {course.map: with_lesson_renamed(course, lesson, new, in_map)}
+    changes = [
+        FileChange(source.path, source.text.encode(), text.encode())
+        for source, text in texts.items()
+    ]
     if lesson.document is not None:
         data = read_bytes(root, lesson.path)
         unchanged = FileChange(lesson.path, data, data)

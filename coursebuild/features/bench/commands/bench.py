@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -30,16 +29,15 @@ from coursebuild.features.bench.commands.measurement import (
     MeasuringRun,
     RecordCheck,
     add_report_options,
-    file_of,
     forbid_quick,
     in_words,
     measurement_json,
-    read_task,
+    record_reports,
     recorded_value,
     run_measurement,
-    write_records,
+    task_of,
 )
-from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
+from coursebuild.features.bench.commands.measuring import Mjbench
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.pipeline.scenes import CourseScene, find_scenes, read_record
 
@@ -115,11 +113,7 @@ def bench(
     measurement = run.measure_each(scenes.value, run.measure)
     if not record:
         return measurement
-    records = [
-        (BENCH.path(report.model), file_of(mjbench, bench=value))
-        for report, value in zip(measurement.reports, measurement.values, strict=True)
-    ]
-    return write_records(options.root, measurement, records)
+    return record_reports(options.root, mjbench, BENCH, "bench", measurement)
 
 
 def check(
@@ -167,7 +161,6 @@ def check(
 class SceneRun(MeasuringRun[SceneReport]):
     """Measures scenes one after the other."""
 
-    function = f"{__name__}:measure_part"
     report_type = SceneReport
 
     def __init__(
@@ -202,18 +195,16 @@ class SceneRun(MeasuringRun[SceneReport]):
             return
         for number in range(_scenario_count(scene)):
             if self.load("bench-scenarios", (*parts, number), tuple[bytes, ...]) is None:
-                yield self._task(scene, "", number, number + 1)
+                yield task_of("scenario", scene, number=number, **self._settings())
         for sweep in scene.declarations.sweeps:
             if self.load("bench-sweeps", (*parts, sweep.name), tuple[bytes, ...]) is None:
-                yield from self._pieces(scene, sweep)
+                yield from (task_of("sweep", scene, **piece) for piece in self._pieces(sweep))
 
-    def _pieces(self, scene: CourseScene, sweep: DeclaredSweep) -> Iterator[tuple[Any, ...]]:
+    def _pieces(self, sweep: DeclaredSweep) -> Iterator[dict[str, Any]]:
         count = sum(len(part.values) for part in sweep.variations if part.parameter != THREADS)
         for first in range(0, count, _PIECE):
-            yield self._task(scene, sweep.name, first, min(first + _PIECE, count))
-
-    def _task(self, scene: CourseScene, sweep: str, first: int, end: int) -> tuple[Any, ...]:
-        return scene.name, scene.digest, self.quick, self.use_store, sweep, first, end
+            piece = {"part": "values", "first": first, "end": min(first + _PIECE, count)}
+            yield {"name": sweep.name, **piece, **self._settings()}
 
     def _report(self, scene: CourseScene, parts: tuple[object, ...]) -> bytes:
         # First, since a value that the model cannot have is told at once.
@@ -241,12 +232,11 @@ class SceneRun(MeasuringRun[SceneReport]):
         return self.mjbench.do("join", scene, **values, card=self.cards)
 
     def _measure_scenario(self, scene: CourseScene, number: int) -> tuple[bytes, ...]:
-        task = self._task(scene, "", number, number + 1)
-        data = self.results.pop(task, b"")
-        return (data or self.mjbench.do("scenario", scene, number=number, **self._settings()),)
+        return (self.do_job("scenario", scene, number=number, **self._settings()),)
 
     def _measure_sweep(self, scene: CourseScene, sweep: DeclaredSweep) -> tuple[bytes, ...]:
-        pieces = [self.results.pop(task, b"") for task in self._pieces(scene, sweep)]
+        tasks = (task_of("sweep", scene, **piece) for piece in self._pieces(sweep))
+        pieces = [self.results.pop(task, b"") for task in tasks]
         settings = {"name": sweep.name, **self._settings()}
         if not pieces or not all(pieces):
             return (self.mjbench.do("sweep", scene, **settings),)
@@ -273,23 +263,3 @@ def _scenario_count(scene: CourseScene) -> int:
     scenarios = scene.declarations.scenarios
     usual = keyframe_scenarios(scene.facts.keyframes) if scene.facts.nv else ()
     return len(scenarios or usual)
-
-
-def measure_part(root: Path, data: bytes) -> bytes:
-    """Measure a scenario, or a piece of a sweep, as a task of `Executor.map`."""
-    with Mjbench(root, "`coursebuild bench`") as mjbench:
-        task = read_task(data, mjbench)
-        if task is None:
-            return b""
-        name, digest, quick, timed, sweep, first, end = task
-        by_digest = {scene.digest: scene for scene in find_scenes(root, (name,)).value}
-        if digest not in by_digest:  # its files were edited
-            return b""
-        settings = {"quick": quick, "timed": timed}
-        try:
-            if not sweep:
-                return mjbench.do("scenario", by_digest[digest], number=first, **settings)
-            piece = {"name": sweep, "part": "values", "first": first, "end": end}
-            return mjbench.do("sweep", by_digest[digest], **piece, **settings)
-        except FailedJobError:  # which is found and told where the command is
-            return b""

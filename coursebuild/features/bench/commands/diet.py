@@ -32,13 +32,12 @@ from coursebuild.features.bench.commands.diet_model import DietModel, Reruns
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     MeasuringRun,
-    file_of,
     forbid_quick,
     in_words,
     measurement_json,
     read_task,
+    record_reports,
     run_measurement,
-    write_records,
 )
 from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
@@ -136,11 +135,7 @@ def diet(
     measurement = run.measure_each(scenes.value, run.look_at)
     if not record:
         return measurement
-    records = [
-        (DIET.path(report.model), file_of(mjbench, diet=value))
-        for report, value in zip(measurement.reports, measurement.values, strict=True)
-    ]
-    return write_records(options.root, measurement, records)
+    return record_reports(options.root, mjbench, DIET, "diet", measurement)
 
 
 class _Change(Struct, frozen=True):

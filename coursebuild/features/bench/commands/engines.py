@@ -14,12 +14,11 @@ from coursebuild.core.model.report_files import ENGINES
 from coursebuild.features.bench.commands.measurement import (
     Measurement,
     MeasuringRun,
-    file_of,
     forbid_quick,
     in_words,
     measurement_json,
+    record_reports,
     run_measurement,
-    write_records,
 )
 from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
 from coursebuild.pipeline.scenes import CourseScene, find_scenes
@@ -88,11 +87,7 @@ def bench_engines(
     measurement = run.measure_each(scenes.value, run.measure)
     if not record:
         return measurement
-    records = [
-        (ENGINES.path(report.model), file_of(mjbench, engines=value))
-        for report, value in zip(measurement.reports, measurement.values, strict=True)
-    ]
-    outcome = write_records(options.root, measurement, records)
+    outcome = record_reports(options.root, mjbench, ENGINES, "engines", measurement)
     return replace(outcome, remarks=(*measurement.remarks, *outcome.remarks))
 
 

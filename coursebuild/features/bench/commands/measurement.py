@@ -43,7 +43,7 @@ from coursebuild.features.bench.commands.measuring import (
     diagnostic_of,
 )
 from coursebuild.pipeline.arguments import style_of
-from coursebuild.pipeline.scenes import CourseScene
+from coursebuild.pipeline.scenes import CourseScene, find_scenes
 from coursebuild.report.text import (
     BOLD,
     FAINT,
@@ -229,7 +229,7 @@ class MeasuringRun(Generic[_T]):
 
     stage, success = "measuring", "measured"
     """Words of the progress display: for the stage, and for a thing that was measured."""
-    function = ""
+    function = f"{__name__}:do_task"
     """Measures a task in another process: `module:name`, as in `Executor.map`."""
     report_type: type[_T]
 
@@ -294,8 +294,16 @@ class MeasuringRun(Generic[_T]):
             self.progress.say(f"{left} of {plural(len(tasks), 'part')} can only be measured here")
 
     def tasks(self, thing: Any) -> Iterable[tuple[Any, ...]]:
-        """What there is to measure of a thing, each part by plain values."""
+        """What there is to measure of a thing: jobs for `do_task`, each by plain values.
+
+        The name of the job, the model's name and its digest, and the values as pairs.
+        """
         return ()
+
+    def do_job(self, job: str, scene: CourseScene | None, **values: object) -> bytes:
+        """What mjbench gives for a job, here or in another process."""
+        data = self.results.pop(task_of(job, scene, **values), b"")
+        return data or self.mjbench.do(job, scene, **values)
 
     def load_or_measure(
         self,
@@ -349,6 +357,28 @@ class MeasuringRun(Generic[_T]):
             self.options.store.put_value(kind, fingerprint(parts), value)
 
 
+def task_of(job: str, scene: CourseScene | None, **values: object) -> tuple[Any, ...]:
+    """A job for `do_task`."""
+    name, digest = ("", "") if scene is None else (scene.name, scene.digest)
+    return job, name, digest, tuple(values.items())
+
+
+def do_task(root: Path, data: bytes) -> bytes:
+    """Do a job of mjbench about a model or about none, as a task of `Executor.map`."""
+    with Mjbench(root, "a measurement") as mjbench:
+        task = read_task(data, mjbench)
+        if task is None:
+            return b""
+        job, name, digest, values = task
+        scenes = {s.digest: s for s in find_scenes(root, (name,)).value} if name else {"": None}
+        if digest not in scenes:  # its files were edited
+            return b""
+        try:
+            return mjbench.do(job, scenes[digest], **dict(values))
+        except FailedJobError:  # which is found and told where the command is
+            return b""
+
+
 def read_task(data: bytes, mjbench: Mjbench) -> tuple[Any, ...] | None:
     """The task that another process has sent; `None` if this is another machine than its own."""
     task, machine = decode(data, tuple[tuple[object, ...], Machine]) or ((), None)
@@ -364,6 +394,17 @@ def forbid_quick(option: str, *, quick: bool) -> None:
         raise UsageError(
             f"{option} cannot be combined with --quick: recorded measurements are complete"
         )
+
+
+def record_reports(
+    root: Path, mjbench: Mjbench, kind: ReportKind[Any], name: str, measurement: Measurement[Any]
+) -> Measurement[Any]:
+    """Write the reports on models into the course; `name`: what the job `write` calls them."""
+    records = [
+        (kind.path(report.model), file_of(mjbench, **{name: value}))
+        for report, value in zip(measurement.reports, measurement.values, strict=True)
+    ]
+    return write_records(root, measurement, records)
 
 
 def write_records(

@@ -83,6 +83,24 @@ class LabEngine(V8Engine):
             self.close()  # an engine that failed or was changed may not run the other labs
         return reply
 
+    def judge(self, request: dict[str, Any], mjb: bytes, seconds: float) -> dict[str, Any]:
+        """Return the reply to an attempt at an exercise; it may take `seconds` of processor time.
+
+        Raises:
+            LimitError: it takes too much time or memory.
+            ScriptError: the engine fails.
+        """
+        isolate = self._running_isolate()
+        isolate.fill("mjb", mjb)
+        progress = Heartbeat(isolate.buffer("beats"), self._patience)
+        try:
+            text = isolate.call("judge", json.dumps(request), seconds, progress)
+        except (LimitError, ScriptError):
+            self.close()
+            raise
+        reply: dict[str, Any] = json.loads(text)
+        return reply
+
     def _end(self, isolate: Isolate, kind: str, message: str) -> dict[str, Any]:
         entry: list[str | int] = []
         with contextlib.suppress(LimitError, ScriptError):

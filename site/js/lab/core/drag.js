@@ -5,6 +5,8 @@
  * felt at the point). Its force is added to what the author's code has put into `xfrc_applied`, for the length of a step only.
  */
 
+import { Pose } from './pose.js'
+
 export class Drag {
   /**
    * @param {import('./engine.js').Engine} engine
@@ -13,12 +15,15 @@ export class Drag {
    */
   constructor(engine, handles, scene) {
     this.engine = engine
+    this.handles = handles
     this.model = handles.model
     this.data = handles.data
     this.scene = scene
     this.handle = handles.adopt(new engine.mj.MjvPerturb())
     this.body = -1
     this.authorForce = new Float64Array(6)
+    /** @type {Pose | null} made when it is first needed */
+    this.poser = null
   }
 
   get active() {
@@ -55,6 +60,15 @@ export class Drag {
     if (this.mocap < 0) return
     const offset = fromLocal(this.data, this.body, this.handle.localpos)
     this.data.mocap_pos.set(target.map((x, i) => x - offset[i]), 3 * this.mocap)
+  }
+
+  /** Move the pose so that the held point comes to where it is drawn, as far as joints allow; for a simulation that stands still. */
+  pose() {
+    if (!this.active || this.mocap >= 0) return
+    const { data, body, handle } = this
+    this.poser ??= new Pose(this.engine, this.handles)
+    const held = () => fromLocal(data, body, handle.localpos).map((x, i) => x + data.xpos[3 * body + i])
+    this.poser.move(body, held, Array.from(handle.refselpos))
   }
 
   release() {

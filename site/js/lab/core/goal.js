@@ -21,6 +21,17 @@ export class Goal {
     this.reached = null // the time at which it had been true for long enough
   }
 
+  /** How it stands. */
+  read() {
+    const { since, held, longest, reached } = this
+    return { since, held, longest, reached }
+  }
+
+  /** Go to how it stood. */
+  write(status) {
+    Object.assign(this, status)
+  }
+
   /** Evaluate it on data whose derived quantities are current. */
   look(env) {
     const { time } = env.data

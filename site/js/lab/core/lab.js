@@ -14,6 +14,7 @@ import { Drag } from './drag.js'
 import { environment } from './environment.js'
 import { Pictures } from './frame.js'
 import { keyframe, siteOf } from './names.js'
+import { Panel } from './panel.js'
 import { call, readable } from './piece.js'
 import { generator } from './random.js'
 import { Sampler } from './sampler.js'
@@ -37,6 +38,8 @@ export class Lab {
     this.code = code
     this.host = host
     this.recorder = null // records each step for the trial
+    this.tape = null // keeps the run, in a page
+    this.panel = null // while the reader looks at the model's actuators and sensors
     this.handles = engine.load(source)
     try {
       this.build()
@@ -89,8 +92,8 @@ export class Lab {
     this.prepare()
   }
 
-  toKeyframe() {
-    const { engine, model, data, key } = this
+  toKeyframe(key = this.key) {
+    const { engine, model, data } = this
     if (key < 0) engine.mj.mj_resetData(model, data)
     else engine.mj.mj_resetDataKeyframe(model, data, key)
     this.draw = generator(this.config.seed ?? 0)
@@ -112,6 +115,7 @@ export class Lab {
     this.log = this.stepping ? null : { values: [...this.values], events: [] }
     this.sampler.clear()
     this.watch.restart()
+    this.tape?.clear()
     this.dirty = true
   }
 
@@ -119,6 +123,7 @@ export class Lab {
   settle() {
     const { engine, model, data } = this
     if (data.time < this.sampler.last) this.forget() // the code has put the time back, which begins a new run
+    this.tape?.event(this.physics.read())
     engine.mj.mj_forward(model, data)
     this.dirty = true
     this.diverged = null
@@ -153,7 +158,7 @@ export class Lab {
     this.act([i, value], () => {
       this.controls.take(i, value)
       this.engine.mj.mj_forward(this.model, this.data)
-      this.controls.apply(i)
+      this.watched(() => this.controls.apply(i))
       if (this.config.controls[i].reset) this.reset()
       else this.settle()
     })
@@ -175,10 +180,49 @@ export class Lab {
     const time = Number(this.time.toFixed(9))
     this.queue = []
     action()
+    this.tape?.mark(event[0])
     if (this.log === null) return
     if (this.log !== log) this.log = { values, events: [[0, ...event]] }
     else if (log.events.length < MOST_EVENTS) log.events.push([time, ...event])
     else this.log = null
+  }
+
+  // --- the model's own actuators and keyframes, which no control of the lab stands for
+
+  /** Look at what the model offers, or no longer; returns its description (see panel.js). */
+  inspect(on) {
+    this.panel = on ? new Panel(this) : null
+    return this.panel?.describe() ?? null
+  }
+
+  /** Run code that may set actuators. */
+  watched(code) {
+    if (this.panel === null) code()
+    else this.panel.watch(code)
+  }
+
+  /** Set the control signal of an actuator. It stays until code or the reader sets another, or the simulation is reset. */
+  actuate(i, value) {
+    const { model, data } = this
+    if (!(i >= 0 && i < model.nu && Number.isFinite(value))) throw new RangeError(`actuator ${i} cannot be set to ${value}`)
+    data.ctrl[i] = value
+    this.leaveControls()
+    this.settle()
+  }
+
+  /** Begin a new run at a keyframe, without the lab's own start. */
+  startAt(key) {
+    if (!(key >= 0 && key < this.model.nkey)) throw new RangeError(`the model has no keyframe ${key}`)
+    this.toKeyframe(key)
+    this.forget()
+    this.leaveControls()
+    this.settle()
+  }
+
+  /** The reader has done what no control does: the motion has no log any more. */
+  leaveControls() {
+    this.log = null
+    this.queue = []
   }
 
   // --- the log: what was done in a run since its reset; `null` if the controls alone do not determine the motion
@@ -234,6 +278,7 @@ export class Lab {
   step(n) {
     if (this.stepping) throw new Error('sim.step() within a step is not possible')
     this.interrupted = false
+    this.tape?.cut()
     let steps = 0
     let reason = this.diverged === null ? null : 'diverged'
     while (reason === null && steps < n) {
@@ -251,17 +296,9 @@ export class Lab {
   }
 
   stepOnce() {
-    const { engine, model, data, drag, recorder } = this
-    recorder?.begin()
-    if (this.code.controller) call(['controller'], () => this.code.controller(this.env))
-    recorder?.controlled()
+    const { data, tape } = this
     const before = data.time
-    drag.push()
-    engine.mj.mj_step(model, data)
-    drag.pop()
-    recorder?.end()
-    this.steps += 1
-    this.dirty = true
+    const numbers = this.advance()
     const findings = this.watch.look(before)
     if (findings !== null) {
       this.warnings.push(...findings.warnings)
@@ -269,10 +306,34 @@ export class Lab {
     }
     const timestep = this.option.timestep
     if (this.sampler.due(this.steps, timestep)) this.sampler.record(this.sync())
+    tape?.after(numbers)
     const { stopAt } = this.config
     const late = stopAt === null ? Infinity : stopAt - timestep / 2
     if (before < late && data.time >= late) return 'stopAt'
     return this.interrupted ? 'code' : null
+  }
+
+  /** Make a step; returns the numbers before it if the tape wants them. */
+  advance() {
+    const { engine, model, data, drag, recorder, tape } = this
+    recorder?.begin()
+    if (this.code.controller) this.watched(() => call(['controller'], () => this.code.controller(this.env)))
+    recorder?.controlled()
+    drag.push()
+    const numbers = tape?.before() ?? null
+    engine.mj.mj_step(model, data)
+    drag.pop()
+    recorder?.end()
+    this.steps += 1
+    this.dirty = true
+    return numbers
+  }
+
+  /** After the tape has put the lab elsewhere. */
+  arrive() {
+    this.diverged = null
+    this.watch.restart()
+    this.dirty = true
   }
 
   /** Bring `displayData` up to date; returns the environment of code that only looks. */
@@ -325,21 +386,29 @@ export class Lab {
   // --- dragging
 
   /**
-   * Drag a body by a spring.
+   * Drag a body: by a spring, or while time stands still by moving the pose.
    *
    * @param {{body?: number, point?: number[], target: number[]} | null} request with a `point` (m, world) the body is taken
-   *   hold of there; the spring draws it to `target`; `null` lets go
+   *   hold of there; it is drawn to `target`; `null` lets go
+   * @param {boolean} [stands] whether time stands still
    */
-  perturb(request) {
-    if (request === null) return this.drag.release()
-    this.log = null
-    this.queue = []
+  perturb(request, stands = false) {
+    if (request === null) {
+      if (!this.drag.active) return
+      this.drag.release()
+      return this.settle()
+    }
+    this.leaveControls()
     if (request.point) {
       this.engine.mj.mj_forward(this.model, this.data)
       this.drag.grab(request.body, request.point)
+      if (this.drag.active) this.settle()
     }
     this.drag.move(request.target)
     this.dirty = true
+    if (!stands || this.diverged !== null) return
+    this.drag.pose()
+    this.settle()
   }
 
   // --- sharing

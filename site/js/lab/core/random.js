@@ -7,7 +7,7 @@ const rotl = (x, k) => (x << k) | (x >>> (32 - k))
 
 /**
  * @param {number} seed any finite number
- * @returns {() => number} uniform numbers in [0, 1), multiples of 2^-53
+ * @returns uniform numbers in [0, 1), multiples of 2^-53; `read` and `write` its state
  */
 export function generator(seed) {
   const bits = new Uint32Array(new Float64Array([seed]).buffer)
@@ -30,5 +30,8 @@ export function generator(seed) {
     d = rotl(d, 11)
     return result >>> 0
   }
-  return () => ((next() >>> 5) * 67108864 + (next() >>> 6)) / 9007199254740992
+  const draw = () => ((next() >>> 5) * 67108864 + (next() >>> 6)) / 9007199254740992
+  draw.read = () => [a, b, c, d]
+  draw.write = (state) => void ([a, b, c, d] = state)
+  return draw
 }

@@ -38,7 +38,9 @@ export class Sampler {
     this.times = []
     this.values = []
     this.points = 0
+    this.first = 0 // of the points that are kept
     this.last = -Infinity
+    this.from = Infinity
     this.goal?.clear()
   }
 
@@ -60,6 +62,7 @@ export class Sampler {
     }
     if (this.site >= 0) {
       const offset = 3 * (this.points++ % TRAIL)
+      this.first = Math.max(this.first, this.points - TRAIL)
       const source = 3 * this.site
       this.trail.set(env.data.site_xpos.subarray(source, source + 3), offset)
     }
@@ -69,21 +72,46 @@ export class Sampler {
 
   /**
    * The samples since the last call. `values` holds, for each of the times, one value for each trace of all plots in turn;
-   * a new `epoch` says that earlier samples belong to an earlier run.
+   * a new `epoch` says that earlier samples belong to an earlier run, and those after the time `from` are no longer of this one.
    */
   take() {
-    const samples = { epoch: this.epoch, times: Float64Array.from(this.times), values: Float64Array.from(this.values) }
+    const { epoch, from } = this
+    const samples = { epoch, from, times: Float64Array.from(this.times), values: Float64Array.from(this.values) }
     this.times = []
     this.values = []
+    this.from = Infinity
     return samples
+  }
+
+  /** Forget the samples after a time (s). */
+  cut(time) {
+    const count = this.times.findLastIndex((at) => at <= time) + 1
+    this.times.length = count
+    this.values.length = count * this.traces.length
+    this.from = Math.min(this.from, time)
+    this.first = Math.min(this.first, this.points)
+  }
+
+  /** What was seen of the run so far, but for its samples. */
+  read() {
+    const { points, last, goal } = this
+    return { points, last, goal: goal?.read() }
+  }
+
+  /** Go back or forward to what was seen at another moment. */
+  write({ points, last, goal }) {
+    this.points = points
+    this.last = last
+    this.goal?.write(goal)
   }
 
   /** Write the points of the trail, from the oldest to the newest, into `target` from `start` on; returns their number. */
   writeTrail(target, start) {
-    const count = Math.min(this.points, TRAIL)
-    const oldest = this.points > TRAIL ? 3 * (this.points % TRAIL) : 0
-    target.set(this.trail.subarray(oldest, 3 * count), start)
-    target.set(this.trail.subarray(0, oldest), start + 3 * count - oldest)
+    const count = Math.max(0, this.points - this.first)
+    for (let i = 0; i < count; i++) {
+      const offset = 3 * ((this.first + i) % TRAIL)
+      target.set(this.trail.subarray(offset, offset + 3), start + 3 * i)
+    }
     return count
   }
 

@@ -56,6 +56,39 @@ export class OrbitCamera {
   }
 }
 
+/** A camera of the model. It goes where the model moves it, and no hand turns it. */
+export class ModelCamera {
+  /** @param {number} start of its numbers in a frame (core/frame.js); @param {number} distance (m) at which the scale is right */
+  constructor(start, distance) {
+    this.start = start
+    this.distance = distance
+  }
+
+  /** Take its place from a frame. @param {Float32Array} frame */
+  follow(frame) {
+    this.place = Array.from(frame.subarray(this.start, this.start + 3))
+    this.matrix = frame.slice(this.start + 3, this.start + 12)
+    this.fovy = frame[this.start + 12]
+  }
+
+  axes() {
+    const column = (j, sign = 1) => [0, 3, 6].map((row) => sign * this.matrix[row + j])
+    return { right: column(0), up: column(1), forward: column(2, -1) }
+  }
+
+  position() {
+    return this.place
+  }
+
+  rotate() {}
+
+  pan() {}
+
+  zoom() {}
+
+  reset() {}
+}
+
 function wrap(degrees) {
   return ((((degrees + 180) % 360) + 360) % 360) - 180
 }

@@ -89,14 +89,17 @@ export function buildOverlays({ toggles, overlays, arrows }, words, toggle) {
 }
 
 function arrowButton(name, words, overlays, toggle) {
-  let isOn = overlays.includes(name)
-  const text = words(`overlay.${name}`)
-  const properties = { type: 'button', class: `lab-icon lab-arrow lab-${name}`, title: text, 'aria-label': text, 'aria-pressed': isOn }
-  const button = h('button', properties, h('i', {}, SIGNS[name]))
+  const kind = `lab-icon lab-arrow lab-${name}`
+  return switchButton(h('i', {}, SIGNS[name]), kind, words(`overlay.${name}`), overlays.includes(name), (isOn) => toggle(name, isOn))
+}
+
+/** A small button that stays pressed. */
+export function switchButton(sign, kind, text, isOn, toggle) {
+  const button = h('button', { type: 'button', class: kind, title: text, 'aria-label': text, 'aria-pressed': isOn }, sign)
   button.addEventListener('click', () => {
     isOn = !isOn
     button.setAttribute('aria-pressed', isOn)
-    toggle(name, isOn)
+    toggle(isOn)
   })
   return button
 }

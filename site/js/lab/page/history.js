@@ -48,6 +48,11 @@ export class History {
     } else if (this.length > MOST) this.thin()
   }
 
+  /** Drop the samples after a time (s). */
+  cut(time) {
+    while (this.end > this.start && this.columns[0][this.end - 1] > time) this.end -= 1
+  }
+
   makeRoom() {
     if (this.start > this.end / 2) {
       for (const column of this.columns) column.copyWithin(0, this.start, this.end)
@@ -71,9 +76,31 @@ export class History {
     this.counter = 1
   }
 
+  /** Take the samples of another history from a time (s) on. */
+  refill(other, from) {
+    this.clear()
+    for (let i = other.start; i < other.end; i++) {
+      const [time, ...values] = other.columns.map((column) => column[i])
+      if (time >= from) this.push(time, values, 0)
+    }
+  }
+
+  /** The samples as they are: times, then one column for each trace. */
+  table() {
+    return this.columns.map((column) => column.subarray(this.start, this.end))
+  }
+
+  /** The values at a time (s), between two samples on a straight line. @returns {number[]} */
+  at(time) {
+    const [times, ...columns] = this.table()
+    const i = Math.max(0, times.findLastIndex((x) => x <= time))
+    const part = i + 1 < times.length ? Math.max(0, time - times[i]) / (times[i + 1] - times[i]) : 0
+    return columns.map((column) => (part > 0 ? column[i] + part * (column[i + 1] - column[i]) : column[i]))
+  }
+
   /** The samples for uPlot: times, then one array for each trace, with `null` where its line is interrupted. @returns {any} */
   data() {
-    const columns = this.columns.map((column) => column.subarray(this.start, this.end))
+    const columns = this.table()
     return this.gaps ? columns.map((column) => Array.from(column, (x) => (Number.isFinite(x) ? x : null))) : columns
   }
 }

@@ -1,24 +1,27 @@
 /**
  * A `simlab` as an instrument: picture, transport, controls, readouts and plots.
  *
- *   const instrument = new Instrument(element, config, base, words, progress)
+ *   const instrument = new Instrument(element, config, base, words, progress, openEditor)
  *
  * `element` is the lab's place in the page, `config` its JSON, `base` the address of that JSON, to which its addresses are relative;
- * `progress` stores a reached goal (progress/store.js), or is null.
+ * `progress` stores a reached goal (progress/store.js), or is null; `openEditor` is that of workbench.js, which needs this module.
  */
 
-import { buildControls, buildOverlays, buildReadouts } from './controls.js'
-import { download, h } from './dom.js'
+import { buildControls, buildOverlays, buildReadouts, switchButton } from './controls.js'
+import { curvesText } from './csv.js'
+import { download, h, icon } from './dom.js'
 import { fillScript } from './export.js'
 import { GoalView } from './goal.js'
 import { Notices } from './notices.js'
 import { formatReadout, formatTime } from './numbers.js'
+import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
 import { copyLink, writeLink, writeLog } from './share.js'
 import { watchSight } from './sight.js'
 import { Simulation } from './simulation.js'
 import { prefersStillness } from './support.js'
+import { buildTape } from './tape.js'
 import { buildTransport } from './transport.js'
 import { View } from './view.js'
 
@@ -29,10 +32,13 @@ const HEIGHT = 300 // CSS pixels, of a view that is 480 wide
 const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
 export class Instrument {
-  constructor(element, config, base, words, progress = null) {
+  constructor(element, config, base, words, progress = null, openEditor = null) {
     this.element = element
     this.config = config
+    this.base = base
     this.words = words
+    this.openEditor = openEditor
+    this.bench = null // in which the reader edits the model, in place of this
     this.progress = progress
     this.values = this.initial = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
@@ -64,23 +70,33 @@ export class Instrument {
     })
     this.hands = new Hands(this.view, {
       pull: (request) => this.simulation.pull(request),
-      keys: { ' ': () => this.togglePlay(), '.': () => this.step(), r: () => this.reset() },
+      keys: { ' ': () => this.togglePlay(), '.': () => this.step(1), ',': () => this.step(-1), r: () => this.reset() },
     })
     this.transport = buildTransport(words, {
       play: () => this.togglePlay(),
-      step: () => this.step(),
+      step: null,
       reset: () => this.reset(),
       speed: (factor) => this.simulation.speed(factor),
       full: document.fullscreenEnabled ? () => this.toggleFull() : null,
     })
+    const seek = (time) => this.simulation.seek(time)
+    this.tape = buildTape(words, config.stopAt, { seek, step: (count) => this.step(count) })
     this.controls = buildControls(config.controls, {
       set: (index, value) => this.simulation.set(index, value, !this.hasStarted),
       press: (index) => this.simulation.press(index, config.controls[index].play),
     })
     const { arrows, boxes } = buildOverlays(config, words, (name, isOn) => this.simulation.overlay(name, isOn))
     if (arrows !== null) this.transport.speed.after(arrows)
+    const grab = switchButton(icon('hand'), 'lab-icon', words('lab.live.grab'), false, (isOn) => (this.hands.grabs = isOn))
+    this.transport.speed.after(grab)
     this.readouts = buildReadouts(config.readouts, formatReadout)
-    this.plots = config.plots.map((plot) => new Plot(plot, words))
+    this.panel = new ModelPanel(words, {
+      inspect: (on) => this.simulation.inspect(on),
+      actuate: (index, value) => this.simulation.actuate(index, value, !this.hasStarted),
+      startAt: (index) => this.simulation.startAt(index),
+      look: (camera) => this.view.look(camera),
+    })
+    this.plots = config.plots.map((plot) => new Plot(plot, words, seek))
     const goal = config.goal && element.querySelector('.lab-goal')
     this.goal = goal
       ? new GoalView(goal, config.goal, words, {
@@ -93,7 +109,7 @@ export class Instrument {
     this.body = h(
       'div',
       { class: 'lab-live' },
-      h('div', { class: 'lab-stage' }, h('div', { class: 'lab-screen' }, this.view.element, this.transport.full), this.transport.element, this.makeReason()),
+      h('div', { class: 'lab-stage' }, h('div', { class: 'lab-screen' }, this.view.element, this.transport.full), this.transport.element, this.tape.element, this.makeReason()),
       h(
         'div',
         { class: 'lab-side' },
@@ -128,10 +144,28 @@ export class Instrument {
       'div',
       { class: 'lab-foot' },
       act(...this.shareAction()),
+      ...(this.plots.length > 0 ? [this.makeKeepButton(), act('csv', () => this.exportCurves())] : []),
       config.exportPython ? act('export', () => this.export()) : null,
       document.querySelector('script[data-state]') && !config.kind ? this.makeLogButton() : null,
+      config.source && this.openEditor ? act('edit', () => this.edit()) : null,
+      this.panel.element,
       help,
     )
+  }
+
+  /** A button that keeps the curves of the run behind those of the next ones, and then one that drops them. */
+  makeKeepButton() {
+    let isKept = false
+    const button = h('button', { type: 'button', class: 'lab-text' }, this.words('lab.live.keep'))
+    button.addEventListener('click', () => {
+      isKept = !isKept
+      button.textContent = this.words(isKept ? 'lab.live.drop' : 'lab.live.keep')
+      this.plots.forEach((plot) => {
+        plot.keep(isKept)
+        plot.draw(plot.now)
+      })
+    })
+    return button
   }
 
   // --- events of the simulation
@@ -141,6 +175,7 @@ export class Instrument {
     return {
       state: (state, reason) => this.onStateChange(state, reason),
       ready: ({ values }) => this.onReady(values),
+      model: (model) => this.panel.open(model),
       samples: (samples, fresh) => this.collect(samples, fresh),
       refresh: (frame, now) => this.refresh(frame, now),
       controls: (values) => {
@@ -170,7 +205,9 @@ export class Instrument {
     this.element.dataset.state = state
     this.textAt = this.plotAt = -Infinity // so that the next refresh shows the numbers of the last picture
     this.showPlay(state === 'playing')
-    this.transport.setEnabled(state !== 'loading' && state !== 'ended')
+    const isReady = state !== 'loading' && state !== 'ended'
+    this.transport.setEnabled(isReady)
+    this.tape.setEnabled(isReady)
     this.controls.setEnabled(state !== 'ended')
     if (state === 'playing') {
       this.hasStarted = true
@@ -186,8 +223,11 @@ export class Instrument {
     this.notices.say(this.words(`lab.live.${key}`, { t: `${formatTime(this.simulation.latest?.time ?? 0)} s` }))
   }
 
-  collect({ times, values }, fresh) {
-    if (fresh) this.plots.forEach((plot) => plot.clear())
+  collect({ times, values, from }, fresh) {
+    for (const plot of this.plots) {
+      if (fresh) plot.clear()
+      else if (from < Infinity) plot.cut(from)
+    }
     const width = times.length > 0 ? values.length / times.length : 0
     let offset = 0
     for (const plot of this.plots) {
@@ -197,19 +237,22 @@ export class Instrument {
   }
 
   /** Update numbers and plots, less often than the picture. */
-  refresh({ time, readouts, realtime, goal }, now) {
+  refresh({ time, readouts, realtime, goal, panel, tape }, now) {
     const resting = this.state !== 'playing'
     if (resting || now - this.textAt >= TEXT_EVERY) {
       this.goal?.show(goal)
       this.textAt = now
       if (readouts !== null) this.readouts.show(readouts)
+      this.panel.show(panel)
       this.transport.setTime(time)
+      this.tape.show(tape, time)
       this.showPlay(!resting)
       this.transport.setRatio(resting ? 1 : realtime)
     }
     if (resting || now - this.plotAt >= PLOT_EVERY) {
       this.plotAt = now
-      this.plots.forEach((plot) => plot.draw())
+      const marks = tape.marks.map(([at, i]) => ({ time: at, label: this.config.controls[i].label }))
+      this.plots.forEach((plot) => plot.draw({ time, resting, marks }))
     }
   }
 
@@ -246,9 +289,9 @@ export class Instrument {
     this.transport.setPlaying(isPlaying, this.starter >= 0 && this.isAtStart ? this.config.start : undefined)
   }
 
-  step() {
+  step(count) {
     this.hasStarted = true
-    this.simulation.step()
+    this.simulation.step(count)
   }
 
   reset() {
@@ -265,6 +308,7 @@ export class Instrument {
   /** Go to the state of a link, now or when the lab is ready, and offer a button that replays the motion that led to it. */
   restore(state) {
     const { log } = state
+    if (state.text !== undefined && this.config.source && this.openEditor) return void this.edit(state)
     const replay = () => this.simulation.replay(log)
     const button = h('button', { type: 'button', class: 'lab-button', onclick: replay }, this.words('lab.live.motion'))
     this.motion.replaceChildren(button)
@@ -286,7 +330,34 @@ export class Instrument {
     })
   }
 
+  /** Let the reader edit the model, in place of this lab. @param {Record<string, any> | null} [state] of a link to an edited model */
+  async edit(state = null) {
+    try {
+      const response = await fetch(new URL(this.config.source, this.base))
+      if (!response.ok) throw new Error(this.words('lab.live.not_found', { status: response.status }))
+      const text = await response.text()
+      if (this.state === 'playing') this.simulation.pause()
+      this.body.hidden = true
+      this.bench = this.openEditor(this, text.trimEnd(), () => this.leaveEditor())
+      if (state !== null) this.bench.restore(state)
+    } catch (error) {
+      this.notices.show(error.message, 'warning')
+    }
+  }
+
+  leaveEditor() {
+    if (this.bench === null) return
+    this.bench.dispose()
+    this.bench = null
+    this.body.hidden = false
+    this.element.classList.add('lab-on')
+    this.element.dataset.state = this.state
+    this.view.invalidate()
+    this.view.element.focus({ preventScroll: true })
+  }
+
   whenReady(act) {
+    this.leaveEditor()
     if (this.state !== 'loading' && this.state !== 'asleep') return act()
     this.pendingAction = act
     this.simulation.wake()
@@ -328,7 +399,17 @@ export class Instrument {
     download(name, fillScript(text, this.values), 'text/x-python')
   }
 
+  exportCurves() {
+    const curves = this.plots.map(({ config, whole }) => ({
+      ylabel: config.ylabel,
+      labels: config.traces.map(({ label }) => label),
+      columns: whole.table(),
+    }))
+    download(`${this.config.id}.csv`, curvesText(curves), 'text/csv')
+  }
+
   dispose() {
+    this.leaveEditor()
     this.unwatch()
     clearTimeout(this.sayTimer)
     this.hands.dispose()

@@ -1,12 +1,13 @@
 /**
  * Plots of traces against time, drawn by uPlot: axes with labels, a colour and a dash for each line, a label at its end instead of a
- * legend, and lines for reference values.
+ * legend, and lines for reference values. While the lab rests, a plot shows the whole run, pale outside its window; a pointer on it reads
+ * values, and sets the time.
  */
 
 import uPlot from 'uplot'
 import { h } from './dom.js'
 import { History } from './history.js'
-import { formatLabel, superscript } from './numbers.js'
+import { formatLabel, formatTime, superscript } from './numbers.js'
 import { palette, watchTheme } from './palette.js'
 import { spanOf } from './span.js'
 import { spread } from './spread.js'
@@ -19,15 +20,29 @@ const LINE = FONT + GAP
 const LINEAR = 1 // uPlot's kinds of scales
 const LOGARITHMIC = 3
 const MOST_POWERS = 6 // labels of a logarithmic axis
+const FIGURES = 4 // of a value under the pointer
+const SLOP = 4 // pixels that a pointer moves before it sets the time
+const TICK = 5 // pixels, of the mark of a change
+const NO_SPAN = [Infinity, -Infinity]
+const PLAYING = { time: 0, resting: false, marks: [] }
 
 export class Plot {
   /**
    * @param {any} config a plot of the lab's JSON; `log: true` gives it a logarithmic y axis
    * @param {(key: string, values?: Record<string, any>) => string} words
+   * @param {((time: number) => void) | null} [seek] the reader points at a time (s)
    */
-  constructor(config, words) {
+  constructor(config, words, seek = null) {
     this.config = config
-    this.history = new History(config.traces.length, config.window)
+    this.recent = new History(config.traces.length, config.window)
+    this.whole = config.window === null ? this.recent : new History(config.traces.length, null)
+    /** @type {{time: number, resting: boolean, marks: {time: number, label: string}[]}} */
+    this.now = PLAYING
+    /** @type {number | null} the time under the pointer (s) */
+    this.pointed = null
+    /** @type {Float64Array[] | null} the samples of an earlier run */
+    this.kept = null
+    this.keptSpan = NO_SPAN
     this.caption = words('lab.plot', { ylabel: config.ylabel || words('lab.value'), xlabel: config.xlabel || words('lab.time') })
     this.element = h('figure', { class: 'lab-plot', role: 'img', 'aria-label': `${this.caption}: ${names(config)}` })
     this.chart = null
@@ -36,24 +51,87 @@ export class Plot {
     this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
     this.resizer.observe(this.element)
     this.unwatch = watchTheme(() => this.recolour())
+    if (seek !== null) this.watchPointer(seek)
   }
 
   /** Add samples: `values` has `width` numbers for each time, those of this plot from `offset` on. */
   push(times, values, width, offset) {
-    for (let i = 0; i < times.length; i++) this.history.push(times[i], values, i * width + offset)
+    for (const history of new Set([this.recent, this.whole])) {
+      for (let i = 0; i < times.length; i++) history.push(times[i], values, i * width + offset)
+    }
     if (times.length > 0) this.dirty = true
   }
 
   clear() {
-    this.history.clear()
+    this.recent.clear()
+    this.whole.clear()
     this.dirty = true
   }
 
-  /** Draw new samples. */
-  draw() {
+  /** Drop what came after a time (s). */
+  cut(time) {
+    const { recent, whole, config } = this
+    whole.cut(time)
+    if (recent !== whole) recent.refill(whole, time - config.window)
+    this.dirty = true
+  }
+
+  /** Keep the run, so that its lines stay behind those of the next; or keep none. */
+  keep(on) {
+    this.kept = on && this.whole.length > 0 ? this.whole.table().map((column) => column.slice()) : null
+    const values = (this.kept ?? []).slice(1).flatMap((column) => [...column].filter(Number.isFinite))
+    this.keptSpan = values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], NO_SPAN)
+    this.dirty = true
+  }
+
+  /** The samples that are shown. */
+  get history() {
+    return this.now.resting ? this.whole : this.recent
+  }
+
+  /**
+   * Draw what is new.
+   *
+   * @param {{time: number, resting: boolean, marks: {time: number, label: string}[]}} [now] the time of the lab (s), whether it rests,
+   *   and when which control was used
+   */
+  draw(now = PLAYING) {
+    const { time, resting } = this.now
+    this.now = now
+    if (now.resting !== resting || (resting && now.time !== time)) this.dirty = true
     if (!this.dirty || this.chart === null) return
     this.dirty = false
     this.chart.setData(this.history.data())
+  }
+
+  watchPointer(seek) {
+    const { element } = this
+    let start = null
+    const timeAt = ({ clientX }) => {
+      const { over } = this.chart
+      const time = this.chart.posToVal(clientX - over.getBoundingClientRect().left, 'x')
+      return Math.min(Math.max(time, 0), this.history.last)
+    }
+    const point = (time) => {
+      if (time === this.pointed) return
+      this.pointed = time
+      this.chart?.redraw(false, false)
+    }
+    element.classList.add('lab-seek')
+    element.addEventListener('pointerdown', (event) => {
+      start = event.button === 0 ? event.clientX : null
+      if (start !== null) element.setPointerCapture(event.pointerId)
+    })
+    element.addEventListener('pointermove', (event) => {
+      if (this.chart === null || this.history.length === 0) return
+      point(timeAt(event))
+      if (start !== null && Math.abs(event.clientX - start) > SLOP) seek(this.pointed)
+    })
+    element.addEventListener('click', (event) => {
+      if (this.chart !== null && this.history.length > 0) seek(timeAt(event))
+    })
+    for (const type of ['pointerup', 'pointercancel']) element.addEventListener(type, () => (start = null))
+    element.addEventListener('pointerleave', () => point(null))
   }
 
   resize(width, height) {
@@ -96,7 +174,11 @@ export class Plot {
         x: { time: false, range: () => this.timeRange() },
         y: {
           distr: config.log ? LOGARITHMIC : LINEAR,
-          range: (_, min, max) => (config.log ? decades(config, min, max) : spanOf(config, min, max)),
+          range: (_, min, max) => {
+            const low = Math.min(min ?? Infinity, this.keptSpan[0])
+            const high = Math.max(max ?? -Infinity, this.keptSpan[1])
+            return config.log ? decades(config, low, high) : spanOf(config, low, high)
+          },
         },
       },
       axes: [
@@ -106,15 +188,15 @@ export class Plot {
       series: [
         {},
         ...config.traces.map((trace, i) => ({
-          stroke: () => this.colours.traces[i % this.colours.traces.length],
+          stroke: (chart) => this.inkOf(chart, i),
           width: 1.6,
           dash: dashOf(trace, i, config.traces.length),
           points: { show: false },
         })),
       ],
       hooks: {
-        drawAxes: [(chart) => this.drawTitle(chart, font), (chart) => this.drawReferences(chart, font)],
-        draw: [(chart) => this.drawLabels(chart, font)],
+        drawAxes: [(chart) => this.drawTitle(chart, font), (chart) => this.drawReferences(chart, font), (chart) => this.drawKept(chart)],
+        draw: [(chart) => this.drawLabels(chart, font), (chart) => this.drawTime(chart, font)],
       },
     }
   }
@@ -122,8 +204,24 @@ export class Plot {
   timeRange() {
     const { window } = this.config
     const { last } = this.history
-    if (window !== null) return last <= window ? [0, window] : [last - window, last]
-    return [0, Math.max(1, last)]
+    if (window === null || this.now.resting) return [0, Math.max(window ?? 1, last, this.kept?.[0].at(-1) ?? 0)]
+    return last <= window ? [0, window] : [last - window, last]
+  }
+
+  /** The colour of a line: outside the window, and after the time at which the lab rests, it is pale. */
+  inkOf({ ctx, bbox, valToPos }, i) {
+    const ink = this.colours.traces[i % this.colours.traces.length]
+    const { time, resting } = this.now
+    const { last } = this.history
+    const from = time - (this.config.window ?? Infinity)
+    if (!resting || (time >= last && from <= 0)) return ink
+    const pale = faint(ink)
+    const { left, width } = bbox
+    const part = (at) => Math.min(1, Math.max(0, (valToPos(Math.max(0, at), 'x', true) - left) / width))
+    const gradient = ctx.createLinearGradient(left, 0, left + width, 0)
+    const stops = [[0, pale], [part(from), pale], [part(from), ink], [part(time), ink], [part(time), pale], [1, pale]]
+    for (const [place, colour] of stops) gradient.addColorStop(/** @type {number} */ (place), /** @type {string} */ (colour))
+    return gradient
   }
 
   /** Width of the labels at the ends of the lines. */
@@ -179,6 +277,29 @@ export class Plot {
     ctx.restore()
   }
 
+  /** Draw the lines of the run that was kept. */
+  drawKept({ ctx, bbox, scales, valToPos }) {
+    if (this.kept === null) return
+    const [times, ...columns] = this.kept
+    ctx.save()
+    ctx.beginPath()
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height)
+    ctx.clip()
+    ctx.lineWidth = uPlot.pxRatio
+    columns.forEach((column, i) => {
+      ctx.strokeStyle = faint(this.colours.traces[i % this.colours.traces.length])
+      ctx.beginPath()
+      let isDrawing = false
+      times.forEach((time, j) => {
+        const isShown = time >= scales.x.min && Number.isFinite(column[j])
+        if (isShown) ctx[isDrawing ? 'lineTo' : 'moveTo'](valToPos(time, 'x', true), valToPos(column[j], 'y', true))
+        isDrawing = isShown
+      })
+      ctx.stroke()
+    })
+    ctx.restore()
+  }
+
   drawLabels(chart, font) {
     const { ctx, bbox, valToPos } = chart
     const { traces } = this.config
@@ -202,12 +323,75 @@ export class Plot {
     ctx.restore()
   }
 
+  /** Draw when controls were used, and the values under the pointer, or at the earlier time at which the lab rests. */
+  drawTime(chart, font) {
+    const { ctx, bbox, valToPos, scales } = chart
+    const { time, resting, marks } = this.now
+    const { last } = this.history
+    const ratio = uPlot.pxRatio
+    const bottom = bbox.top + bbox.height
+    const place = (at) => Math.round(valToPos(at, 'x', true))
+    const at = this.pointed ?? (resting && time < last ? time : null)
+    ctx.save()
+    ctx.fillStyle = ctx.strokeStyle = this.colours.text
+    ctx.lineWidth = ratio
+    const shown = marks.filter((mark) => mark.time >= scales.x.min)
+    for (const mark of shown) {
+      const x = place(mark.time)
+      ctx.beginPath()
+      ctx.moveTo(x, bottom - 2 * TICK * ratio)
+      ctx.lineTo(x - TICK * ratio, bottom)
+      ctx.lineTo(x + TICK * ratio, bottom)
+      ctx.fill()
+    }
+    if (at !== null && last > 0) {
+      const x = place(at)
+      ctx.beginPath()
+      ctx.moveTo(x, bbox.top)
+      ctx.lineTo(x, bottom)
+      ctx.stroke()
+      const near = shown.filter((mark) => Math.abs(place(mark.time) - x) <= TICK * ratio).map(({ label }) => label)
+      this.drawValues(chart, font, at, [`${formatTime(at)} s`, ...near].join(', '))
+    }
+    ctx.restore()
+  }
+
+  drawValues({ ctx, bbox, valToPos }, font, at, text) {
+    const ratio = uPlot.pxRatio
+    const x = valToPos(at, 'x', true)
+    const values = this.history.at(at)
+    const pixels = values.map((value) => (Number.isFinite(value) ? valToPos(value, 'y', true) : null))
+    const places = spread([bbox.top + (FONT / 2) * ratio, ...pixels], (FONT + 2) * ratio, bbox.top + (FONT / 2) * ratio, bbox.top + bbox.height)
+    const isLeft = x < bbox.left + bbox.width / 2
+    ctx.font = scaleFont(font, ratio)
+    ctx.textAlign = isLeft ? 'left' : 'right'
+    ctx.textBaseline = 'middle'
+    const write = (words, y, colour) => {
+      const { width } = ctx.measureText(words)
+      const edge = x + (isLeft ? GAP : -GAP) * ratio
+      ctx.clearRect(isLeft ? edge : edge - width, y - (FONT / 2) * ratio, width, FONT * ratio)
+      ctx.fillStyle = colour
+      ctx.fillText(words, edge, y)
+    }
+    write(text, places[0], this.colours.text)
+    values.forEach((value, i) => {
+      if (pixels[i] === null) return
+      const colour = this.colours.traces[i % this.colours.traces.length]
+      write(formatLabel(Number(value.toPrecision(FIGURES))), places[i + 1], colour)
+      ctx.beginPath()
+      ctx.arc(x, pixels[i], 3 * ratio, 0, 2 * Math.PI)
+      ctx.fill()
+    })
+  }
+
   dispose() {
     this.unwatch()
     this.resizer.disconnect()
     this.chart?.destroy()
   }
 }
+
+const faint = (colour) => colour.replace('rgb(', 'rgba(').replace(')', ', 0.35)')
 
 const names = ({ traces }) => traces.map(({ label }) => label).join(', ')
 

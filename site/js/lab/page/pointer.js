@@ -2,7 +2,7 @@
  * Mouse, touch and keys on a view.
  *
  * Mouse as in MuJoCo's viewer: left turns, right moves, the wheel zooms, Ctrl or Shift and the left button on a body pulls it with
- * a spring. In a page the wheel belongs to the page until the view has the focus, and one finger that goes up or down scrolls.
+ * a spring, or moves the pose of a lab that is paused. If `grabs` is set, the left button or a finger alone does that. In a page the wheel belongs to the page until the view has the focus, and one finger that goes up or down scrolls.
  *
  * One finger turns, two move and zoom, and a finger that has rested on a body pulls it. Only a tap gives the view the focus, since
  * a finger that scrolls past must not capture the page's scrolling.
@@ -26,6 +26,7 @@ export class Hands {
     this.view = view
     this.actions = actions
     this.pointers = new Map()
+    this.grabs = false
     this.drag = null
     this.restingFinger = null // a finger that has not moved yet: {pointer, timer}
     this.abort = new AbortController()
@@ -59,8 +60,9 @@ export class Hands {
     this.cancelRest()
     this.release()
     if (this.pointers.size > 1) return
-    if (touch) this.awaitRest(event)
-    else if (event.button === 0 && (event.ctrlKey || event.shiftKey || event.metaKey)) this.grab(event.pointerId)
+    const isMeant = this.grabs || (!touch && (event.ctrlKey || event.shiftKey || event.metaKey))
+    if (event.button === 0 && isMeant) this.grab(event.pointerId)
+    if (touch && this.drag === null) this.awaitRest(event)
   }
 
   /** Grab the body under a finger once it has rested for a while. */

@@ -8,8 +8,9 @@
  *
  *   state(state, reason)   'asleep' (nothing is loaded before something is asked of it), 'loading', 'paused', 'playing', 'ended' (it will not run again)
  *   ready({scene, values, time, version})
- *   samples({epoch, times, values}, fresh)   `fresh`: a new run began, earlier samples belong to another
- *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts, goal}
+ *   samples({epoch, from, times, values}, fresh)   `fresh`: a new run began, earlier samples belong to another
+ *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts, goal, panel, tape}
+ *   model(model)           what the model offers (core/panel.js), after `inspect(true)`
  *   controls(values)       lab code may have changed them
  *   diverged({time, kind, message}), warning({time, kind, message}), error({message, entry, kind, fatal}), saved(state)
  *   noPicture()            the browser has no WebGL
@@ -36,7 +37,7 @@ export class Simulation {
     this.element = null
     this.address = (path) => (path ? new URL(path, base).href : '')
     this.visible = false
-    this.settings = new Map() // messages to repeat after a restart: speed and overlays
+    this.settings = new Map() // messages to repeat after a restart: speed, overlays, inspection
     this.tick = (now) => this.refresh(now)
     this.request = 0
     this.line = null
@@ -95,6 +96,11 @@ export class Simulation {
     this.send({ type: 'step', n })
   }
 
+  /** Go to another time (s) of the run. */
+  seek(time) {
+    this.send({ type: 'seek', time })
+  }
+
   reset() {
     this.send({ type: 'reset' })
   }
@@ -121,6 +127,21 @@ export class Simulation {
 
   overlay(name, on) {
     this.choose(name, { type: 'overlay', name, on })
+  }
+
+  /** Begin or stop to receive what the model offers, and with each frame its values. */
+  inspect(on) {
+    this.choose('inspect', { type: 'inspect', on })
+  }
+
+  /** Set the control signal of an actuator of the model; `play`: and run. */
+  actuate(index, value, play = false) {
+    this.send({ type: 'actuate', index, value, play })
+  }
+
+  /** Begin again at a keyframe of the model. */
+  startAt(index) {
+    this.send({ type: 'keyframe', index })
   }
 
   /** Pull a body: `{body, point, target}`, then `{body, target}`; null lets go. */
@@ -215,6 +236,7 @@ const MESSAGES = {
   playing: (simulation) => simulation.state === 'playing' || simulation.setState('playing'),
   // Out of sight it only waits, which is no pause.
   paused: (simulation, { reason }) => reason === 'offscreen' || simulation.setState('paused', reason),
+  model: (simulation, { model }) => simulation.on.model?.(model),
   controls(simulation, { values }) {
     simulation.diverged = false
     simulation.on.controls?.(values)

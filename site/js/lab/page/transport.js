@@ -1,4 +1,4 @@
-/** The row under the picture: play and pause, step, reset, speed, time, full screen. */
+/** The row under the picture: play and pause, a step, reset, speed, time, full screen. */
 
 import { h, icon } from './dom.js'
 import { formatRatio, formatTime } from './numbers.js'
@@ -8,7 +8,7 @@ const ON_TIME = 0.95
 
 /**
  * @param {(key: string, values?: Record<string, any>) => string} words
- * @param {{play: () => void, step: () => void, reset: () => void, speed: (factor: number) => void, full: (() => void) | null}} actions
+ * @param {{play: () => void, step: (() => void) | null, reset: () => void, speed: (factor: number) => void, full: (() => void) | null}} actions
  */
 export function buildTransport(words, actions) {
   const act = (name, text, run) =>
@@ -16,7 +16,7 @@ export function buildTransport(words, actions) {
   const label = h('span', {}, words('lab.live.play'))
   const sign = h('span', { class: 'lab-sign' }, icon('play'))
   const play = h('button', { type: 'button', class: 'lab-play', onclick: actions.play }, sign, label)
-  const step = act('step', words('lab.live.step'), actions.step)
+  const step = actions.step === null ? null : act('step', words('lab.live.step'), actions.step)
   const reset = act('reset', words('lab.live.reset'), actions.reset)
   const speed = h('select', { class: 'lab-speed', 'aria-label': words('lab.live.speed'), title: words('lab.live.speed') })
   speed.append(...SPEEDS.map((factor) => h('option', { value: String(factor), selected: factor === 1 }, `${factor} ×`)))
@@ -28,11 +28,7 @@ export function buildTransport(words, actions) {
   const element = h(
     'div',
     { class: 'lab-transport', role: 'group', 'aria-label': words('lab.live.transport') },
-    play,
-    step,
-    reset,
-    speed,
-    clock,
+    ...[play, step, reset, speed, clock].filter((part) => part !== null),
   )
   let shown = null
   return {
@@ -57,7 +53,7 @@ export function buildTransport(words, actions) {
       if (late.textContent !== text) late.textContent = text
     },
     setEnabled(isEnabled) {
-      for (const button of [step, reset, speed]) button.disabled = !isEnabled
+      for (const field of [step, reset, speed]) if (field !== null) field.disabled = !isEnabled
     },
   }
 }

@@ -5,13 +5,15 @@
  */
 
 import { PerspectiveCamera } from 'three'
-import { OrbitCamera } from './camera.js'
+import { ModelCamera, OrbitCamera } from './camera.js'
 import { h } from './dom.js'
 import { channels, resolve, watchTheme } from './palette.js'
 import { ScaleBar } from './scale.js'
 import { stage } from './stage.js'
 import { STUDIO_LAYER } from './studio.js'
 import { World, aim } from './world.js'
+
+const CAMERA = 13 // floats of a camera in a frame
 
 export class View {
   /**
@@ -60,9 +62,21 @@ export class View {
     this.world?.dispose()
     this.world = new World(description)
     const { azimuth, elevation, distance, target, fovy } = description.camera
-    this.camera = new OrbitCamera({ azimuth, elevation, distance, target: [...target], fovy })
+    this.camera = this.freeCamera = new OrbitCamera({ azimuth, elevation, distance, target: [...target], fovy })
     this.frame = null
     this.colour()
+  }
+
+  /** Look through a camera of the model, or through the free one (-1). */
+  look(camera) {
+    if (this.world === null) return
+    this.camera = this.freeCamera
+    if (camera >= 0 && this.frame !== null) {
+      const { layout, extent } = this.world.description
+      this.camera = new ModelCamera(layout.cameras + CAMERA * camera, extent)
+      this.camera.follow(this.frame)
+    }
+    this.invalidate()
   }
 
   /** Apply the page's colours. */
@@ -93,6 +107,7 @@ export class View {
   /** Make ready for drawing; false if there is nothing to draw. */
   prepare() {
     if (this.world === null || this.frame === null || this.width === 0 || this.height === 0) return false
+    if (this.camera instanceof ModelCamera) this.camera.follow(this.frame)
     this.world.update(this.frame, this.camera)
     aim(this.lens, this.camera, this.world.description, this.width, this.height)
     this.world.edges.update(this.width, this.height)

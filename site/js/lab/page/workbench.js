@@ -10,6 +10,20 @@ import { Editor } from './editor.js'
 import { Instrument } from './instrument.js'
 import { copyLink, writeLink } from './share.js'
 
+/**
+ * Let the reader edit the model of an instrument, in its place.
+ *
+ * @param {Instrument} instrument @param {string} xml the text of its model @param {() => void} leave the reader wants the lab again
+ */
+export function openEditor({ element, config, base, words }, xml, leave) {
+  const bare = { goal: null, exportPython: null, source: null, key: null, start: null, still: '', stopAt: null, trail: null, autoplay: false }
+  const own = { kind: 'mjcf', xml, mjb: '', module: '', worker: `${config.worker}#${config.id}` }
+  const bench = new Workbench(element, { ...config, ...bare, ...own, controls: [], readouts: [], plots: [] }, base, words)
+  bench.backButton.after(h('button', { type: 'button', class: 'lab-button', onclick: leave }, words('lab.live.leave')))
+  bench.editor.field.focus()
+  return bench
+}
+
 export class Workbench extends Instrument {
   build() {
     super.build()

@@ -4,11 +4,22 @@
  * The worker's functions are handed in, so that the tests can run this module outside a worker.
  */
 
+import { confine, watchableCode } from '../../exercise/attempt.js'
 import { EngineError, createEngine } from '../core/engine.js'
 import { Session } from './session.js'
 
 const BUDGET = 12 // ms of stepping before messages are looked at
 const LONGEST = 8 // ms between two ticks
+
+/** The code of a lab that has none: of a model that the reader edits. It starts from the first keyframe, if any. */
+const PLAIN = {
+  setup: ({ model, data, mj }) => {
+    if (model.nkey > 0) mj.mj_resetDataKeyframe(model, data, 0)
+  },
+  controls: [],
+  readouts: [],
+  plots: [],
+}
 
 export class Host {
   /**
@@ -66,11 +77,12 @@ export class Host {
     this.queues.set(id, queue)
     try {
       const model = config.xml ?? fetchBytes(mjb)
-      const [engine, source, code] = await Promise.all([this.start(wasm), model, importModule(module)])
+      const [engine, source, code] = await Promise.all([this.start(wasm), model, module === '' ? PLAIN : importModule(module)])
       if (this.queues.get(id) !== queue) return // disposed of, or loaded again
       const session = new Session(id, post, now)
       this.sessions.set(id, session)
-      session.open(engine, source, config, code)
+      if (config.attempt !== undefined) confine() // its worker is dedicated
+      session.open(engine, source, config, config.attempt === undefined ? code : watchableCode(config, code))
       this.queues.delete(id)
       queue.forEach((message) => session.receive(message))
       session.show()

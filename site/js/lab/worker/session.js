@@ -9,16 +9,22 @@
  *
  *   warm {wasm}                       start to fetch and compile the engine (an address)
  *   load {config, module, mjb, wasm}  fetch what is missing and start the lab; the last three are absolute addresses. A model in
- *                                     `config.xml` replaces `mjb`
+ *                                     `config.xml` replaces `mjb`; without a `module` the lab has no code but a start from the
+ *                                     first keyframe
  *   ping                              answered by `pong`, unless something takes all the worker's time
  *   play, pause, reset
- *   step {n}                          pause and make `n` steps
+ *   step {n}                          pause and make `n` steps, or go back by as many if it is negative
+ *   seek {time}                       pause and go to another time of the run (core/tape.js)
  *   speed {factor}                    simulated seconds for each real one
  *   control {index, value, play}      set a number or an option; with `play` the lab then runs, unless its code pauses
  *   press {index, play}               press a button; `play` likewise
+ *   inspect {on}                      begin or stop to send what the model offers (core/panel.js)
+ *   actuate {index, value, play}      set the control signal of an actuator; `play` as above
+ *   keyframe {index}                  begin again at a keyframe of the model
  *   overlay {name, on}                one of `OVERLAYS` in core/frame.js
  *   visible {on}                      a lab out of sight makes no steps and sends no frames
- *   perturb {body, point, target}     with `point` (m, world) take hold of the body there; draw it to `target`; `null` lets go
+ *   perturb {body, point, target}     with `point` (m, world) take hold of the body there; draw it to `target`; `null` lets go.
+ *                                     A lab that is paused moves its pose; else a spring pulls
  *   frame {buffer}                    give a frame's buffer back (or `null` if it is lost)
  *   replay {log}                      begin again and play the log (core/lab.js)
  *   state                             ask for the state
@@ -28,7 +34,8 @@
  * To the page:
  *
  *   ready {version, scene, values, time}  `scene` of core/scene.js; `values` of the controls, `null` for none yet
- *   frame {time, buffer, readouts, samples, realtime, contacts, goal}
+ *   model {model}                     what the model offers, or `null`: the answer to `inspect`
+ *   frame {time, buffer, readouts, samples, realtime, contacts, goal, panel, tape}
  *   playing
  *   paused {reason}                   `user`, `stopAt`, `code`, `diverged`, `error`, `offscreen`
  *   controls {values}                 after anything that lab code may have changed
@@ -39,15 +46,17 @@
  *   state {state}                     `{values, steps, time, physics, log}`
  *
  * Of a frame: `buffer` is laid out as core/frame.js says, and transferred, not copied. `readouts` has a number, a text or `null` (no
- * value) each; it is `null` as a whole if one of them failed. `samples` is `{epoch, times, values}` since the last frame: for each
- * time one number for each trace of all plots in turn, NaN for a gap; a new `epoch` means that the run began again. `realtime` is how
+ * value) each; it is `null` as a whole if one of them failed. `samples` is `{epoch, from, times, values}` since the last frame: for each
+ * time one number for each trace of all plots in turn, NaN for a gap; a new `epoch` means that the run began again, and what lies after
+ * `from` no longer belongs to it. `tape` is the `range` of core/tape.js. `realtime` is how
  * much of the time due in the last second was simulated: 1 unless the model is too slow. `goal` is `null` or `{held, reached,
  * counts}`: for how long its condition has held (s), when it was reached (s or `null`), and whether the reader has used the controls
- * alone.
+ * alone. `panel` is `null` or, of a lab that is inspected, `{ctrl, sensors, driven}`.
  */
 
 import { Clock } from '../core/clock.js'
 import { Lab } from '../core/lab.js'
+import { Tape } from '../core/tape.js'
 
 const CHUNK = 2 // ms of stepping between two looks at the clock
 const LEAST = 4 // ms between two frames of a running lab
@@ -77,6 +86,7 @@ export class Session {
     this.guard(() => {
       const host = { play: () => this.play(), pause: () => this.stop('code') }
       this.lab = new Lab(engine, source, config, code, host)
+      this.lab.tape = new Tape(this.lab)
       this.lab.start()
     })
     if (this.lab === null) return
@@ -228,7 +238,8 @@ export class Session {
     const frame = lab.frame(this.buffers.pop())
     const samples = lab.sampler.take()
     const realtime = this.playing ? this.clock.ratio() : 1
-    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, contacts: lab.data.ncon, goal: lab.goal }
+    const panel = lab.panel?.read() ?? null
+    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, contacts: lab.data.ncon, goal: lab.goal, panel, tape: lab.tape.range }
     this.post('frame', rest, [frame.buffer, samples.times.buffer, samples.values.buffer])
   }
 }
@@ -239,10 +250,20 @@ const HANDLERS = {
   pause: (session) => session.stop('user'),
   step(session, { n }) {
     session.stop('user')
-    const { stopped: reason } = session.advance(n ?? 1)
+    const { tape, steps } = session.lab
+    if (n < 0 || tape.isPast) {
+      tape.go(Math.max(0, steps + n))
+      return session.afterChange()
+    }
+    const { stopped: reason } = session.advance(n)
     session.stale = true
     session.report()
     if (reason === 'stopAt') session.post('paused', { reason: 'stopAt' })
+  },
+  seek(session, { time }) {
+    session.stop('user')
+    session.lab.tape.seek(time)
+    session.afterChange()
   },
   reset(session) {
     session.lab.reset()
@@ -252,6 +273,16 @@ const HANDLERS = {
   speed: (session, { factor }) => session.clock.setSpeed(factor),
   control: (session, { index, value, play }) => session.act((lab) => lab.setControl(index, value), play),
   press: (session, { index, play }) => session.act((lab) => lab.press(index), play),
+  inspect(session, { on }) {
+    session.post('model', { model: session.lab.inspect(on) })
+    session.stale = true
+  },
+  actuate: (session, { index, value, play }) => session.act((lab) => lab.actuate(index, value), play),
+  keyframe(session, { index }) {
+    session.lab.startAt(index)
+    session.clock.stop()
+    session.afterChange()
+  },
   overlay(session, { name, on }) {
     session.lab.pictures.setOverlay(name, on)
     session.stale = true
@@ -263,8 +294,9 @@ const HANDLERS = {
     if (session.playing) session.post(on ? 'playing' : 'paused', on ? {} : { reason: 'offscreen' })
   },
   perturb(session, { body, point, target }) {
-    session.lab.perturb(target === null || target === undefined ? null : { body, point, target })
+    session.lab.perturb(target === null || target === undefined ? null : { body, point, target }, !session.playing)
     session.stale = true
+    session.report()
   },
   state: (session) => session.post('state', { state: session.lab.state() }),
   restore(session, { state }) {

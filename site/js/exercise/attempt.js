@@ -1,0 +1,54 @@
+/**
+ * What a reader has written, put in the place of the author's solution: the model, the controller, or the function `ctx.answer`.
+ *
+ * `config.exercise` is what coursebuild/features/exercise/model.py says of the exercise, `config.attempt` the text.
+ */
+
+/**
+ * The code of a lab with an attempt in it; that of a model is not in the code.
+ *
+ * @param {Record<string, any>} config
+ * @param {Record<string, any>} code of the lab
+ * @throws {SyntaxError} the text is no JavaScript
+ */
+export function attemptCode({ exercise, attempt }, code) {
+  if (exercise.subject === 'model') return code
+  const run = compile(exercise, attempt)
+  if (exercise.subject === 'controller') return { ...code, controller: run }
+  const setup = (env) => {
+    env.ctx.answer = run
+    code.setup(env)
+  }
+  return { ...code, setup }
+}
+
+/** The same for a reader who watches: a readout that fails shows nothing, as the attempt may lack what it reads. */
+export function watchableCode(config, code) {
+  const readouts = code.readouts.map((read) => (env) => {
+    try {
+      return read(env) ?? null
+    } catch {
+      return null
+    }
+  })
+  return { ...attemptCode(config, code), readouts }
+}
+
+function compile({ subject, bounds: [before, after] }, attempt) {
+  // As it stands alone: a text that closes its function and opens another is refused.
+  const text = subject === 'formula' ? attempt.replaceAll('^', '**') : attempt
+  new Function(subject === 'formula' ? `return (${text}\n)` : text)
+  return new Function(`"use strict"; return (${before}${text}${after})`)()
+}
+
+const REACH = [
+  'fetch', 'XMLHttpRequest', 'WebSocket', 'WebSocketStream', 'WebTransport', 'EventSource', 'importScripts', 'Worker', 'SharedWorker', 'BroadcastChannel',
+  'indexedDB', 'caches', 'cookieStore', 'navigator', 'Notification',
+] // prettier-ignore
+
+/** Take from this worker, for good, all by which its code could reach the network, what a browser keeps, or other pages. */
+export function confine() {
+  for (let owner = globalThis; owner !== null; owner = Object.getPrototypeOf(owner)) {
+    for (const name of REACH) Reflect.deleteProperty(owner, name)
+  }
+}

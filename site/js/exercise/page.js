@@ -1,0 +1,195 @@
+/**
+ * An exercise in its page: an editor, the verdicts of the trials, and a simulation of what the reader has written.
+ *
+ * The simulation runs in a dedicated worker, as that of a model which readers edit; the trials in one more (judging.js).
+ */
+
+import { h } from '../lab/page/dom.js'
+import { Editor } from '../lab/page/editor.js'
+import { Instrument } from '../lab/page/instrument.js'
+import { formatReadout, withUnit } from '../lab/page/numbers.js'
+import { sign } from '../progress/signs.js'
+import { judgeAttempt } from './judging.js'
+
+export class Exercise extends Instrument {
+  constructor(element, config, base, words, progress = null) {
+    const worker = `${config.worker}#${config.id}` // so that it is dedicated
+    super(element, { ...config, worker, kind: 'exercise', exportPython: null }, base, words, progress) // an export would be the solution
+    this.base = base
+    this.leave = progress?.onChange(() => this.showState())
+    this.showState()
+  }
+
+  build() {
+    super.build()
+    const { words, config } = this
+    const { exercise } = config
+    this.controls.element?.remove() // its buttons belong to the trials
+    this.otherText = exercise.start // the reader's, while the start is in the editor
+    this.loadedText = null
+    this.checkedText = null
+    this.tries = 0
+    this.stopJudging = () => {}
+    this.stateText = ''
+    this.editor = new Editor(exercise.start, words, { run: () => this.check(), input: () => this.labelBackButton() })
+    this.editor.element.querySelector('label').textContent = words(`exercise.live.${exercise.subject}`, { names: exercise.names.join(', ') })
+    const check = h('button', { type: 'button', class: 'lab-button exercise-check', onclick: () => this.check() }, words('exercise.live.check'))
+    this.backButton = h('button', { type: 'button', class: 'lab-button', onclick: () => this.exchange() })
+    const keys = h('span', {}, words('exercise.live.keys_check'))
+    this.labelBackButton()
+    this.rows = exercise.trials.map((trial, i) => this.makeRow(trial, i))
+    const label = this.element.querySelector('.lab-static [role="group"]')?.getAttribute('aria-label') ?? ''
+    this.board = h('ol', { class: 'exercise-trials', 'aria-label': label }, ...this.rows.map(({ element }) => element))
+    this.summary = h('p', { class: 'exercise-state', role: 'status' })
+    this.editor.element.append(h('div', { class: 'lab-buttons' }, check, this.backButton, keys), this.summary, this.board)
+    this.body.prepend(this.editor.element)
+  }
+
+  makeRow({ name, hint }, i) {
+    const { words } = this
+    const verdict = h('span', { class: 'exercise-verdict' }, words('exercise.live.waiting'))
+    const seen = h('span', { class: 'exercise-seen' })
+    const advice = h('p', { class: 'exercise-hint', hidden: true }, hint)
+    const watch = h('button', { type: 'button', class: 'lab-text', hidden: true, onclick: () => this.watch(i) }, words('exercise.live.watch'))
+    const element = h('li', {}, h('p', {}, h('b', {}, name), ' ', verdict, ' ', seen, ' ', watch), advice)
+    return { element, verdict, seen, advice, watch, hint }
+  }
+
+  makeFoot() {
+    const foot = super.makeFoot()
+    foot.querySelector('button').remove() // a link holds no attempt
+    return foot
+  }
+
+  listeners() {
+    const inherited = super.listeners()
+    return {
+      ...inherited,
+      error: (error) => {
+        this.playRequested = false
+        if (error.kind === 'load') this.editor.fail(error.message)
+        else inherited.error(error)
+      },
+    }
+  }
+
+  // --- judging
+
+  check() {
+    const { config, words, base, editor } = this
+    this.stopJudging()
+    editor.clear()
+    this.notices.clear()
+    this.tries += 1
+    this.checkedText = editor.text
+    for (const row of this.rows) this.showVerdict(row, 'waiting')
+    this.summary.replaceChildren(words('exercise.live.checking'))
+    const address = (path) => new URL(path, base).href
+    const addresses = { worker: address(config.worker), module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
+    const results = []
+    const next = () => results.length < this.rows.length && this.showVerdict(this.rows[results.length], 'running')
+    this.stopJudging = judgeAttempt(addresses, { ...config, attempt: editor.text }, {
+      begun: next,
+      verdict: (index, verdict) => {
+        results.push(verdict.passed)
+        this.showVerdict(this.rows[index], verdict.passed ? 'passed' : 'failed', verdict)
+        next()
+      },
+      end: (problem) => this.finish(problem, results),
+    }) // prettier-ignore
+  }
+
+  showVerdict({ element, verdict, seen, advice, watch, hint }, state, result = null) {
+    const { words } = this
+    element.dataset.state = state
+    verdict.textContent = words(`exercise.live.${state}`)
+    seen.textContent = result === null ? '' : this.seenText(result, this.rows.findIndex((row) => row.element === element))
+    watch.hidden = result === null
+    advice.hidden = state !== 'failed' || hint === ''
+  }
+
+  seenText({ seen, failure }, i) {
+    if (seen === null) return this.words('exercise.live.unseen', { message: failure })
+    const { digits, unit } = this.config.exercise.trials[i]
+    return this.words('exercise.live.seen', { value: withUnit(formatReadout(seen, digits).trim(), unit) })
+  }
+
+  finish(problem, results) {
+    const { words, rows, progress, config, element } = this
+    for (const row of rows.slice(results.length)) this.showVerdict(row, 'waiting')
+    if (problem !== null) this.editor.fail(problem === '' ? words('exercise.live.endless') : problem)
+    const passed = results.filter(Boolean).length
+    const isSolved = passed === rows.length
+    const isJudged = results.length === rows.length
+    this.stateText = isJudged ? words(isSolved ? 'exercise.live.solved' : 'exercise.live.unsolved', { n: passed, all: rows.length }) : ''
+    this.showState()
+    if (!isSolved) return
+    const { id } = config.exercise
+    const lesson = document.querySelector('main')?.dataset.lesson ?? ''
+    const answer = { kind: 'exercise', given: 'solved', right: true, tries: this.tries, hints: 0, number: 1, lesson }
+    progress?.put(id, id, answer)
+    element.dispatchEvent(new CustomEvent('coursebuild:answered', { bubbles: true, detail: { quiz: id, key: id, answer } }))
+  }
+
+  /** Show how many trials are passed, or else whether the reader has solved the exercise before. */
+  showState() {
+    const { id } = this.config.exercise
+    const isKept = this.progress?.get(id, id)?.right === true
+    const text = this.stateText || (isKept ? this.words('exercise.live.kept') : '')
+    this.summary.replaceChildren(...(isKept ? [sign('read'), text] : [text]))
+  }
+
+  // --- watching
+
+  /** Load what is in the editor, if it is not loaded. */
+  load(text) {
+    if (this.loadedText === text && this.state !== 'ended') return
+    const { simulation, config } = this
+    this.loadedText = text
+    this.editor.clear()
+    this.notices.clear()
+    const model = config.exercise.subject === 'model' ? { xml: text } : {}
+    simulation.config = { ...simulation.config, attempt: text, ...model }
+    simulation.restart()
+  }
+
+  togglePlay() {
+    if (this.state !== 'playing' && this.state !== 'loading') this.load(this.editor.text)
+    super.togglePlay()
+  }
+
+  /** Show the run of a trial, of the text that was judged. */
+  watch(i) {
+    const { button, t } = this.config.exercise.trials[i]
+    this.load(this.checkedText)
+    ;[...this.readouts.element.children].forEach((row, n) => (row.hidden = n !== i))
+    this.whenReady(() => {
+      this.simulation.replay({ values: this.initial, events: button === null ? [] : [[0, button]], end: t })
+    })
+    this.body.querySelector('.lab-stage').scrollIntoView({ block: 'nearest' })
+  }
+
+  // --- the reader's text
+
+  /** Exchange the reader's text for the start, or back. */
+  exchange() {
+    const { editor, config } = this
+    const { text } = editor
+    const { start } = config.exercise
+    editor.text = text === start ? this.otherText : start
+    if (text !== start) this.otherText = text
+    this.labelBackButton()
+  }
+
+  labelBackButton() {
+    const { editor, config, otherText, words } = this
+    const { start } = config.exercise
+    this.backButton.textContent = words(`exercise.live.${editor.text !== start || otherText === start ? 'back' : 'mine'}`)
+  }
+
+  dispose() {
+    this.stopJudging()
+    this.leave?.()
+    super.dispose()
+  }
+}

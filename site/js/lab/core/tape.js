@@ -1,0 +1,192 @@
+/**
+ * What a run was: its states, one every few steps, from which each step is found again to the last bit.
+ *
+ * A state holds all that the next step depends on: MuJoCo's numbers, the lab's `ctx`, its controls and its random numbers. What is derived
+ * (`xpos`, sensors, contacts) is that of the step before; so the numbers before a step are kept, too, and the step is made again. After
+ * something was done to the lab, the numbers are those before `mj_forward`. (Accelerations are derived with the model as it is now, which
+ * is another if a controller changes it.) Between two states steps are repeated, unless a body was
+ * pulled there: then the run can be looked at in the states only. When there are too many, every second one goes.
+ *
+ * The lab may stand at an earlier step of its tape. What then happens to it, or the next step that it makes, drops what came after.
+ */
+
+const MOST = 1500 // states
+const MOST_NUMBERS = 1_000_000 // in all of them, 8 MB
+const LARGEST = 5000 // values that `ctx` may hold
+const MOST_MARKS = 200
+const APART = 0.3 // s between two marks of one control
+const TOLERANCE = 1e-6 // of a step
+
+export class Tape {
+  /** @param {import('./lab.js').Lab} lab */
+  constructor(lab) {
+    this.lab = lab
+    this.most = Math.min(MOST, Math.max(20, Math.floor(MOST_NUMBERS / (2 * lab.physics.size))))
+    this.clear()
+  }
+
+  /** Begin a new run. */
+  clear() {
+    this.states = []
+    this.stride = 0 // steps between two states; 0: not known yet
+    this.end = null // the last step: {step, time, log}
+    this.marks = []
+  }
+
+  /** The times (s) between which the lab can be put, and those at which a control was used: `[time, control]`. */
+  get range() {
+    const start = this.states[0]?.time ?? this.lab.time
+    return { start, end: this.end?.time ?? start, marks: this.marks }
+  }
+
+  /** Whether the lab stands at an earlier step. */
+  get isPast() {
+    return this.end !== null && this.lab.steps < this.end.step
+  }
+
+  // --- recording
+
+  /** The numbers before the step that begins, if its state is to be kept. */
+  before() {
+    const { lab } = this
+    if (this.stride === 0) this.stride = Math.max(1, Math.round(lab.sampler.interval / lab.option.timestep))
+    return (lab.steps + 1) % this.stride === 0 ? lab.physics.read() : null
+  }
+
+  /** A step was made. @param {Float64Array | null} numbers of `before` */
+  after(numbers) {
+    if (numbers !== null) this.keep(numbers, this.lab.physics.read())
+    this.markEnd()
+  }
+
+  /** Something was done to the lab; @param {Float64Array} numbers before `mj_forward` */
+  event(numbers) {
+    this.cut()
+    const { steps } = this.lab
+    while (this.states.length > 0 && this.states[this.states.length - 1].step >= steps) this.states.pop()
+    this.keep(null, numbers)
+    this.markEnd()
+  }
+
+  /** A control was used. */
+  mark(control) {
+    const { time } = this.lab
+    const last = this.marks.findLast((mark) => mark[1] === control)
+    if (this.lab.steps === 0 || (last !== undefined && time - last[0] < APART)) return
+    this.marks = [...this.marks, [time, control]].slice(-MOST_MARKS)
+  }
+
+  markEnd() {
+    const { steps, time, log } = this.lab
+    this.end = { step: steps, time, log }
+  }
+
+  keep(before, numbers) {
+    const { lab } = this
+    if (sizeOf(lab.ctx) > LARGEST) return void (this.states = [])
+    this.states.push({
+      step: lab.steps,
+      time: lab.time,
+      before,
+      numbers,
+      ctx: structuredClone(lab.ctx),
+      values: [...lab.values],
+      random: lab.draw.read(),
+      seen: lab.sampler.read(),
+      isPulled: lab.drag.active,
+    })
+    if (this.states.length > this.most) this.thin()
+  }
+
+  /** Drop every second state; those after which steps cannot simply be repeated go last. */
+  thin() {
+    const events = this.states.filter(({ before }) => before === null).length
+    let drops = false
+    const kept = []
+    for (const state of this.states) {
+      const isEvent = state.before === null
+      if (kept.length > 0 && (!isEvent || 2 * events > this.most)) drops = !drops
+      else drops = false
+      if (!drops) kept.push(state)
+      else if (isEvent || state.isPulled) kept[kept.length - 1].isPulled = true
+    }
+    this.states = kept
+    this.stride *= 2
+  }
+
+  /** Drop what came after the step at which the lab stands. */
+  cut() {
+    if (!this.isPast) return
+    const { steps, time } = this.lab
+    this.states = this.states.filter(({ step }) => step <= steps)
+    this.marks = this.marks.filter(([at]) => at <= time)
+    this.lab.sampler.cut(time)
+    this.markEnd()
+  }
+
+  // --- going to a step
+
+  /** Go to the last step that is not after a time (s). */
+  seek(time) {
+    const { lab, states } = this
+    const state = states.findLast((item) => item.time <= time + TOLERANCE * lab.option.timestep) ?? states[0]
+    if (state === undefined) return
+    this.restore(state)
+    const { timestep } = lab.option // which controls may have changed
+    this.repeat(state, state.step + Math.floor((time - state.time) / timestep + TOLERANCE))
+  }
+
+  /** Go to a step. */
+  go(step) {
+    const state = this.states.findLast((item) => item.step <= step) ?? this.states[0]
+    if (state === undefined) return
+    this.restore(state)
+    this.repeat(state, step)
+  }
+
+  restore({ before, numbers, ctx, values, random, seen, step }) {
+    const { lab, end } = this
+    const { mj } = lab.engine
+    lab.queue = []
+    lab.drag.release()
+    lab.controls.change(values)
+    for (const name of Object.keys(lab.ctx)) delete lab.ctx[name]
+    Object.assign(lab.ctx, structuredClone(ctx))
+    lab.physics.write(before ?? numbers)
+    if (before === null) mj.mj_forward(lab.model, lab.data)
+    else {
+      mj.mj_step(lab.model, lab.data)
+      lab.physics.write(numbers)
+    }
+    lab.draw.write(random)
+    lab.sampler.write(seen)
+    lab.steps = step
+    lab.log = end.log
+    lab.arrive()
+  }
+
+  /** Repeat the steps from a state up to another step, unless the hand that pulled then is missing. */
+  repeat(state, step) {
+    const { lab, end } = this
+    const last = Math.min(step, end.step)
+    while (!state.isPulled && lab.steps < last) lab.advance()
+    const { log } = end
+    lab.log = log === null || lab.steps === end.step ? log : { ...log, events: log.events.filter(([at]) => at <= lab.time + TOLERANCE) }
+    lab.arrive()
+  }
+}
+
+/** How many values an object holds; infinite if one cannot be copied, or belongs to the engine. */
+function sizeOf(value) {
+  if (typeof value === 'function' || typeof value === 'symbol') return Infinity
+  if (typeof value !== 'object' || value === null) return 1
+  if (ArrayBuffer.isView(value)) return value.byteLength < value.buffer.byteLength ? Infinity : value.byteLength / 8
+  const prototype = Object.getPrototypeOf(value)
+  if (prototype !== Object.prototype && prototype !== Array.prototype) return Infinity
+  let size = 1
+  for (const item of Object.values(value)) {
+    size += sizeOf(item)
+    if (size > LARGEST) return Infinity
+  }
+  return size
+}

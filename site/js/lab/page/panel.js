@@ -1,0 +1,81 @@
+/** What the model of a lab offers, in a folded panel: sliders of its actuators, values of its sensors, its cameras and keyframes. */
+
+import { buildControls, buildReadouts } from './controls.js'
+import { h } from './dom.js'
+import { formatNumber, formatReadout } from './numbers.js'
+
+const DIGITS = 3 // of sensors
+const MOST_VALUES = 6 // of a sensor that are shown
+
+export class ModelPanel {
+  /**
+   * @param {(key: string, values?: Record<string, any>) => string} words
+   * @param {{inspect: (on: boolean) => void, actuate: (index: number, value: number) => void, startAt: (index: number) => void,
+   *   look: (camera: number) => void}} actions `look`: through a camera of the model, or the free one (-1)
+   */
+  constructor(words, actions) {
+    this.words = words
+    this.actions = actions
+    this.body = h('div', { class: 'lab-model' })
+    this.element = h('details', { class: 'lab-help' }, h('summary', {}, words('lab.live.panel')), this.body)
+    this.element.addEventListener('toggle', () => actions.inspect(this.element.open))
+  }
+
+  /** Show what there is. @param {any} model of core/panel.js; null: nothing any more */
+  open(model) {
+    if (model === null) return
+    const { words, actions } = this
+    const { actuators, sensors, cameras, keys } = model
+    this.sensors = sensors
+    this.sliders = buildControls(
+      actuators.map(({ name, min, max }) => ({ type: 'slider', label: name, unit: '', min, max, step: null, digits: DIGITS })),
+      { set: (i, value) => actions.actuate(i, Number(value)), press: () => {} },
+    )
+    this.readouts = buildReadouts(
+      sensors.map(({ name }) => ({ label: name, digits: DIGITS })),
+      formatReadout,
+    )
+    const views = [[words('lab.live.camera_free'), -1], ...cameras.map(({ name, index }) => [name, index])]
+    const menu = buildControls([{ type: 'select', label: words('lab.live.camera'), unit: '', options: views }], {
+      set: (_, camera) => actions.look(Number(camera)),
+      press: () => {},
+    })
+    const buttons = buildControls(
+      keys.map((label) => ({ type: 'button', label })),
+      { set: () => {}, press: actions.startAt },
+    )
+    this.driven = h('p', { class: 'lab-driven', hidden: true }, words('lab.live.driven'))
+    this.body.replaceChildren(
+      ...this.section('actuators', actuators, this.sliders.element, this.driven),
+      ...this.section('sensors', sensors, this.readouts.element),
+      ...this.section('keyframes', keys, buttons.element),
+      ...(cameras.length > 0 ? [menu.element] : []),
+    )
+    if (!this.body.hasChildNodes()) this.body.append(h('p', {}, words('lab.live.panel_empty')))
+    actions.look(-1)
+  }
+
+  section(key, items, ...content) {
+    if (items.length === 0) return []
+    const label = this.words(`lab.live.${key}`)
+    return [h('p', { 'aria-hidden': 'true', class: 'lab-kind' }, label), h('div', { role: 'group', 'aria-label': label }, ...content)]
+  }
+
+  /** Show the values of a frame. @param {{ctrl: Float64Array, sensors: Float64Array, driven: Uint8Array} | null} panel */
+  show(panel) {
+    if (panel === null || this.sensors === undefined) return
+    const { ctrl, sensors, driven } = panel
+    let start = 0
+    const values = this.sensors.map(({ size }) => textOf(sensors.subarray(start, (start += size))))
+    this.readouts.show(values)
+    this.sliders.show(Array.from(ctrl))
+    this.driven.hidden = !driven.includes(1)
+    this.sliders.element?.querySelectorAll('input').forEach((field, i) => (field.disabled = driven[i] === 1))
+  }
+}
+
+/** The value of a sensor; of a long one the first numbers. */
+function textOf(values) {
+  const texts = Array.from(values.subarray(0, MOST_VALUES), (x) => formatNumber(x, DIGITS))
+  return values.length > MOST_VALUES ? `${texts.join(' ')} …` : texts.join(' ')
+}

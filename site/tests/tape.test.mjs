@@ -1,0 +1,178 @@
+/** The tape: every step of a run is found again to the last bit, whatever shaped the run, and memory stays bounded. */
+
+import assert from 'node:assert/strict'
+import { test } from 'node:test'
+import { Tape } from '../js/lab/core/tape.js'
+import { PENDULUM, control, labOf, newEngine, plot } from './helpers.mjs'
+
+const engine = await newEngine()
+const BALLS = `<mujoco><option timestep="0.004"/><worldbody><geom type="plane" size="2 2 .1"/>
+  ${[0.2, 0.45, 0.7].map((z, i) => `<body pos="${0.05 * i} 0 ${z}"><freejoint/><geom size=".1"/><site name="s${i}"/></body>`).join('')}
+</worldbody><sensor><framepos objtype="site" objname="s2"/></sensor></mujoco>`
+
+const taped = (t, xml, data, functions) => {
+  const lab = labOf(t, engine, xml, data, functions)
+  lab.tape = new Tape(lab)
+  lab.start()
+  return lab
+}
+
+/** All that a reader or the next step could see of a lab. */
+const whole = (lab) => ({
+  physics: lab.physics.read(),
+  derived: [lab.data.xpos, lab.data.sensordata, lab.data.qacc].map((array) => array.slice()),
+  ctx: structuredClone(lab.ctx),
+  values: [...lab.values],
+  goal: lab.goal,
+  time: lab.time,
+  steps: lab.steps,
+})
+
+// A controller that remembers, draws random numbers, and sees sensors of the step before.
+const CONTROLLER = ({ data, ctx, lib }) => {
+  ctx.sum = (ctx.sum ?? 0) + data.sensordata[2] + lib.random()
+  data.xfrc_applied[6] = 0.01 * ctx.sum * ctx.gain
+}
+const GAIN = { controls: [control({ param: 'gain', min: 0, max: 9, value: 1 }), control({ type: 'button' })] }
+const CODE = {
+  controller: CONTROLLER,
+  controls: [{ set: ({ ctx }, value) => (ctx.gain = value) }, { run: ({ data }) => (data.qvel[2] += 1) }],
+}
+
+test('every step is found again to the last bit, also after controls were used', (t) => {
+  const lab = taped(t, BALLS, GAIN, CODE)
+  const seen = [whole(lab)]
+  for (let i = 1; i <= 200; i++) {
+    lab.step(1)
+    if (i === 61) lab.setControl(0, 4)
+    if (i === 130) lab.press(1)
+    seen.push(whole(lab))
+  }
+  assert.ok(lab.tape.states.length < 60, `${lab.tape.states.length} states of 200 steps`)
+  for (const step of [200, 3, 60, 61, 62, 199, 130, 129, 0, 131, 77]) {
+    lab.tape.go(step)
+    assert.deepEqual(whole(lab), seen[step], `step ${step}`)
+  }
+  assert.deepEqual(
+    lab.tape.range.marks.map(([time, i]) => [time.toFixed(3), i]),
+    [['0.244', 0], ['0.520', 1]],
+  )
+  lab.tape.seek(seen[150].time)
+  assert.equal(lab.steps, 150)
+  lab.tape.seek(1e9)
+  assert.equal(lab.steps, 200)
+  lab.tape.seek(-1)
+  assert.equal(lab.steps, 0)
+})
+
+test('a controller that changes the model is repeated, too', (t) => {
+  const controller = ({ data, model }) => (model.opt.gravity[0] = Math.sin(9 * data.time) + data.sensordata[2])
+  const lab = taped(t, BALLS, {}, { controller })
+  const seen = [lab.physics.read()]
+  for (let i = 0; i < 100; i++) {
+    lab.step(1)
+    seen.push(lab.physics.read())
+  }
+  for (const step of [99, 4, 50, 51, 52, 53, 100]) {
+    lab.tape.go(step)
+    assert.deepEqual(lab.physics.read(), seen[step])
+  }
+})
+
+test('a run that goes on from an earlier step goes as it went before', (t) => {
+  const lab = taped(t, BALLS, GAIN, CODE)
+  const other = taped(t, BALLS, GAIN, CODE)
+  lab.step(150)
+  other.step(150)
+  lab.tape.go(43)
+  assert.ok(lab.tape.isPast)
+  lab.step(107)
+  assert.ok(!lab.tape.isPast)
+  assert.deepEqual(whole(lab), whole(other))
+})
+
+test('what is done at an earlier step drops what came after, from the log too', (t) => {
+  const lab = taped(t, BALLS, GAIN, CODE)
+  lab.step(50)
+  lab.setControl(0, 2)
+  lab.step(50)
+  lab.setControl(0, 3)
+  lab.step(50)
+  lab.tape.go(70)
+  assert.equal(lab.values[0], 2)
+  assert.deepEqual(lab.state().log.events, [[0.2, 0, 2]])
+  assert.equal(lab.tape.range.end.toFixed(3), '0.600', 'looking drops nothing')
+  lab.press(1)
+  assert.equal(lab.tape.range.end.toFixed(3), '0.280')
+  assert.deepEqual(lab.state().log.events, [[0.2, 0, 2], [0.28, 1]])
+  const { log } = lab.state()
+  lab.step(30)
+  const reached = lab.physics.read()
+  const again = taped(t, BALLS, GAIN, CODE)
+  again.replay({ ...log, end: lab.time })
+  while (again.step(1).stopped === null);
+  assert.deepEqual(again.physics.read(), reached)
+})
+
+test('samples, trail and goal go back with the run', (t) => {
+  const fields = { plots: [plot(1, { window: 1 })], trail: 's0', goal: { hold: 0 } }
+  const lab = taped(t, BALLS, fields, { plots: [[({ data }) => data.qpos[2]]], goal: ({ data }) => data.time > 0.3 })
+  lab.step(100)
+  assert.ok(lab.goal.reached !== null)
+  const { length } = lab.sampler.take().times
+  const points = lab.sampler.points
+  lab.tape.seek(0.2)
+  assert.equal(lab.goal.reached, null)
+  assert.ok(lab.sampler.points < points)
+  assert.equal(lab.sampler.take().from, Infinity)
+  lab.step(1)
+  assert.ok(Math.abs(lab.sampler.take().from - 0.2) < 1e-9)
+  lab.step(49)
+  assert.ok(lab.sampler.take().times.length < length)
+  assert.ok(lab.goal.reached !== null)
+  assert.equal(lab.sampler.points, points)
+})
+
+test('where a hand pulled, the run stands still at its states only', (t) => {
+  const lab = taped(t, PENDULUM)
+  lab.step(100)
+  lab.perturb({ body: 1, point: [0, 0, -0.4], target: [0.2, 0, -0.3] })
+  const seen = []
+  for (let i = 0; i < 100; i++) {
+    lab.step(1)
+    seen[lab.steps] = lab.physics.read()
+  }
+  lab.perturb(null)
+  lab.step(100)
+  for (const step of [299, 150, 101, 100, 177]) {
+    lab.tape.go(step)
+    assert.ok(lab.steps <= step && step - lab.steps < lab.tape.stride, `${lab.steps} for ${step}`)
+    if (seen[lab.steps] && lab.steps < 200) assert.deepEqual(lab.physics.read(), seen[lab.steps])
+  }
+})
+
+test('a long run with many changes keeps few states, and those are true', (t) => {
+  const lab = taped(t, PENDULUM, { controls: [control({ min: -9, max: 9, value: 0 })] }, { controls: [{ set: ({ data }, value) => (data.ctrl[0] = value) }] })
+  lab.tape.most = 100
+  const seen = []
+  for (let i = 0; i < 3000; i++) {
+    if (i % 7 === 0 && i < 2000) lab.setControl(0, i % 5)
+    lab.step(1)
+    seen[lab.steps] = lab.physics.read()
+  }
+  assert.ok(lab.tape.states.length <= 100)
+  for (const step of [2999, 2500, 1400, 33]) {
+    lab.tape.go(step)
+    if (lab.steps === step) assert.deepEqual(lab.physics.read(), seen[step])
+    else assert.ok(step < 2000 && lab.steps <= step)
+  }
+})
+
+test('a lab that keeps what cannot be copied has no tape, and runs as ever', (t) => {
+  const lab = taped(t, PENDULUM, {}, { setup: ({ ctx, data }) => Object.assign(ctx, { law: () => 1, view: data.qpos }) })
+  lab.step(100)
+  const { start, end } = lab.tape.range
+  assert.deepEqual([start, end], [lab.time, lab.time])
+  lab.tape.seek(0)
+  assert.equal(lab.steps, 100)
+})

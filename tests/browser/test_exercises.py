@@ -1,0 +1,140 @@
+"""Exercises: what a reader writes is judged, whatever it is, and harms nothing."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from support.axe import violations
+from support.built_sites import Site
+from support.lab_page import press, until, watch_page
+
+pytestmark = pytest.mark.browser
+
+ADDRESS = "lessons/1.1-one.html"
+HOLDS = "document.documentElement.scrollWidth <= window.innerWidth"
+
+
+@pytest.fixture(scope="module")
+def page(browsers: Mapping[str, Browser], sites: Mapping[str, Site]) -> Iterator[Page]:
+    """A phone's window in the dark, in whose console nothing may appear."""
+    size = {"width": 390, "height": 800}
+    with browsers["webgl"].new_context(viewport=size, color_scheme="dark") as context:  # type: ignore[arg-type]
+        page, console = watch_page(context)
+        page.goto(sites["exercises"].url(ADDRESS))
+        yield page
+        assert console == []
+
+
+def exercise(page: Page, title: str) -> tuple[Locator, Locator]:
+    """An exercise, and the field of its text."""
+    element = page.locator(".exercise").filter(has=page.locator(".lab-title", has_text=title))
+    element.scroll_into_view_if_needed()
+    return element, element.get_by_role("textbox")
+
+
+def verdicts(element: Locator) -> Locator:
+    return element.get_by_role("list").get_by_role("listitem")
+
+
+def test_attempts_are_judged_watched_and_kept(page: Page) -> None:
+    bar, text = exercise(page, "A bar that balances")
+    press(bar, "Check")
+    level, mass = verdicts(bar).all()
+    expect(level).to_contain_text(re.compile("level failed −27\\.\\d+° was seen"))
+    expect(level).to_contain_text("The heavier ball needs the shorter arm.")
+    expect(mass).to_contain_text("there passed 1.600 kg was seen")
+    expect(bar.get_by_role("status").filter(has_text="1 of 2")).to_be_visible()
+    press(level, "Watch this run")
+    expect(bar).to_have_attribute("data-state", "paused")
+    expect(bar.locator(".lab-time")).to_have_text("2.00 s")
+    expect(bar.locator(".lab-readouts dd").first).to_have_text("−27.366")
+    assert violations(page, ".exercise") == []
+    until(page, HOLDS)
+    start = text.input_value()
+    text.fill(start.replace("-0.3 0 0", "-0.15 0 0"))
+    text.press("Control+Enter")
+    expect(bar.get_by_text("Solved: all trials are passed.")).to_be_visible()
+    press(bar, "Back to the start")
+    expect(text).to_have_value(start)
+    press(bar, "Back to mine")
+    expect(text).to_have_value(re.compile("-0.15"))
+    page.reload()
+    bar, text = exercise(page, "A bar that balances")
+    expect(bar.get_by_text("You have solved this exercise before.")).to_be_visible()
+
+
+def test_a_model_that_does_not_compile_is_told_at_its_line(page: Page) -> None:
+    bar, text = exercise(page, "A bar that balances")
+    text.fill("<mujoco>\n  <worldbody>\n    <geom foo='1'/>\n  </worldbody>\n</mujoco>")
+    press(bar, "Check")
+    expect(bar.get_by_role("alert").filter(has_text="unrecognized attribute")).to_be_visible()
+    expect(text).to_have_accessible_description(re.compile("Line 3: Schema violation"))
+    expect(verdicts(bar).first).to_contain_text("not tried yet")
+    text.fill("<mujoco/>")
+    press(bar, "Check")
+    expect(verdicts(bar).first).to_contain_text('no value: Error: the model has no joint "pivot"')
+
+
+def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None:
+    neighbour = page.locator(".lab").filter(has_text="A neighbour")
+    neighbour.scroll_into_view_if_needed()
+    press(neighbour, "Play")
+    expect(neighbour).to_have_attribute("data-state", "playing")
+    hold, text = exercise(page, "Hold it")
+    text.fill("for (;;) {}")
+    press(hold, "Check")
+    expect(hold.get_by_role("alert").filter(has_text="took too long")).to_be_visible()
+    for mistake, message in (
+        ("data.qpos[0] = ", "Unexpected token"),
+        ("}) => {}, ({", ""),
+        ("return 1 +", "Unexpected token"),
+    ):
+        text.fill(mistake)
+        press(hold, "Check")
+        expect(hold.get_by_role("alert").filter(has_text=message)).to_be_visible()
+        expect(text).to_have_attribute("aria-invalid", "true")
+    for reach in ("fetch", "indexedDB", "caches", "navigator", "XMLHttpRequest", "WebSocket"):
+        text.fill(f"{reach}.x = 1")
+        press(hold, "Check")
+        expect(verdicts(hold).last).to_contain_text(f"ReferenceError: {reach} is not defined")
+    text.fill("Math.sin = Array.prototype.map = null; self.postMessage({type: 'judged'})")
+    press(hold, "Check")
+    expect(hold).not_to_contain_text("Solved")
+    text.fill("data.qfrc_applied[0] = 50 * (0.5 - data.qpos[0]) - 10 * data.qvel[0]")
+    press(hold, "Check")
+    expect(hold.get_by_text("Solved: all trials are passed.")).to_be_visible()
+    press(verdicts(hold).last, "Watch this run")
+    expect(hold.locator(".lab-time")).to_have_text("5.00 s")
+    expect(hold.locator(".lab-readouts dd").last).to_have_text(re.compile("0.4"))
+    neighbour.scroll_into_view_if_needed()
+    expect(neighbour).to_have_attribute("data-state", "playing")
+
+
+def test_a_formula_is_written_as_on_paper(page: Page) -> None:
+    push, text = exercise(page, "A push")
+    expect(push.get_by_label("Your formula, of h, g")).to_have_value("2*g*h")
+    press(push, "Check")
+    expect(verdicts(push)).to_contain_text("failed 9.810 m/s was seen")
+    text.fill("(2*g*h)^0.5")
+    press(push, "Check")
+    expect(verdicts(push)).to_contain_text("passed 3.132 m/s was seen")
+
+
+def test_an_exercise_is_read_without_scripts(
+    browsers: Mapping[str, Browser], sites: Mapping[str, Site]
+) -> None:
+    with browsers["plain"].new_context(java_script_enabled=False) as context:
+        page = context.new_page()
+        page.goto(sites["exercises"].url(ADDRESS))
+        hold = page.locator(".exercise").nth(1)
+        expect(hold.get_by_text("Hold the pendulum at 0.5 rad.")).to_be_visible()
+        expect(hold.get_by_text("data.qfrc_applied[0] = 0")).to_be_visible()
+        expect(hold.get_by_role("row").last).to_contain_text("0.4 to 0.6 rad at t = 5 s")
+        solution = hold.get_by_text("50 * (0.5")
+        expect(solution).to_be_hidden()
+        hold.get_by_text("Solution").click()
+        expect(solution).to_be_visible()
