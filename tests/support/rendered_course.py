@@ -94,7 +94,8 @@ class RenderedCourse(Struct, frozen=True):
         """The whole site as a build puts it together, with these files of the course."""
         with TemporaryDirectory() as folder:
             root = Path(folder)
-            for path, data in files.items():
+            models = {m.source.path: m.source.text.encode() for m in self.course.models}
+            for path, data in {**models, **files}.items():
                 (root / path).parent.mkdir(parents=True, exist_ok=True)
                 (root / path).write_bytes(data)
             course = replace(self.course, files=tuple(files))
