@@ -39,6 +39,7 @@ export class Lab {
     this.host = host
     this.recorder = null // records each step for the trial
     this.tape = null // keeps the run, in a page
+    this.began = 0 // s, the time before the last step
     this.panel = null // while the reader looks at the model's actuators and sensors
     this.handles = engine.load(source)
     try {
@@ -297,8 +298,8 @@ export class Lab {
 
   stepOnce() {
     const { data, tape } = this
-    const before = data.time
     const numbers = this.advance()
+    const before = this.began
     const findings = this.watch.look(before)
     if (findings !== null) {
       this.warnings.push(...findings.warnings)
@@ -319,6 +320,7 @@ export class Lab {
     recorder?.begin()
     if (this.code.controller) this.watched(() => call(['controller'], () => this.code.controller(this.env)))
     recorder?.controlled()
+    this.began = data.time // which the controller may have set
     drag.push()
     const numbers = tape?.before() ?? null
     engine.mj.mj_step(model, data)
