@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import fields
 from coursebuild.core.model.blocks import Comparison, Document, Filter, Paragraph, Recording
-from coursebuild.core.model.fields import Author, Slug, WebPlace, describe, matching
+from coursebuild.core.model.fields import Author, CoursePath, Slug, WebPlace, describe, matching
 from coursebuild.core.model.inlines import NumberBinding
 from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.scenarios import Declarations
@@ -180,14 +180,6 @@ class Lesson(LessonTable, frozen=True, kw_only=True):
     @property
     def path(self) -> str:
         return f"content/lessons/{self.id}-{self.slug}.md"
-
-
-class CoursePath(Struct, frozen=True, forbid_unknown_fields=True):
-    """A way through the course, for one kind of reader."""
-
-    title: Annotated[fields.Text, describe("plain text")]
-    lessons: Annotated[tuple[fields.Text, ...], describe("ids of lessons in the order of reading")]
-    summary: Annotated[fields.Summary, describe("for whom it is, or where it leads")] = ""
 
 
 class Level(Struct, frozen=True):

@@ -1,4 +1,4 @@
-"""Types of fields that several declarations share, and who wrote a course.
+"""Types of fields that several declarations share, and who wrote a course, and ways through it.
 
 In the `extra` of a `Meta` are two remarks for the decoder: `text` ("blocks" or "inlines": the
 string is Markdown; "plain" or "number": it is none, but may bind numbers) and `expects` (words for
@@ -110,3 +110,11 @@ class Author(Struct, frozen=True, forbid_unknown_fields=True):
         for digit in digits[:-1]:
             total = (total + int(digit)) * 2
         return bool(digits) and digits[-1] != "0123456789X"[(12 - total % 11) % 11]
+
+
+class CoursePath(Struct, frozen=True, forbid_unknown_fields=True):
+    """A way through the course, for one kind of reader."""
+
+    title: Annotated[Text, describe("plain text")]
+    lessons: Annotated[tuple[Text, ...], describe("ids of lessons in the order of reading")]
+    summary: Annotated[Summary, describe("for whom it is, or where it leads")] = ""

@@ -12,7 +12,6 @@ from msgspec import Struct
 
 from coursebuild.core.features import ModelPart
 from coursebuild.core.model import (
-    CoursePath,
     Document,
     FeatureBlock,
     Lesson,
@@ -24,6 +23,7 @@ from coursebuild.core.model import (
     find_blocks,
     listing_anchor,
 )
+from coursebuild.core.model.fields import CoursePath
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import AddedParts, HighlightedFile, PageHead, PageInputs
 from coursebuild.core.pages.document_inputs import (

@@ -21,10 +21,11 @@ from coursebuild.core.drawing.contrast import (
     contrast,
     legible,
 )
-from coursebuild.core.model import CoursePath, Filter, LessonTable, Limits, Silence
+from coursebuild.core.model import Filter, LessonTable, Limits, Silence
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import (
     Author,
+    CoursePath,
     Language,
     NotNegative,
     RelativeTolerance,

@@ -169,8 +169,8 @@ def _find_blocks(text: str) -> Iterator[tuple[list[int], str, str, str]]:
         is_plain = token.type == "fence" and head[:1] != "{" and " " not in head
         if quotation is not None:
             if not is_plain:
-                quoted = (_QUOTE.sub("", line) for line in lines[slice(*quotation)])
-                yield quotation, ">", "", "\n".join(quoted)
+                texts = (_QUOTE.sub("", line) for line in lines[slice(*quotation)])
+                yield quotation, ">", "", "\n".join(texts)
         elif token.level == 0 or (
             not is_plain and lines[token.map[0]].lstrip().startswith(token.markup)
         ):

@@ -183,9 +183,9 @@ def unbound_results(course: model.Course) -> Iterator[tuple[model.Owner, tuple[S
         if isinstance(owner, model.Lesson) or owner.menu:
             claims = document_claims(read_again(course, owner, document))
             of_map = _map_claims(owner, document.comma)
-            stated = [*claims.open, *(claim for claim in of_map if claim.text not in bound)]
-            inputs = parts.inputs(document).union(claims.inputs) if stated else ()
-            yield owner, tuple(claim for claim in stated if not claim.is_in(inputs))
+            results = [*claims.open, *(claim for claim in of_map if claim.text not in bound)]
+            inputs = parts.inputs(document).union(claims.inputs) if results else ()
+            yield owner, tuple(claim for claim in results if not claim.is_in(inputs))
 
 
 def _map_claims(owner: model.Owner, comma: bool) -> Iterator[StatedNumber]:
