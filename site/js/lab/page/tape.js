@@ -38,8 +38,9 @@ export function buildTape(words, stopAt, { seek, step }) {
     element: h('div', { class: 'lab-tape' }, back, field, on),
     /** @param {{start: number, end: number}} range of the run @param {number} time where it stands (s) */
     show({ start, end }, time) {
-      field.min = String(start)
-      field.max = String(Math.max(stopAt ?? start + USUAL, end))
+      const first = end > start ? start : 0 // a run that is not kept has its time shown, and cannot be gone through
+      field.min = String(first)
+      field.max = String(Math.max(stopAt ?? first + USUAL, end))
       if (!queued) field.value = String(time)
       field.setAttribute('aria-valuetext', `${formatTime(time)} s`)
       field.disabled = end <= start
