@@ -8,9 +8,11 @@ from coursebuild.core.checks.links import LinkTargets, check_links, link_targets
 from coursebuild.core.model import (
     Course,
     Document,
+    FeatureBlock,
     Term,
     document_blocks,
     document_scripts,
+    find_blocks,
     find_inlines,
     is_blank,
 )
@@ -85,6 +87,13 @@ def _check_core_rules(
         help += f'`[…](term:{term.id})`; or name this one by `{{term="…"}}`'
         notes = [Note("the first one is here", first)]
         yield diagnose("term-repeated", term.span, message, help=help, notes=notes)
+    for id, place in filter(None, (b.given_id() for b in find_blocks(document, FeatureBlock))):
+        first = targets.progress_ids.get(id, place)
+        if (first.path, first.start) != (place.path, place.start):
+            message = f"the id `{id}` is used twice"
+            help = "a learner's progress is kept under the id; give each quiz and exercise its own"
+            notes = [Note("the first one is here", first)]
+            yield diagnose("progress-id-repeated", place, message, help=help, notes=notes)
 
 
 def _check_features(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:

@@ -37,16 +37,22 @@ class LinkTargets(Struct, frozen=True):
     scripts: frozenset[str]
     files: frozenset[str]
     terms: Mapping[str, Span]
+    progress_ids: Mapping[str, Span]
+    """Under which what readers did is kept."""
 
 
 def link_targets(course: model.Course) -> LinkTargets:
     """What the course offers as targets."""
     scripts: set[str] = set()
     terms: dict[str, Span] = {}
+    progress_ids: dict[str, Span] = {}
     for document in course.documents:
         scripts.update(script.path for script in model.document_scripts(document))
         for term in model.find_inlines(document, model.Term):
             terms.setdefault(term.id, term.span)
+        for block in model.find_blocks(document, model.FeatureBlock):
+            if (given := block.given_id()) is not None:
+                progress_ids.setdefault(*given)
     return LinkTargets(
         {lesson.id: lesson.document for lesson in course.lessons},
         frozenset(level.id for level in course.levels),
@@ -56,6 +62,7 @@ def link_targets(course: model.Course) -> LinkTargets:
         frozenset(scripts),
         frozenset(course.files),
         terms,
+        progress_ids,
     )
 
 

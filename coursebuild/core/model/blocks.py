@@ -344,6 +344,10 @@ class FeatureBlock(Labelled, frozen=True, kw_only=True):
         """What a reader's progress is recorded for: an id, unique in the course, and its keys."""
         return None
 
+    def given_id(self) -> tuple[str, Span] | None:
+        """That id, where its author chose it, and its place."""
+        return None
+
 
 Block: TypeAlias = (
     Heading

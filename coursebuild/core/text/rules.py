@@ -116,6 +116,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "math-unclosed": "A displayed formula is not closed.",
         "term-attribute": "The attribute that defines a term cannot be read.",
         "term-place": "A term is defined outside a paragraph.",
+        "progress-id-repeated": "Two quizzes or exercises of the course have the same id.",
         "term-repeated": "The course defines a term twice.",
         "symbol-attribute": "The braces that declare a symbol cannot be read.",
         "symbol-formula": "The formula declared as a symbol is not a single symbol.",
@@ -229,13 +230,11 @@ GROUPS: dict[str, dict[str, str]] = {
         "lab-engine": "An engine ended while a lab was tried, or refused its model.",
     },
     "Exercises": {
-        "exercise-id-repeated": "Two exercises of the course have the same id.",
         "exercise-solution": "The solution of an exercise fails a trial, or cannot be tried.",
         "exercise-start": "The start of an exercise passes all its trials.",
         "exercise-wrong": "A wrong attempt passes the trial that it names, or cannot be tried.",
     },
     "Quizzes": {
-        "quiz-id-repeated": "Two quizzes of the course have the same id.",
         "question-id-repeated": "Two questions of a quiz have the same id.",
         "quiz-answer": "The answer of a question is not one of its options.",
         "quiz-output": "An `output` question names a script or line that was not printed or is "

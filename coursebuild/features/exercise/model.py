@@ -76,6 +76,10 @@ class Exercise(FeatureBlock, frozen=True):
         """The id, which is also the key of its only question."""
         return self.id, (self.id,)
 
+    def given_id(self) -> tuple[str, Span]:
+        """The id."""
+        return self.id, self.id_span
+
     @property
     def bounds(self) -> tuple[str, str]:
         """What stands before and behind a text that a reader writes, to make a function of it."""

@@ -1,4 +1,4 @@
-"""Quizzes across the course: ids are unique, questions name scripts and labs that there are."""
+"""Quizzes across the course: questions name scripts and labs that there are."""
 
 from __future__ import annotations
 
@@ -38,25 +38,10 @@ from coursebuild.features.quiz.schema import QuizFile
 
 
 def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
-    """Report repeated ids, and output questions about scripts that nothing runs.
-
-    Only `documents` are checked; ids are compared with those of the whole course.
-    """
-    first: dict[str, Quiz] = {}
-    for document in course.documents:
-        for quiz in find_blocks(document, Quiz):
-            first.setdefault(quiz.id, quiz)  # the id is empty where it cannot be read
+    """Report output questions of some documents about scripts that nothing runs."""
     norun = {s.path: s.norun for document in course.documents for s in document_scripts(document)}
     for document in documents:
         for quiz in find_blocks(document, Quiz):
-            if quiz.id and first[quiz.id] is not quiz:
-                yield diagnose(
-                    "quiz-id-repeated",
-                    quiz.id_span,
-                    f"the quiz id `{quiz.id}` is used twice",
-                    help="a learner's progress is kept under the id; give each quiz its own",
-                    notes=[Note("the first one is here", first[quiz.id].id_span)],
-                )
             for question in quiz.output_questions():
                 script, place = question.script, question.script_span
                 if script not in norun:

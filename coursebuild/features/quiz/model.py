@@ -148,6 +148,10 @@ class Quiz(FeatureBlock, frozen=True):
         """The keys under which a reader's answers are kept: of the quiz, and of its questions."""
         return self.id, self.keys
 
+    def given_id(self) -> tuple[str, Span] | None:
+        """The id; `None` where it cannot be read."""
+        return (self.id, self.id_span) if self.id else None
+
     def output_questions(self) -> Iterator[OutputQuestion]:
         """The questions whose answer a script gives."""
         return (question for question in self.questions if isinstance(question, OutputQuestion))
