@@ -51,8 +51,8 @@ def link_targets(course: model.Course) -> LinkTargets:
         for term in model.find_inlines(document, model.Term):
             terms.setdefault(term.id, term.span)
         for block in model.find_blocks(document, model.FeatureBlock):
-            if (given := block.given_id()) is not None:
-                progress_ids.setdefault(*given)
+            if (entry := block.given_id()) is not None:
+                progress_ids.setdefault(*entry)
     return LinkTargets(
         {lesson.id: lesson.document for lesson in course.lessons},
         frozenset(level.id for level in course.levels),
