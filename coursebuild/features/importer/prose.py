@@ -136,7 +136,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
 
 
 _ATTRIBUTES = (
-    r"\{(?:[ ]*(?:[#.][\w:.-]+|[\w:-]+=(?:\"[^\"\n]*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}"
+    r"\{(?:[ ]*(?:#[\w:.-]+|\.[A-Za-z][\w:-]*"
+    r"|[\w:-]+=(?:\"[^\"\n]*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}"
     r"|\{:[^{}\n]*\}"
 )
 _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
@@ -346,8 +347,10 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "attributes":
             line, before = match.string, match.string[: match.start()]
             is_heading, is_whole = line.startswith("#"), whole == line.rstrip()
-            if not (is_heading or is_whole or before.endswith(tuple('`)]*>:"'))):
-                return whole  # an index in a formula
+            is_marked = whole.lstrip().startswith("{:")
+            is_behind = whole[0] == "{" and re.search(r"[`\]*>:\"]$|\]\([^()]*\)$", before)
+            if not (is_heading or is_whole or is_marked or is_behind):
+                return whole  # an index in a formula, a set, an argument
             id = re.search(r"#([\w:.-]+)", whole)
             if id is None or not (":" in id[1] or is_heading):
                 return ""
