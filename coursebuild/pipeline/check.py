@@ -89,8 +89,7 @@ def check(
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
         inventory: list[Diagnostic] = []
         if truth:
-            runs, verdicts = verification.results.runs, verification.results.verdicts
-            inventory = [*unproven(course), *unproven_units(course, runs, verdicts)]
+            inventory = [*_list_unproven(checked_course)]
         report = checked_course.report(diagnostics, inventory)
         if shard is None:
             checked_course.write_records()
@@ -206,6 +205,19 @@ def read_and_verify(
 
 
 # --- from diagnostics to a report
+
+
+def _list_unproven(checked: CheckedCourse) -> Iterator[Diagnostic]:
+    """What nothing gives in the checked documents, and in what the map says of their lessons."""
+    course, results = checked.course, checked.verification.results
+    shown = [
+        (owner.span, document.source.path)
+        for owner, document in course.owned_documents
+        if checked.documents is None or document.source.path in checked.documents
+    ]
+    entries, paths = {span for span, _ in shown}, {path for _, path in shown}
+    found = (*unproven(course), *unproven_units(course, results.runs, results.verdicts))
+    return (d for d in found if d.span in entries or d.span.path in paths)
 
 
 def _used_files(course: Course, documents: Collection[str], results: Results) -> set[str]:

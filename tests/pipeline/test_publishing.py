@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from support.scratch_course import FIRST, GOOD, Folder, Make, block, without_locks
+from support.scratch_course import FIRST, GOOD, SECOND, Folder, Make, block, without_locks
 
 pytestmark = pytest.mark.site
 
@@ -252,6 +252,16 @@ def test_strict_leaves_what_is_silenced_or_only_listed(make: Make) -> None:
     assert result.status == 0
     assert result.out.startswith("warning[number-unproven]: `17.5` is stated")
     assert last_line(result.out) == "1 lesson, 1 script run: 1 warning (1 silenced)"
+
+
+def test_results_that_nothing_gives_are_listed_of_the_lessons_that_are_named(make: Make) -> None:
+    first, second = FIRST + "\nIt weighs 17.5 kg.\n", SECOND + "\nIt takes 3.25 s.\n"
+    folder = make(first, second)
+    folder.replace("content/course.toml", 'title = "Lesson two"', 'title = "Lesson two, in 6.5 s"')
+    stated = {(): ["17.5", "3.25", "6.5"], ("1.1",): ["17.5"], ("1.2",): ["3.25", "6.5"]}
+    for names, numbers in stated.items():
+        out = folder.main("check", "--truth", *names).out
+        assert sorted(re.findall(r"`([\d.]+)` is stated", out)) == numbers
 
 
 def test_a_script_that_lacks_a_package_proves_nothing(make: Make) -> None:
