@@ -44,7 +44,7 @@ const typeset = (() => {
     [/(\\begin\{array\})(?:\[[tcb]\])?\{((?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}/g, (_, begin, columns) => `${begin}{${plainColumns(columns)}}`],
     [/([_^])\s*\\(rm|bf|it|sf|tt|cal)\s*(?=\{)/g, (_, mark, font) => `${mark}\\math${font}`],
     [/([_^])\s*(\\(?:arg|deg|det|dim|exp|gcd|inf|ker|lim|ln|log|max|min|Pr|sup|sin|cos|tan))(?![A-Za-z])/g, (_, mark, name) => `${mark}{${name}}`],
-    [/\\text(?:tt|rm|sf|bf|it)?\{[^{}$\\]*\}/g, (text) => text.replaceAll('_', '\\_')],
+    [/\\(?:mbox|text(?:tt|rm|sf|bf|it)?)\{[^{}$\\]*\}/g, (text) => text.replaceAll('_', '\\_')],
   ]
 
   /** The columns of an array without the spaces, widths and commands of LaTeX's `array` package; `*{3}{c}` is `ccc`. */

@@ -34,7 +34,7 @@ _OTHER = "\ufffc"
 _ESCAPED = {"\\[": "\ue000", "\\{": "\ue001", "\\<": "\ue002", "&lt;": "\ue002"}
 """Stand for brackets that are escaped, and may be closed by one that need not be."""
 _HIDDEN = re.compile(r"\\[!-/:-@\[-`{-~]|&#?\w+;")
-_MARKS = re.compile(r"(`|\*|_|~|#|\[|\]|\{|\}|<|>|\||\$|\^|\\)\1*")
+_MARKS = re.compile(r"(`|\*|_|~|#|\[|\]|\{|\}|<|\||\$|\^|\\)\1*")
 _BRACKETS = (
     re.compile(r"\[([-+\d.,; ]*(?:\[[-+\d.,; ]*\][,; ]*)*)\](?![(\[{])"),  # [[1, 2], [3, 4]]
     re.compile(  # [0, 1), ]0, 1[, but not what lies between the brackets of a(b, [c])
