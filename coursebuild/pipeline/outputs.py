@@ -26,7 +26,11 @@ from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.model.results import Outcome, ScriptRun, TrialLine, Verdict
 from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.bindings import update_outputs
-from coursebuild.core.scripts.bound_places import carried_addresses, document_values
+from coursebuild.core.scripts.bound_places import (
+    carried_addresses,
+    document_values,
+    reworded_addresses,
+)
 from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.edit import adopt_file, block_text, edited_texts
 from coursebuild.core.scripts.extract import Extraction
@@ -97,6 +101,8 @@ class _Updater:
         self.scripts = [e for e in self.extracted_scripts.runnable if e.path in paths]
         """The scripts that have an output or a figure to bring up to date."""
         self.addresses = known_addresses(course.records)
+        self.reworded: set[str] = set()
+        """The lessons with values that are called otherwise in outputs now."""
 
     def update(self, began: float) -> Report:
         runs = run(self.course, self.scripts, self.options)
@@ -163,17 +169,20 @@ class _Updater:
             for verdict in outputs.of_document(document)
             if verdict.recording.script in good_paths and verdict.recording.readable
         ]
+        reworded = reworded_addresses(self.addresses, verdicts, outputs)
+        self.addresses |= reworded
+        self.reworded |= {value.path for value in reworded}
         return update_outputs(verdicts, documents, outputs, self.addresses)
 
     def _outputs(self, course: Course, runs: Sequence[ScriptRun]) -> PrintedOutputs:
         paths = (e.path for e in self.extracted_scripts.extractions)
         return PrintedOutputs(compare_all(course, runs, self.addresses), runs, paths)
 
-    def _chosen_documents(self, course: Course) -> list[Document]:
+    def _chosen_documents(self, course: Course, further: Collection[str] = ()) -> list[Document]:
         return [
             document
             for _, document in course.shown_texts
-            if self.documents is None or document.source.path in self.documents
+            if self.documents is None or document.source.path in {*self.documents, *further}
         ]
 
     def _write(self, edits: Iterable[Edit]) -> tuple[list[str], list[Diagnostic]]:
@@ -207,7 +216,7 @@ class _Updater:
 
     def _write_records(self, new_course: Course, runs: Sequence[ScriptRun]) -> list[str]:
         """Write what the lessons were recorded with, and where values stand, beside them."""
-        root, documents = self.options.root, self._chosen_documents(new_course)
+        root, documents = self.options.root, self._chosen_documents(new_course, self.reworded)
         outputs, read = self._outputs(new_course, runs), functools.partial(read_recorded, root)
         changes = list(record_changes(new_course, documents, outputs, self.addresses, root, read))
         if changes:

@@ -35,6 +35,7 @@ from coursebuild.core.scripts.bound_places import (
     carried_addresses,
     document_bindings,
     document_values,
+    reworded_addresses,
 )
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.diff import diff_rows
@@ -131,7 +132,7 @@ def accept(session: Session, path: str, ids: str) -> str:
 
 
 def changes_of(
-    session: Session, edits: Iterable[Edit], drawings: Iterable[FileChange] = ()
+    session: Session, edits: Collection[Edit], drawings: Iterable[FileChange] = ()
 ) -> list[FileChange]:
     """The changes of files by what is accepted, and of those that say what it was recorded with."""
     changes = [
@@ -140,18 +141,40 @@ def changes_of(
     ]
     changes += drawings
     with session.condition:
-        return [*changes, *_change_records(session, changes)]
+        reworded = _reword_addresses(session, edits)
+        return [*changes, *_change_records(session, changes, reworded)]
 
 
-def _change_records(session: Session, changes: Sequence[FileChange]) -> Iterator[FileChange]:
-    """Change the records of lessons in which these changes record something."""
+def _reword_addresses(session: Session, edits: Iterable[Edit]) -> set[str]:
+    """The lessons with addresses that the outputs which these edits record call otherwise."""
+    library, addresses = session.library, session.runs.addresses
+    if library is None:
+        return set()
+    results = library.results
+    edited = {(edit.span.path, edit.span.start) for edit in edits}
+    recorded = [
+        verdict
+        for verdict in results.verdicts
+        for span in [verdict.recording.span]
+        if any(path == span.path and span.start <= at < span.end for path, at in edited)
+    ]
+    outputs = PrintedOutputs(results.verdicts, results.runs, library.scripts)
+    reworded = reworded_addresses(addresses, recorded, outputs)
+    addresses |= reworded
+    return {value.path for value in reworded}
+
+
+def _change_records(
+    session: Session, changes: Sequence[FileChange], reworded: Collection[str]
+) -> Iterator[FileChange]:
+    """Change the records of lessons in which these changes record something, and of `reworded`."""
     library, addresses = session.library, session.runs.addresses
     new_files = {change.path: change.new for change in changes}
     for owner, document in () if library is None else library.course.owned_documents:
         figures = {figure.path for figure in recorded_figures(document)}
         path = document.source.path
         new_text = new_files.get(path)
-        if library is None or not new_files.keys() & {path, *figures}:
+        if library is None or not ({*new_files, *reworded} & {path, *figures}):
             continue
         new_document = document
         if new_text is not None:

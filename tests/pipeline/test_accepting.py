@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 
 import pytest
@@ -189,6 +190,32 @@ def test_one_click_accepts_an_output_and_all_numbers_at_their_addresses(make: Ma
         assert folder.text(folder.lesson(2)) == expected
     assert folder.main("undo").status == 0
     assert folder.text(folder.lesson(2)) == again
+
+
+def test_other_words_around_the_same_numbers_keep_every_address(make: Make) -> None:
+    """Accepted in one lesson, of whose script another shows a number; then updated."""
+    code = "print('period', 2.95, 's')\nprint('half', 2.95, 's')"
+    prose = '`2.950 s`{out="period"} and `2.950`{out="half"}\n'
+    again = '## Again\n\n`2.95`{out=examples/x.py "period"}, `2.9500`{out=examples/x.py "half"}\n'
+    plain = re.sub(r' ?"\w+"|="\w+"', "", again)
+    text = "## Swing\n\n" + block("x.py", code, "period 2.95 s\nhalf 2.95 s")
+    folder = make(text + prose, again)
+    assert folder.main("check").status == 0
+    folder.write(folder.lesson(2), plain)  # the words are known from now on by the record
+    folder.replace(folder.lesson(), prose, re.sub('="[a-z]+"', "", prose))
+    folder.replace(folder.lesson(), "'period'", "'whole'")
+    with serve_preview(folder) as preview, preview.events() as events:
+        events.until(lambda page: any(o.get("offer") for o in page.news["outputs"]))
+        assert preview.accept_offer(events.news["outputs"][0]["offer"]) == (200, {"message": ""})
+        events.wait_until_settled()
+    assert folder.main("check").status == 0
+    folder.replace(folder.lesson(), "'half'", "'every other'")
+    assert folder.main("update", "1.1").status == 0
+    assert folder.main("check").status == 0
+    folder.replace(folder.lesson(), "'whole', 2.95", "'all', 2.96")  # no longer the same numbers
+    result = folder.main("update")
+    assert result.status == 1
+    assert "the line that showed `2.950 s` is no longer printed" in result.out
 
 
 def test_a_number_that_is_printed_twice_offers_its_words(make: Make) -> None:

@@ -175,12 +175,15 @@ def _wrong_unit(
 
 
 def unprinted_unit(bound: BoundNumber) -> str:
-    """The unit of a bound number that is printed with none; empty if there is no such."""
+    """The unit of a bound number that is printed with none; empty if there is no such.
+
+    A unit that its label or heading names, whatever else they name, is taken for printed.
+    """
     is_known = bound.path in bound.outputs.scripts and bound.text.numbers
     shown_units = bound.text.units(bound.following) if is_known else []
-    printed_units = [place.units for place in bound.places()] if any(shown_units) else []
+    places = [*bound.places()] if any(shown_units) else []
     for at, unit in enumerate(shown_units):
-        if unit and printed_units and not any(units[at] for units in printed_units):
+        if unit and places and not any(place.units[at] or place.names(unit) for place in places):
             return unit.text
     return ""
 

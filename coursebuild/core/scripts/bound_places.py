@@ -78,6 +78,38 @@ def carried_addresses(
     return {new: addresses[old] for old, new in pairs if old in addresses}
 
 
+def reworded_addresses(
+    addresses: Addresses, verdicts: Iterable[Verdict], outputs: PrintedOutputs
+) -> Addresses:
+    """The addresses in recorded outputs of which this run prints other words, and no other number.
+
+    Each number then stands in its line as before, so that what it is called now is its address.
+    """
+    texts: dict[str, list[tuple[PrintedText, PrintedText]]] = {}
+    for verdict in verdicts:
+        script, part = verdict.recording.script or "", verdict.recording.part
+        if isinstance(verdict.recording.body, model.Table) or verdict.status != "drift":
+            continue
+        before = outputs.text(verdict)
+        now = outputs.text_of_run(script, verdict.comparison.own_filters, part)
+        if before.numbers == now.numbers:
+            texts.setdefault(script, []).append((before, now))
+    reworded = {
+        value: tuple(_reword(address, texts[value.script]) for address in known)
+        for value, known in addresses.items()
+        if value.script in texts
+    }
+    return {value: now for value, now in reworded.items() if now != addresses[value]}
+
+
+def _reword(address: Address, texts: Iterable[tuple[PrintedText, PrintedText]]) -> Address:
+    for before, now in texts:
+        if (place := before.find(address, 1)) is not None:
+            numbers = now.lines[place.at].numbers[place.first : place.first + 1]
+            return PrintedPlace(now, place.at, numbers).address or address
+    return address
+
+
 _MARKUP = re.compile(r"\{[^{}]*\}|[`*_$]")
 _CONTEXT = 5
 """The words before a binding by which it is known again."""

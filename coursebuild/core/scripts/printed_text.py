@@ -28,7 +28,9 @@ from coursebuild.core.scripts.table_cells import RowCell, table_rows
 from coursebuild.core.text.numbers import Number, has_groups, point_decimals, scan
 from coursebuild.core.text.quantities import (
     UnitText,
+    is_same_unit,
     numbers_of_quantities,
+    read_unit,
     title_of_column,
     unit_behind,
     unit_of_printed,
@@ -40,6 +42,8 @@ _Words: TypeAlias = tuple[tuple[str, bool], ...]
 """Words and numbers, each with whether it is a number."""
 
 
+_IN_BRACKETS = re.compile(r"[(\[]([^()\[\]]+)[)\]]")
+_REST_OF_ROW = re.compile(r"\A(?:[-+]?\d[\d.e+-]*(?=[\s)\]])|[\s)\]])*")
 _FORBIDDEN = re.compile(r'["{}]')
 """What the words of `{out="words"}` cannot hold."""
 
@@ -101,6 +105,16 @@ class PrintedPlace(Struct, frozen=True):
     def units(self) -> list[UnitText]:
         """The units that are printed with them."""
         return [self.output.unit(self.at, number) for number in self.numbers]
+
+    def names(self, unit: UnitText) -> bool:
+        """Whether a unit stands behind their row, right before them, in brackets, or above."""
+        heading = self.output.headings(self.at)
+        bracketed = _IN_BRACKETS.findall(f"{heading} {self.before}")
+        parts = [part for text in bracketed for part in (text, *text.split(","))]
+        last = self.before.split()[-1:]
+        units = [read_unit(part.strip(" :,()[]")) for part in (*parts, *heading.split(), *last)]
+        behind = unit_behind(_REST_OF_ROW.sub("", self.after, count=1))
+        return any(is_same_unit(unit, other) for other in (*units, behind))
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -173,9 +187,19 @@ class PrintedText:
     def _words(self) -> list[str]:
         return [masked(line.text) for line in self.lines]
 
+    @property
+    def numbers(self) -> tuple[tuple[str, ...], ...]:
+        """The numbers of each line, as they are printed."""
+        return tuple(tuple(number.text for number in line.numbers) for line in self.lines)
+
     def heading(self, at: int) -> str:
         """The heading of a line, by its index."""
         return self._words[self._headings[at]] if self._headings[at] >= 0 else ""
+
+    def headings(self, at: int) -> str:
+        """The heading of a line behind its own: what stands above a table, and its titles."""
+        own = self._headings[at]
+        return f"{self.heading(own)} {self.heading(at)}" if own >= 0 else ""
 
     def title(self, at: int, number: Number) -> str:
         """The title of the column that a number stands in; empty where there is none."""

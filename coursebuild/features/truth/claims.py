@@ -419,12 +419,14 @@ def _is_claim(side: FormulaSide, tex: str) -> bool:
     if not side.is_numeric and "." not in tex[side.start : side.end]:
         return False
     if not isinstance(side.expression, Expression):
-        return side.is_numeric or _DECIMAL.search(tex, side.start, side.end) is not None
+        part = tex[side.start : side.end]
+        wholes = map(int, re.findall("[0-9]+", part)) if side.is_numeric else ()
+        return _DECIMAL.search(part) is not None or any(whole > _COUNTS for whole in wholes)
     parts = tuple(side.expression.walk())
     numbers = [part.text for part in parts if part.kind == "number"]
     if any("." in number for number in numbers):
         return True
-    units = any(part.kind == "unit" for part in parts)
+    units = any(part.kind == "unit" and find_unit(part.text) is not None for part in parts)
     powers = any(part.kind == "^" and part.parts[0].text == "10" for part in parts)
     large = any(int(number) > _COUNTS for number in numbers)
     return bool(side.is_numeric and numbers and (units or powers or large))
