@@ -215,6 +215,8 @@ HOVERS = [
 def test_hovers(editor: Editor) -> None:
     for path in (FIRST_LESSON, SECOND_LESSON, MAP):
         editor.until(path)
+    # Models are compiled beside.
+    editor.wait_for(lambda: "here `(7,)`" in editor.hover_text(FIRST_LESSON, "data.qp|os[2]:"))
     texts = [(path, needle, editor.hover_text(path, needle)) for path, needle, _ in HOVERS]
     assert [
         hover for hover, (*_, part) in zip(texts, HOVERS, strict=True) if part not in hover[-1]
