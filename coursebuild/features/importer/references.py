@@ -105,7 +105,9 @@ def _edit_links(
             text = texts.get(start or link, text)
             if target_anchor not in text.anchors:
                 if reference := _REFERENCE.fullmatch(inline.span.text):
-                    yield Edit(inline.span, reference[1] or title_of_file(anchor))
+                    yield Edit(
+                        inline.span, reference[1] or title_of_file(anchor.rpartition(":")[2])
+                    )
                 continue
             yield Edit(span, address)
         if inline.span.text.startswith("[]("):
