@@ -56,7 +56,7 @@ class Account:
         """Note that something is left; the same twice is one."""
         self._left[leftover] = None
 
-    def convert(self, kind: str, how: str, old: str, convert: Callable[[], str]) -> str:
+    def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
         """Return what a part of a text becomes, and note what that is: kept, changed or left.
 
         It is left where a leftover of this kind is noted meanwhile.
@@ -68,7 +68,7 @@ class Account:
         if new.strip() == old.strip():
             self.taken[kind] += 1
         else:
-            self.changed[kind, how] += 1
+            self.changed[kind, change] += 1
         return new
 
     def summary(self) -> Iterator[str]:
@@ -78,8 +78,8 @@ class Account:
         yield f"{counts}: IMPORT.md lists them by kind"
         for leftover in left[:_MOST_LINES]:
             yield f"left: {leftover.position}: {leftover.message}"
-        if more := left[_MOST_LINES:]:
-            yield f"left: {len(more)} more, which are in IMPORT.md"
+        if rest := left[_MOST_LINES:]:
+            yield f"left: {len(rest)} more, which are in IMPORT.md"
 
     def text(self, name: str) -> str:
         """The text of IMPORT.md for a course that was called so."""
@@ -102,8 +102,8 @@ class Account:
         if self.changed:
             lines += ["", "## Changed", ""]
             lines += (
-                f"- {kind}: {how} ({plural(count, 'time')})"
-                for (kind, how), count in sorted(self.changed.items())
+                f"- {kind}: {change} ({plural(count, 'time')})"
+                for (kind, change), count in sorted(self.changed.items())
             )
         if self._left:
             lines += ["", "## Left", ""]
@@ -113,8 +113,8 @@ class Account:
         for message, positions in places.items():
             lines.append(f"- {message}")
             lines += (f"  - {position}" for position in positions[:_MOST_PLACES])
-            if more := positions[_MOST_PLACES:]:
-                lines.append(f"  - {len(more)} more")
+            if rest := positions[_MOST_PLACES:]:
+                lines.append(f"  - {len(rest)} more")
         return "\n".join(lines) + "\n"
 
 

@@ -102,8 +102,8 @@ def _convert(segment: Segment, context: LessonContext) -> str:
 _TAB = "a title in bold, and what it holds: pages show one tab below the other"
 
 
-def _note_change(context: LessonContext, kind: str, how: str) -> None:
-    context.files.account.changed[kind, how] += 1
+def _note_change(context: LessonContext, kind: str, change: str) -> None:
+    context.files.account.changed[kind, change] += 1
 
 
 def _convert_division(head: str, text: str, context: LessonContext) -> str:

@@ -46,12 +46,12 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     word = " part" if context.parts else ""
     context.parts.append(code)
     account.changed["cell", "a part of the lesson's script"] += 1
-    written = [fence(f"python file={context.script_path}{word}{how_shown(cell)}", code)]
+    blocks = [fence(f"python file={context.script_path}{word}{how_shown(cell)}", code)]
     if output := recorded_output(cell, code):
-        written.append(fence("output", output))
+        blocks.append(fence("output", output))
         account.taken["output that is recorded"] += 1
         context.notebook_outputs.append((context.script_path, output))
-    return "\n\n".join((*written, figure) if figure else written)
+    return "\n\n".join((*blocks, figure) if figure else blocks)
 
 
 _PYPLOT = re.compile(
@@ -74,8 +74,8 @@ def _draws(cell: Segment, code: str) -> bool:
 def _save_figure(cell: Segment, code: str, context: LessonContext) -> tuple[str, str]:
     """Return code that saves what it draws, and the paragraph that shows it."""
     options = options_of(cell)
-    drawn = _DRAWN_TITLE.search(code)
-    caption = options.get("fig-cap") or options.get("caption") or (drawn[2] if drawn else "")
+    title = _DRAWN_TITLE.search(code)
+    caption = options.get("fig-cap") or options.get("caption") or (title[2] if title else "")
     caption = rewrite_prose(caption.strip("\"' ") or context.title, context)
     alt = options.get("fig-alt", options.get("alt", "")).strip("\"' ") or caption
     alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)

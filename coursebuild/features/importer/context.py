@@ -74,9 +74,9 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         """Note that something has no counterpart, why, and what to do."""
         self.files.leave(self.path, message, kind, self.place)
 
-    def convert(self, kind: str, how: str, old: str, convert: Callable[[], str]) -> str:
+    def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
         """Return what a part of the text becomes, which the account notes."""
-        return self.files.account.convert(kind, how, old, convert)
+        return self.files.account.convert(kind, change, old, convert)
 
     def resolve_link(self, address: str) -> str:
         """Return the new address of a link; empty where nothing in the course has it."""
@@ -162,6 +162,12 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         path = f"content/files/{name}"
         self.copies[path] = data
         return posixpath.relpath(path, self.folder).replace(" ", "%20")
+
+
+def script_path_of(document: str) -> str:
+    """Return the path of the script that the cells of a lesson or page become, by its own path."""
+    words = re.findall("[a-z0-9]+", posixpath.basename(stem_of(document)).lower())
+    return f"examples/{'' if words and words[0].isalpha() else 'l'}{'_'.join(words)}.py"
 
 
 def formula_anchor(label: str) -> str:

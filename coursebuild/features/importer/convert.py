@@ -22,7 +22,7 @@ from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.account import Account
 from coursebuild.features.importer.blocks import convert_segment
 from coursebuild.features.importer.contents import read_contents
-from coursebuild.features.importer.context import LessonContext, to_anchor
+from coursebuild.features.importer.context import LessonContext, script_path_of, to_anchor
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.jsx import is_mdx
 from coursebuild.features.importer.prose import find_anchors
@@ -124,14 +124,14 @@ def _works(files: SourceFiles) -> Iterator[tuple[str, str]]:
 
 def _cited_works(files: SourceFiles, cited: Set[str]) -> str:
     """Return the BibTeX of the sources that texts cite."""
-    works, chosen = [*_works(files)], dict[str, str]()
+    works, selection = [*_works(files)], dict[str, str]()
     for key, text in works:
         if key in cited or not key:
-            chosen.setdefault(key or text, text)
+            selection.setdefault(key or text, text)
     uncited = {key for key, _ in works if key} - cited
     files.account.changed["source", "left out: no text cites it"] += len(uncited)
     files.account.taken["source"] += len(cited)
-    return "".join(f"{text}\n\n" for text in chosen.values())
+    return "".join(f"{text}\n\n" for text in selection.values())
 
 
 def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, store: Store) -> None:
@@ -226,15 +226,18 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     context = replace(course_context, path=text.file, folder=folder, pictures=text.pictures)
     prose = (segment.text for segment in text.segments if segment.kind == "prose")
     context = replace(context, is_mdx=text.file.endswith(".mdx") or any(map(is_mdx, prose)))
-    words = re.findall("[a-z0-9]+", f"{text.id}-{text.slug}".lower())
-    script_path = f"examples/{'' if words and words[0].isalpha() else 'l'}{'_'.join(words)}.py"
     context = replace(
-        context, script_path=script_path, title=text.title, parts=[], figures=[], notes=[]
+        context,
+        script_path=script_path_of(text.path),
+        title=text.title,
+        parts=[],
+        figures=[],
+        notes=[],
     )
     parts = [convert_segment(segment, context) for segment in text.segments]
     new = "\n\n".join(part.strip("\n") for part in parts if part.strip()) + "\n"
     if context.figures:  # the first part has the keys of the script
-        head = f"python file={script_path}"
+        head = f"python file={context.script_path}"
         new = new.replace(head, f"{head} figure={','.join(context.figures)}", 1)
     notes = (f"[^note-{number}]: {note}\n" for number, note in enumerate(context.notes, 1))
     return "\n".join((new, *notes)) if context.notes else new

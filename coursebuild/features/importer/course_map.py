@@ -256,9 +256,9 @@ def _read_file(
         source = files.read_text(text.file)
         if not text.file.endswith(".ipynb"):
             source = expand_includes(source, text.file, files)
-        if has_hidden_lines and (shown := without_hidden_lines(source)) != source:
+        if has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
             files.account.changed["hidden lines of Rust", "dropped: readers did not see them"] += 1
-            source = shown
+            source = visible_text
         read = read_segments(source, text.file)
     except RecursionError:
         raise UsageError(f"{text.file} is nested too deeply") from None

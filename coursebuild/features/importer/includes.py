@@ -45,13 +45,13 @@ def expand_includes(text: str, path: str, files: SourceFiles, depth: int = 0) ->
             message = f"`{name}`, which is not in the folder: what it holds is missing"
             files.leave(path, message, "file that is included", line)
             return ""
-        found = _part_of(files.read_text(target), part, by_lines=True)
-        if found is None:
+        part_text = _part_of(files.read_text(target), part, by_lines=True)
+        if part_text is None:
             message = f"`{name}`: the file has no such part"
             files.leave(path, message, "file that is included", line)
             return ""
         files.account.changed["file that is included", "its lines stand in the text"] += 1
-        included = expand_includes(found, target, files, depth + 1).strip("\n")
+        included = expand_includes(part_text, target, files, depth + 1).strip("\n")
         if mark["command"] == "playground":
             return f"```rust\n{included}\n```"
         return textwrap.indent(included, mark["indent"] or "")
@@ -63,8 +63,8 @@ def _find(name: str, path: str, files: SourceFiles) -> str:
     """Return the path of a file that a text names: beside it, or from a folder that holds it."""
     folder = posixpath.dirname(path)
     while True:
-        if found := files.find(posixpath.normpath(posixpath.join(folder, name.lstrip("/")))):
-            return found
+        if place := files.find(posixpath.normpath(posixpath.join(folder, name.lstrip("/")))):
+            return place
         if not folder:
             return ""
         folder = posixpath.dirname(folder)
@@ -95,8 +95,8 @@ def lines_of(text: str, options: Mapping[str, str]) -> str:
     """Return the lines of a text that the options of a directive of Sphinx choose."""
     lines = text.splitlines()
     for option in ("start-after", "start-at", "end-before", "end-at"):
-        wanted = options.get(option)
-        at = next((n for n, line in enumerate(lines) if wanted and wanted in line), None)
+        words = options.get(option)
+        at = next((n for n, line in enumerate(lines) if words and words in line), None)
         if at is None:
             continue
         match option:
@@ -108,9 +108,9 @@ def lines_of(text: str, options: Mapping[str, str]) -> str:
                 lines = lines[:at]
             case _:
                 lines = lines[: at + 1]
-    if chosen := options.get("lines", ""):
+    if selection := options.get("lines", ""):
         numbers = list[int]()
-        for part in chosen.split(","):
+        for part in selection.split(","):
             if bounds := re.fullmatch(r"\s*(\d*)\s*(-?)\s*(\d*)\s*", part):
                 first = int(bounds[1] or 1)
                 last = int(bounds[3]) if bounds[3] else len(lines) if bounds[2] else first

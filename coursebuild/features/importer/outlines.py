@@ -117,9 +117,9 @@ def _group_by_depth(entries: Iterable[_Entry]) -> Iterator[ImportedText | Import
         if entry.depth == 0 or not groups:
             groups.append([])
         groups[-1].append(entry.text)
-    for first, *others in groups:
-        if others:
-            yield ImportedLevel(title=first.title, lessons=(first, *others))
+    for first, *sections in groups:
+        if sections:
+            yield ImportedLevel(title=first.title, lessons=(first, *sections))
         else:
             yield first
 
@@ -183,7 +183,7 @@ def _read_sidebar(
             case "category":
                 link = items.get("link")
                 first = link.get("id") if isinstance(link, Mapping) else None
-                inside = [first, *_listed(items.get("items"))] if first else items.get("items")
+                inside = [first, *_as_list(items.get("items"))] if first else items.get("items")
                 yield from _level(str(items.get("label") or ""), _read_sidebar(inside, name, files))
             case None:
                 for label, inside in items.items():
@@ -193,7 +193,7 @@ def _read_sidebar(
                 files.leave(name, f"`{words}` of the map, which is no text", "entry of the map")
 
 
-def _listed(value: object) -> list[object]:
+def _as_list(value: object) -> list[object]:
     return value if isinstance(value, list) else []
 
 

@@ -194,10 +194,10 @@ def _write_figure(match: re.Match[str]) -> str:
 def _rewrite_line(line: str, context: LessonContext) -> str:
     def rewrite(match: re.Match[str]) -> str:
         group = match.lastgroup or ""
-        kind, how = _KINDS[group]
+        kind, change = _KINDS[group]
         if group == "role":
             kind = f"role `{{{match['name']}}}`"
-        return context.convert(kind, how, match[0], lambda: _rewrite_match(match, context))
+        return context.convert(kind, change, match[0], lambda: _rewrite_match(match, context))
 
     return _LINE.sub(rewrite, line)
 

@@ -248,7 +248,7 @@ def texts_of(course: ConvertedCourse) -> str:
 @pytest.mark.parametrize("format", FORMATS)
 def test_every_construct_is_taken_changed_or_left(tmp_path: Path, format: str) -> None:
     constructs, name = FORMATS[format]
-    wrong = []
+    failures = []
     for number, (kind, column, text) in enumerate(constructs):
         folder = name.rpartition("/")[0]
         files = {
@@ -258,14 +258,14 @@ def test_every_construct_is_taken_changed_or_left(tmp_path: Path, format: str) -
             **MORE[format],
         }
         course = import_files(tmp_path / str(number), files)
-        counted = counts(course)
-        if not counted.get(kind, {}).get(column):
-            wrong.append(f"{text!r} is not {column} as {kind}, but {counted}")
+        table = counts(course)
+        if not table.get(kind, {}).get(column):
+            failures.append(f"{text!r} is not {column} as {kind}, but {table}")
         account = account_of(course).partition("## Left")[2]
         words = set(re.findall(r"\bw[a-e]\d+", text))
-        kept = set(re.findall(r"w[a-e]\d+", texts_of(course) + account))
-        wrong += [f"{text!r}: {word} is lost" for word in sorted(words - kept)]
-    assert not wrong, "\n".join(wrong)
+        words_there = set(re.findall(r"w[a-e]\d+", texts_of(course) + account))
+        failures += [f"{text!r}: {word} is lost" for word in sorted(words - words_there)]
+    assert not failures, "\n".join(failures)
 
 
 def test_every_part_of_a_notebook_is_taken_changed_or_left(tmp_path: Path) -> None:
@@ -300,7 +300,7 @@ def test_every_part_of_a_notebook_is_taken_changed_or_left(tmp_path: Path) -> No
     }
     files = {"one.ipynb": json.dumps(notebook), "data/wn4.csv": "1\n", "wn11.csv": "1\n"}
     course = import_files(tmp_path, files)
-    counted = counts(course)
+    table = counts(course)
     expected = {
         "cell": (0, 5, 2),
         "figure of a cell": (0, 1, 0),
@@ -313,7 +313,7 @@ def test_every_part_of_a_notebook_is_taken_changed_or_left(tmp_path: Path) -> No
         "statement of a cell": (0, 0, 2),
         "text": (0, 1, 0),
     }
-    assert {kind: tuple(counted.get(kind, {}).values()) for kind in expected} == expected
+    assert {kind: tuple(table.get(kind, {}).values()) for kind in expected} == expected
     lesson = course.files["content/lessons/1.1-one.md"].decode()
     assert 'open("content/files/data/wn4.csv")' in lesson
     left = account_of(course).partition("## Left")[2]

@@ -20,16 +20,19 @@ from coursebuild.api import (
     print_report,
 )
 from coursebuild.core.files.write import undo_changes
+from coursebuild.core.model.results import TrialLine
+from coursebuild.features.importer.commands.proof import keep_notebook_outputs, prove
 from coursebuild.features.importer.convert import convert, write_course
-from coursebuild.features.importer.proof import keep_notebook_outputs, prove
 from coursebuild.features.importer.source_files import SourceFiles
 from coursebuild.pipeline.arguments import add_sandbox, available_cores
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Progress, check_path, open_store
+from coursebuild.pipeline.outputs import unasked_lines
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scripts import extract_scripts
 from coursebuild.pipeline.verify import compile_models
+from coursebuild.report import ScriptLine
 from coursebuild.report.values import plural
 
 EXAMPLES = """\
@@ -110,12 +113,16 @@ def _examine(options: Options, remarks: tuple[str, ...]) -> Report:
     """Report what is wrong in a course, as far as that is seen without running its code."""
     began = time.monotonic()
     with Reader(options) as reader:
-        loaded = load(options.root, reader, code="refuse")
-    course, diagnostics = loaded.value, [*loaded.diagnostics]
+        parsed_course = load(options.root, reader, code="refuse")
+    scripts: tuple[ScriptLine, ...] = ()
+    labs: tuple[TrialLine, ...] = ()
+    course, diagnostics = parsed_course.value, [*parsed_course.diagnostics]
     if course is not None:
         extracted = extract_scripts(course, options)
         diagnostics += [*extracted.diagnostics, *compile_models(course, options)[1]]
-        if scripts := extracted.extractions:
+        reason = "import runs nothing before --prove"
+        scripts, labs = unasked_lines(course, extracted.extractions, None, reason)
+        if scripts:
             proof = f"run `coursebuild -C {options.root.name} import --prove`"
             remarks += (f"{plural(len(scripts), 'script')} not run: {proof}",)
-    return judge(course, diagnostics, began, remarks=remarks)
+    return judge(course, diagnostics, began, scripts=scripts, labs=labs, remarks=remarks)

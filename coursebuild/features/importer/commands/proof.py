@@ -9,12 +9,10 @@ gets keys: `requires` for a module that it misses, `timeout` where it needs more
 
 from __future__ import annotations
 
-import ast
 import math
 import posixpath
-import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
 from textwrap import shorten
 
 from msgspec.structs import replace
@@ -31,13 +29,14 @@ from coursebuild.api import (
     Store,
 )
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Script, ScriptPart
+from coursebuild.core.model import Script
 from coursebuild.core.model.results import Change, EffectKind, Sign
 from coursebuild.core.pages.marks import fence
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.values import fingerprint
+from coursebuild.features.importer.chain import Chain, missing_module
 from coursebuild.features.importer.convert import change_tried_lessons
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.recordings import read_recorded, write_figures
@@ -51,9 +50,8 @@ _LONG_TIMEOUT = 900.0
 """Seconds allowed in the second run of a script that exceeded the usual time."""
 _TIME_FACTOR = 3.0
 """A script's new time limit, as a multiple of the time it took here."""
-_ROUNDS = 2
-"""How often cells are taken out of a script; then all from the one on that fails."""
-_MISSING_MODULE = re.compile(r"^ModuleNotFoundError: No module named '([\w.]+)'", re.MULTILINE)
+_ROUNDS, _PATIENCE = 8, 5.0
+"""How often cells are taken out of a script, and after how many seconds of a run just once."""
 _HEADING = "\n## What running showed\n\n"
 
 
@@ -72,8 +70,11 @@ def prove(options: Options) -> tuple[str, ...]:
         edits: dict[Source, list[Edit]] = {}
         for extraction, script_run in runs:
             if script_run.outcome is Outcome.FAILED and number < _ROUNDS:
-                chain = _Chain(extraction, script_run, course)
-                changes = [*chain.edits(is_prefix=number == _ROUNDS - 1)]
+                is_slow = number > 0 and script_run.seconds > _PATIENCE
+                is_last = is_slow or number == _ROUNDS - 1
+                recordings = recorded_outputs(course)
+                chain = Chain(extraction.script, script_run, recordings)
+                changes = [*chain.edits(is_prefix=is_last)]
                 if changes:
                     edits.setdefault(extraction.script.span.source, []).extend(changes)
                     remarks += chain.remarks
@@ -93,8 +94,8 @@ def prove(options: Options) -> tuple[str, ...]:
         if script_run.outcome is Outcome.OK:
             changes += _record_outputs(extraction.script, script_run, course, options, remarks)
     _write(options, edits)
-    drawn, _ = write_figures(course, None, [run for _, run in runs], options, dry_run=False)
-    remarks += drawn
+    figures, _ = write_figures(course, None, [run for _, run in runs], options, dry_run=False)
+    remarks += figures
     _write_remarks(options, remarks)
     return tuple(remarks)
 
@@ -145,10 +146,9 @@ def _run(
 
 def _missing_keys(script: Script, script_run: ScriptRun) -> Iterator[str]:
     """Yield the keys that a script's fence needs after this run, as `key=value`."""
-    if script_run.outcome is Outcome.FAILED and not script.requires:
-        missing = _MISSING_MODULE.search(script_run.stderr)
-        if missing is not None:
-            yield f"requires={missing[1]}"
+    module = missing_module(script_run) if script_run.outcome is Outcome.FAILED else ""
+    if module and not script.requires:
+        yield f"requires={module}"
     if script_run.outcome is Outcome.TIMEOUT:
         yield "norun"
     limit = script_run.seconds * _TIME_FACTOR
@@ -217,147 +217,3 @@ def _describe_changes(changes: Sequence[Change]) -> str:
         "the recorded output does not hold here and is replaced: "
         f"{recorded} was recorded, {printed} is printed{rest}"
     )
-
-
-# --- cells that cannot run
-
-
-class _Chain:
-    """The cells of a script that failed, as parts of it."""
-
-    def __init__(self, extraction: Extraction, script_run: ScriptRun, course: Course) -> None:
-        self.extraction, self.course = extraction, course
-        self.script = extraction.script
-        self.parts: tuple[Script | ScriptPart, ...] = self.script.parts or (self.script,)
-        self.codes = [part.code.text for part in self.parts]
-        self.remarks: list[str] = []
-        name = re.escape(self.script.path)
-        lines = re.findall(rf'File "[^"\n]*{name}", line (\d+)', script_run.stderr)
-        starts = self.script.part_lines if self.script.parts else ()
-        self.failing = sum(start <= int(lines[0]) for start in starts) if lines else None
-        self.reason = (script_run.stderr.strip().splitlines() or ["it failed"])[-1]
-        missing = _MISSING_MODULE.search(script_run.stderr)
-        self.module = missing[1] if missing is not None else ""
-
-    def edits(self, *, is_prefix: bool) -> Iterator[Edit]:
-        """Yield the edits that show, and no longer run, what cannot.
-
-        `is_prefix`: all from the cell on that failed.
-        """
-        if self.failing is None or not self.script.parts or self.script.requires:
-            return
-        imports, names = self._without_module()
-        reasons: dict[int, str] = {}
-        if is_prefix:
-            reasons = dict.fromkeys(range(self.failing + 1, len(self.parts)), "a cell above fails")
-            reasons[self.failing] = self.reason
-        else:
-            if not imports:
-                reasons[self.failing] = self.reason
-                names = _bound(self.codes[self.failing])
-            for number in range(0 if imports else self.failing + 1, len(self.parts)):
-                code = imports.get(number, self.codes[number])
-                if needed := _used(code) & names:
-                    words = " and ".join(f"`{name}`" for name in sorted(needed))
-                    reasons[number] = f"{self.reason}: it needs {words}"
-                    names |= _bound(code)
-                else:
-                    names -= _bound(code)
-        if len(reasons) == len(self.parts):
-            return  # nothing would be left of it: a key says why
-        yield from self._edits(reasons, imports)
-        count = plural(len(reasons), "cell") if reasons else "an import"
-        self.remarks.append(f"{self.script.path}: {count} shown, not run: {self.reason}")
-
-    def _without_module(self) -> tuple[dict[int, str], Set[str]]:
-        """Return the cells that import a missing module without these imports, and their names."""
-        cells: dict[int, str] = {}
-        names = set[str]()
-        for number, code in enumerate(self.codes) if self.module else ():
-            lines = code.split("\n")
-            for statement in ast.parse(code).body:
-                match statement:
-                    case ast.Import():
-                        modules = [alias.name for alias in statement.names]
-                    case ast.ImportFrom(module=str(module)):
-                        modules = [module]
-                    case _:
-                        continue
-                if any(f"{name}.".startswith(f"{self.module}.") for name in modules):
-                    names |= {a.asname or a.name.split(".")[0] for a in statement.names}
-                    first, last = statement.lineno - 1, statement.end_lineno or statement.lineno
-                    lines[first:last] = [""] * (last - first)
-            if (new := "\n".join(lines)) != code:
-                cells[number] = re.sub(r"\n{3,}", "\n\n", new).strip("\n")
-        return cells, names
-
-    def _edits(self, reasons: Mapping[int, str], imports: Mapping[int, str]) -> Iterator[Edit]:
-        source, figures = self.script.span.source, [f.name for f in self.script.figures]
-        gone = [
-            name
-            for number in reasons
-            for name in figures
-            if f'plt.savefig("{name}")' in self.codes[number]
-        ]
-        shown = [number for number in reasons if number not in imports or reasons[number]]
-        first = next(n for n in range(len(self.parts)) if n not in reasons)
-        for number, part in enumerate(self.parts):
-            code = self.codes[number]
-            head = part.span.first_line().text.lstrip("`~ ")
-            if number == first:  # it has the keys of the script
-                own = re.search(r"\b(?:open|folded|hidden)\b", head)
-                head = self.script.span.first_line().text.lstrip("`~ ")
-                head = re.sub(r"\s+(?:open|folded|hidden)\b", "", head)
-                kept = ",".join(name for name in figures if name not in gone)
-                head = re.sub(r"\s+figure=\S+", f" figure={kept}" if kept else "", head)
-                head = f"{head} {own[0]}" if own else head
-            if number in shown:
-                for name in gone:
-                    lines = f'\nplt.savefig("{name}")\nplt.close("all")'
-                    code = f"\n{code}".replace(lines, "").strip("\n")
-                why = f"*Not run here: {reasons[number].replace('*', chr(92) + '*')}.*"
-                new = f"{fence('python', code)}\n\n{why}" if code else why
-            elif number in imports:
-                taken = "\n".join(line for line in code.split("\n") if line not in imports[number])
-                why = f"*Not run here: {self.reason}.*"
-                new = f"{fence('python', taken)}\n\n{why}"
-                if imports[number]:
-                    new += f"\n\n{fence(head, imports[number])}"
-            elif number == first:
-                new = fence(head, code)
-            else:
-                continue
-            indented = textwrap.indent(new, part.prefix, lambda line: True)
-            yield Edit(part.span, indented.removeprefix(part.prefix))
-        for recording in recorded_outputs(self.course):
-            if recording.script == self.script.path and recording.part in reasons:
-                line = recording.span.first_line()
-                if "output" in line.text:
-                    yield Edit(line, line.text.replace("output", "text", 1))
-        for name in gone:
-            pattern = rf"^[> ]*Figure: !\[[^\]\n]*\]\({re.escape(name)}\)[^\n]*\n?"
-            if paragraph := re.search(pattern, source.text, re.MULTILINE):
-                yield Edit(Span(source, paragraph.start(), paragraph.end()), "")
-
-
-def _used(code: str) -> set[str]:
-    return {
-        node.id
-        for node in ast.walk(ast.parse(code))
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
-    }
-
-
-def _bound(code: str) -> set[str]:
-    names = set[str]()
-    for node in ast.walk(ast.parse(code)):
-        match node:
-            case ast.Name(id=name, ctx=ast.Store()):
-                names.add(name)
-            case ast.FunctionDef() | ast.ClassDef() | ast.AsyncFunctionDef():
-                names.add(node.name)
-            case ast.alias():
-                names.add(node.asname or node.name.partition(".")[0])
-            case _:
-                continue
-    return names
