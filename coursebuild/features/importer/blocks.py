@@ -42,7 +42,9 @@ _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
 _TITLE = re.compile(r"\b(?:title|tab|filename)=(?:\"([^\"]*)\"|'([^']*)')")
 _CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
-_QUOTED_KIND = re.compile(r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(\])", re.MULTILINE)
+_QUOTED_KIND = re.compile(
+    r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\])", re.MULTILINE
+)
 
 
 def convert_segment(segment: Segment, context: LessonContext) -> str:
@@ -187,6 +189,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         context.files.account.taken[f"block of `{kind}`"] += 1
         return fence(head, text)
     language = re.split(r"[\s,]", head.strip("{}. "), maxsplit=1)[0].rstrip("}")
+    language = "" if re.search("[=#]", language) and language.lower() != "c#" else language
     if language not in highlighted_languages() and language.lower() in highlighted_languages():
         language = language.lower()
     if language in ("python", "py", "python3") and re.match(r"\s*>>> ", text):

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from coursebuild.api import UsageError
-from coursebuild.features.importer.outlines import find_text, read_outline
+from coursebuild.features.importer.outlines import find_text, leave_entry, read_outline
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedCourse,
@@ -100,6 +100,7 @@ def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
 _SETTINGS = (
     "bibtex_bibfiles",
     "bibliography",
+    "appendices",
     "title",
     "site_name",
     "nav",
@@ -131,6 +132,8 @@ def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | Im
     if isinstance(value, str):
         if path := find_text(value, files):
             yield ImportedText(file=path)
+        elif "*" not in value and value != "auto":
+            leave_entry("the map", value, files)
     elif isinstance(value, list):
         for item in value:
             yield from _read_parts(item, files)
@@ -165,8 +168,7 @@ def _read_nav(
             elif path := find_text(posixpath.join(folder, str(value)), files):
                 yield ImportedText(file=path, title=str(title))
             else:
-                message = f"the map names `{value}`, which is not in the folder or no text"
-                files.leave("mkdocs.yml", message, "entry of the map")
+                leave_entry("mkdocs.yml", str(value), files)
 
 
 def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:

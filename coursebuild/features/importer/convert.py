@@ -9,6 +9,7 @@ import posixpath
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from pathlib import Path
+from textwrap import shorten
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -69,6 +70,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     ids |= {lesson.old_id: lesson.id for lesson in lessons if lesson.old_id}
     models = _find_models(files)
     out, context = _convert_texts(course, texts, ids, models, files)
+    course = _plan_empty_lessons(course, out, files)
     if map_path is not None:
         for text in texts:
             for name in text.prerequisites:
@@ -92,6 +94,22 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     _leave_unused(files, (path for path in files if path in unused))
     out["IMPORT.md"] = _encode(files.account.text(files.name))
     return ConvertedCourse(dict(sorted(out.items())), files.account, context.notebook_outputs)
+
+
+def _plan_empty_lessons(
+    course: ImportedCourse, out: dict[str, bytes], files: SourceFiles
+) -> ImportedCourse:
+    """Return the course with lessons planned of whose texts nothing is left; their files go."""
+
+    def plan(text: ImportedText) -> ImportedText:
+        if not text.path or out[text.path].strip():
+            return text
+        del out[text.path]
+        files.leave(text.file, "a text of which nothing is left: a lesson that is planned", "text")
+        return replace(text, path="")
+
+    levels = (replace(level, lessons=tuple(map(plan, level.lessons))) for level in course.levels)
+    return replace(course, levels=tuple(levels))
 
 
 def _find_models(files: SourceFiles) -> Mapping[str, str]:
@@ -214,8 +232,12 @@ def _convert_texts(
             text_context.leave("link", f"a link to `#{anchor}`, which no text sets")
         return address
 
+    def leave_tag(link: str, tag: str) -> None:
+        message = f"`{shorten(tag, 120, placeholder='…')}`, which a page cannot hold"
+        files.leave(files_of[link], message, "tag of HTML")
+
     callouts = frozenset((*CALLOUTS, *context.callouts))
-    completed = complete_texts(new, resolve_label, callouts)
+    completed = complete_texts(new, resolve_label, leave_tag, callouts)
     out = {text.path: _encode(new_text) for text, new_text in zip(texts, completed, strict=True)}
     return {**out, **context.copies}, context
 

@@ -256,6 +256,16 @@ def _read_file(
         source = files.read_text(text.file)
         if not text.file.endswith(".ipynb"):
             source = expand_includes(source, text.file, files)
+        if text.file.endswith(".qmd"):  # there a tag need not be apart from a block
+            source = re.sub(
+                r"^([ \t]*</?[a-z][^<>\n]*>)[ \t]*\n(?=[ \t]*`{3})",
+                r"\1\n\n",
+                source,
+                flags=re.MULTILINE,
+            )
+            source = re.sub(
+                r"^([ \t]*`{3,}[ \t]*\n)(?=[ \t]*</)", r"\1\n", source, flags=re.MULTILINE
+            )
         if has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
             files.account.changed["hidden lines of Rust", "dropped: readers did not see them"] += 1
             source = visible_text

@@ -1,7 +1,8 @@
 """Texts and lines of other files that a text includes, put where it does so.
 
 mdBook writes `{{#include FILE:LINES}}` or `{{#include FILE:ANCHOR}}`, MkDocs `--8<-- "FILE:LINES"`
-or `--8<-- "FILE:SECTION"`, Quarto `{{< include FILE >}}`, MyST a directive with options.
+or `--8<-- "FILE:SECTION"` or `{!FILE!}`, Quarto `{{< include FILE >}}`, MyST a directive with
+options.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ _MARK = re.compile(
     r"(?P<escape>\\)?\{\{[ ]*#(?P<command>include|rustdoc_include|playground|title)[ ]+"
     r"(?P<mdbook>[^{}]*?)[ ]*\}\}"
     r"|\{\{<[ ]*include[ ]+(?P<quarto>\S+)[ ]*>\}\}"
+    r"|\{!>?[ \t]*(?P<inclusion>[^{}!\s]+)[^{}!\n]*!\}"
     r"|^(?P<indent>[ \t]*)-{1,}8<-{1,}[ \t]+[\"'](?P<mkdocs>[^\"'\n]+)[\"'][ \t]*$",
     re.MULTILINE,
 )
@@ -37,7 +39,7 @@ def expand_includes(text: str, path: str, files: SourceFiles, depth: int = 0) ->
         if mark["command"] == "title":
             files.account.changed["title of the page", "the map has it"] += 1
             return ""
-        name = mark["mdbook"] or mark["quarto"] or mark["mkdocs"]
+        name = mark["mdbook"] or mark["quarto"] or mark["mkdocs"] or mark["inclusion"]
         line = f"line {text.count(chr(10), 0, mark.start()) + 1}"
         file, _, part = name.split()[0].partition(":")
         target = _find(file, path, files)

@@ -61,6 +61,12 @@ def find_text(name: object, files: SourceFiles) -> str:
     return next((path for end in TEXTS if (path := files.find(name + end))), "")
 
 
+def leave_entry(path: str, name: str, files: SourceFiles, place: str = "") -> None:
+    """Note that a map names what is no text of the folder."""
+    message = f"the map names `{name}`, which is not in the folder or no text"
+    files.leave(path, message, "entry of the map", place)
+
+
 # --- mdBook, GitBook
 
 _ENTRY = re.compile(
@@ -90,8 +96,7 @@ def _read_summary(path: str, title: str, files: SourceFiles, is_mdbook: bool) ->
             name = posixpath.join(posixpath.dirname(path), entry["file"].partition("#")[0])
             file = find_text(name, files) if entry["file"] else ""
             if entry["file"] and not file:
-                message = f"the map names `{entry['file']}`, which is not in the folder or no text"
-                files.leave(path, message, "entry of the map", f"line {number}")
+                leave_entry(path, entry["file"], files, f"line {number}")
             words = re.sub(r"\\(.)", r"\1", entry["title"]).replace("`", "")
             depth = len(entry["indent"].expandtabs(4)) if entry["item"] else -1
             groups[-1][1].append(_Entry(depth, ImportedText(file=file, title=words)))
@@ -168,8 +173,7 @@ def _read_sidebar(
         if path := _find_doc(items, files):
             yield ImportedText(file=path)
         else:
-            message = f"the map names `{items}`, which is not in the folder"
-            files.leave(name, message, "entry of the map")
+            leave_entry(name, items, files)
     elif isinstance(items, list):
         for item in items:
             yield from _read_sidebar(item, name, files)

@@ -45,6 +45,8 @@ _LINE = re.compile(
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     r"|(?P<tail>\]\((?P<rest>[^()\s]+)(?=\)))"  # of a link whose text began a line above
+    r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:)"
+    r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>[a-z][a-z0-9-]*(?:\+[a-z0-9-]+)*)\+\+(?![\w+]))"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     r"|(?P<tag><(?i:a|img|source|video)[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
     r"|(?P<markdown>(?P<before><[a-z]\w*(?:[ ][^<>\n]*?)?)[ ]markdown(?:=[\"'\w]+)?(?=[ >]))"
@@ -76,6 +78,10 @@ _CAPTION = re.compile(
     re.MULTILINE,
 )
 """A caption of Quarto, below its table."""
+_MEANING = re.compile(
+    r"^(?<![^\n]\n)(?![|:#>\s<]|[-*+][ ])([^\n]*[^\s\n:])[ \t]*\n:[ \t]+(?=\S)", re.MULTILINE
+)
+"""A term in a paragraph of its own, and the mark of what it means."""
 _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
@@ -125,6 +131,8 @@ _KINDS = {
     "mention": ("mention of a lesson", "its new number"),
     "route": ("link", "its new address"),
     "tail": ("link", "its new address"),
+    "icon": ("icon", "dropped: it is a picture of its tool"),
+    "keys": ("keys", "their names"),
     "definition": ("link by reference", "its new address"),
     "tag": ("tag of HTML", "its new address"),
     "markdown": ("tag of HTML", "without `markdown`: its text always is"),
@@ -163,6 +171,9 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     text, count = _TARGET.subn(write_target, text)
     if count:
         account.changed["label", "an anchor"] += count
+    text, count = _MEANING.subn(r"**\1**: ", text)
+    if count:
+        account.changed["definition", "behind its term, which is bold"] += count
     text, count = _CAPTION.subn(_move_caption, text)
     if count:
         account.changed["caption of a table", "stands above it"] += count
@@ -331,6 +342,10 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
+        case "icon":
+            return ""
+        case "keys":
+            return "+".join(key.capitalize() for key in match["stroke"].split("+"))
         case "route":
             return context.resolve_link(whole) or whole
         case "tail":

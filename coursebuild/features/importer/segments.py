@@ -119,6 +119,13 @@ _GATES = re.compile(
 """An exercise or a solution of MyST between a block that begins it and one that ends it."""
 
 
+_HINT = re.compile(
+    r"^\{% hint style=\"(\w+)\" %\}[ \t]*\n(.*?)\n?^\{% endhint %\}[ \t]*$",
+    re.MULTILINE | re.DOTALL,
+)
+"""A callout of GitBook."""
+
+
 def _join_gates(gates: re.Match[str]) -> str:
     mark = "`" * 12
     return f"{mark}{{{gates['name']}}}{gates['head']}\n{gates['body']}\n{mark}"
@@ -141,7 +148,7 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
     Plain blocks in quotations and lists remain part of the prose. Around others, a quotation is a
     block.
     """
-    text = _GATES.sub(_join_gates, text)
+    text = _HINT.sub(r"::::::\1\n\2\n::::::", _GATES.sub(_join_gates, text))
     lines = text.split("\n")
     at = 0
     for (start, end), mark, head, content in (*_find_blocks(text), ([len(lines)] * 2, "", "", "")):

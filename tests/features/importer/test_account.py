@@ -148,6 +148,11 @@ MKDOCS: list[Construct] = [
     ("attributes", CHANGED, "Text wc15 {: .class }"),
     ("link", CHANGED, "[wc16](two.md)"),
     ("tag of HTML", CHANGED, '<div markdown="1">wc17</div>'),
+    ("icon", CHANGED, ":material-check: wc19"),
+    ("keys", CHANGED, "Press ++ctrl+alt+w++ wc20."),
+    ("definition", CHANGED, "Term wc21\n:   Meaning wc22."),
+    ("tag of HTML", LEFT, "<font color=blue>wc23</font>"),
+    ("tag of HTML", LEFT, '<img alt="wc24"\n  src="https://example.org/a.png">'),
 ]
 MDBOOK: list[Construct] = [
     ("file that is included", CHANGED, "```rust\n{{#include code.rs:2:3}}\n```"),
@@ -159,6 +164,7 @@ MDBOOK: list[Construct] = [
     ("callout", CHANGED, '```admonish warning title="wd10"\nText wd11\n```'),
     ("link", CHANGED, "[wd12](two.html#part)"),
     ("title of the page", CHANGED, "{{#title Words}}"),
+    ("callout", CHANGED, '{% hint style="info" %}\nwd14\n{% endhint %}'),
 ]
 DOCUSAURUS: list[Construct] = [
     ("callout", CHANGED, ":::tip[Title we1]\nText we2\n:::"),
