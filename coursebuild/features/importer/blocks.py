@@ -9,8 +9,8 @@ import textwrap
 
 from msgspec.structs import replace
 
+from coursebuild.api import marks
 from coursebuild.core.model.course import CALLOUTS
-from coursebuild.core.pages.marks import block_quote, fence
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.cells import write_cell
@@ -66,7 +66,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
         case ":":
             return _convert_division(head, text, context)
         case ">":
-            quotation = block_quote(_convert_nested(text, context))
+            quotation = marks.block_quote(_convert_nested(text, context))
             return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], quotation)
         case "=":
             _note_change(context, "tab", _TAB)
@@ -175,7 +175,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         if raw[1] == "html":
             return text
         context.leave("block that is raw", f"a block of raw {raw[1]}, shown as text")
-        return fence("text", text)
+        return marks.fence("text", text)
     if kind == "admonish":
         title = _TITLE.search(head)
         name = next(iter(re.findall(r"\b(?:type=[\"'])?([a-z]+)\b", head)[1:]), "note")
@@ -187,7 +187,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         context.leave(f"block of `{kind}`", message)
     if kind in ("mjcf", *fence_names()) or (kind == "python" and "file=" in head):
         context.files.account.taken[f"block of `{kind}`"] += 1
-        return fence(head, text)
+        return marks.fence(head, text)
     language = re.split(r"[\s,]", head.strip("{}. "), maxsplit=1)[0].rstrip("}")
     language = "" if re.search("[=#]", language) and language.lower() != "c#" else language
     if language not in highlighted_languages() and language.lower() in highlighted_languages():
@@ -204,7 +204,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
     kind = f"block of `{language}`" if language else "block without a kind"
-    new = fence(language, text)
+    new = marks.fence(language, text)
     context.convert(kind, "without what its tool adds", head, lambda: language)
     return (f"**{words}**\n\n" if words else "") + new
 
@@ -213,7 +213,7 @@ def _convert_nested(text: str, context: LessonContext) -> str:
     if context.depth == _MAX_DEPTH:
         message = f"blocks that nest more than {_MAX_DEPTH} deep, shown as written"
         context.leave("block in blocks", message)
-        return fence("text", text)
+        return marks.fence("text", text)
     context = replace(context, depth=context.depth + 1)
     parts = (
         replace(part, text=lower_titles(part.text)) if part.kind == "prose" else part
@@ -239,7 +239,7 @@ def _write_callout(
     title = " ".join(rewrite_prose(title, context).split())
     head = f"[!{_callout_kind(kind, context)}]{fold_mark} {title}".rstrip()
     _note_change(context, "callout", "a quotation that begins with its kind")
-    return block_quote(f"{head}\n{_convert_nested(text, context)}".rstrip("\n"))
+    return marks.block_quote(f"{head}\n{_convert_nested(text, context)}".rstrip("\n"))
 
 
 def _convert_directive(name: str, argument: str, text: str, context: LessonContext) -> str:

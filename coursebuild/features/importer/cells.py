@@ -7,7 +7,7 @@ import re
 import warnings
 from collections.abc import Mapping
 
-from coursebuild.core.pages.marks import fence
+from coursebuild.api import marks
 from coursebuild.features.importer.context import LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment, read_yaml
@@ -33,9 +33,9 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     code = runnable_code(cell, context)
     if not code:
         if (magic := re.match(r"\s*%%(\w+).*\n", cell.text)) is not None:
-            return fence(magic[1], cell.text[magic.end() :].strip("\n"))
+            return marks.fence(magic[1], cell.text[magic.end() :].strip("\n"))
         shown_code = code_for_readers(cell)
-        return fence("python", shown_code) if shown_code else ""
+        return marks.fence("python", shown_code) if shown_code else ""
     code, figure = _with_new_paths(code, context), ""
     if _draws(cell, code):
         if any(_PYPLOT.search(part) for part in (*context.parts, code)):
@@ -46,9 +46,9 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     word = " part" if context.parts else ""
     context.parts.append(code)
     account.changed["cell", "a part of the lesson's script"] += 1
-    blocks = [fence(f"python file={context.script_path}{word}{how_shown(cell)}", code)]
+    blocks = [marks.fence(f"python file={context.script_path}{word}{how_shown(cell)}", code)]
     if output := recorded_output(cell, code):
-        blocks.append(fence("output", output))
+        blocks.append(marks.fence("output", output))
         account.taken["output that is recorded"] += 1
         context.notebook_outputs.append((context.script_path, output))
     return "\n\n".join((*blocks, figure) if figure else blocks)

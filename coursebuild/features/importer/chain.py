@@ -8,9 +8,7 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence, Set
 from textwrap import shorten
 
-from coursebuild.api import Edit, Recording, ScriptRun, Span
-from coursebuild.core.model import Script, ScriptPart
-from coursebuild.core.pages.marks import fence
+from coursebuild.api import Edit, Recording, ScriptRun, Span, marks, model
 from coursebuild.features.importer.context import script_path_of
 from coursebuild.report.values import plural
 
@@ -27,10 +25,12 @@ class Chain:
     """The cells of a script that failed, as parts of it."""
 
     def __init__(
-        self, script: Script, script_run: ScriptRun, recordings: Sequence[Recording]
+        self, script: model.Script, script_run: ScriptRun, recordings: Sequence[Recording]
     ) -> None:
         self.script, self.recordings = script, recordings
-        self.parts: tuple[Script | ScriptPart, ...] = self.script.parts or (self.script,)
+        self.parts: tuple[model.Script | model.ScriptPart, ...] = self.script.parts or (
+            self.script,
+        )
         self.codes = [part.code.text.strip("\n") for part in self.parts]
         self.is_of_cells = script.path == script_path_of(script.span.path)
         self.remarks: list[str] = []
@@ -121,17 +121,17 @@ class Chain:
                     lines = f'\nplt.savefig("{name}")\nplt.close("all")'
                     code = f"\n{code}".replace(lines, "").strip("\n")
                 note = f"*Not run here:* {reasons[number]}"
-                new = f"{fence('python', code)}\n\n{note}" if code else note
+                new = f"{marks.fence('python', code)}\n\n{note}" if code else note
             elif number in imports:
                 imports_alone = "\n".join(
                     line for line in code.split("\n") if line not in imports[number]
                 )
                 note = f"*Not run here:* `{self.reason}`"
-                new = f"{fence('python', imports_alone)}\n\n{note}"
+                new = f"{marks.fence('python', imports_alone)}\n\n{note}"
                 if imports[number]:
-                    new += f"\n\n{fence(head, imports[number])}"
+                    new += f"\n\n{marks.fence(head, imports[number])}"
             elif number == first:
-                new = fence(head, code)
+                new = marks.fence(head, code)
             else:
                 continue
             indented = textwrap.indent(new, part.prefix, lambda line: True)

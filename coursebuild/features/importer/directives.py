@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from msgspec import Struct
 
-from coursebuild.core.pages.marks import block_quote, fence
+from coursebuild.api import marks
 from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.context import LessonContext, label_anchor, to_anchor
 from coursebuild.features.importer.includes import lines_of
@@ -101,7 +101,7 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             language = argument if name != "parsed-literal" else ""
             caption = options.get("caption", "")
             head = f"**{rewrite_prose(caption, context)}**\n\n" if caption else ""
-            return head + fence(language or "text", text) if text.strip() else ""
+            return head + marks.fence(language or "text", text) if text.strip() else ""
         case "literalinclude" | "include":
             return _write_file(directive, context, kind)
         case "list-table" | "csv-table" | "table":
@@ -129,7 +129,7 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
                 address = f"https://www.youtube.com/watch?v={address}"
             return rewrite_prose(f"[{words}]({address})", context)
         case "epigraph" | "pull-quote" | "blockquote" | "highlights":
-            return block_quote(directive.nested(text))
+            return marks.block_quote(directive.nested(text))
         case _ if name in _MAPS:
             return ""
         case _ if name in _FRAMES:
@@ -150,14 +150,14 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
         case _ if package := missing_package(name):
             message = f"a block of `{name}` is shown as text: install {package}, and name it so"
             context.leave(kind, message)
-            return fence("text", text)
+            return marks.fence("text", text)
         case _ if name in highlighted_languages():
             context.leave(kind, f"a block of `{name}` is shown and not run")
-            return fence(name, text)
+            return marks.fence(name, text)
         case _:
             message = f"the directive `{{{name}}}`, whose text is shown as it was written"
             context.leave(kind, message)
-            return fence("text", f"{argument}\n{text}".strip("\n"))
+            return marks.fence("text", f"{argument}\n{text}".strip("\n"))
 
 
 def _write_figure(directive: Directive, context: LessonContext) -> str:
@@ -190,7 +190,9 @@ def _write_file(directive: Directive, context: LessonContext, kind: str) -> str:
         return directive.nested(text)
     language = options.get("language") or path.rpartition(".")[2]
     language = {"py": "python", "cpp": "cpp", "txt": "text", "yml": "yaml"}.get(language, language)
-    return fence(language if language in highlighted_languages() else "text", text.strip("\n"))
+    return marks.fence(
+        language if language in highlighted_languages() else "text", text.strip("\n")
+    )
 
 
 def _write_card(directive: Directive, context: LessonContext) -> str:

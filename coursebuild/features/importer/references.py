@@ -75,11 +75,11 @@ def _read(
 ) -> _Text:
     for _ in range(_PASSES):
         source = Source(link, text)
-        parsed = parse_document(source, callouts, lesson=link.startswith("lesson:"))
-        document, edits = parsed.value, dict[int, Edit]()
+        parse = parse_document(source, callouts, lesson=link.startswith("lesson:"))
+        document, edits = parse.value, dict[int, Edit]()
         spans = [
             *(part.span for html in _raw_html(document) for part in html.forbidden),
-            *(d.span for d in parsed.diagnostics if d.rule == "html-unbalanced"),
+            *(d.span for d in parse.diagnostics if d.rule == "html-unbalanced"),
         ]
         for span in spans:
             whole = _WITH_CONTENT.match(text, span.start)

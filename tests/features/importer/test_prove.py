@@ -30,19 +30,19 @@ def files_of(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
 
 def test_nothing_runs_before_it_is_asked_for(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    write_notebook(here / "old/a.ipynb", "open('ran', 'w').close()", printed="as recorded\n")
+    write_notebook(folder / "old/a.ipynb", "open('ran', 'w').close()", printed="as recorded\n")
     assert main(["import", "old", "--out", "new"]) == 0
     assert "1 script not run: run `coursebuild -C new import --prove`" in capsys.readouterr().out
-    assert "```output\nas recorded\n```" in lesson(here / "new", "1.1-a")
-    assert not list(here.rglob("ran"))
+    assert "```output\nas recorded\n```" in lesson(folder / "new", "1.1-a")
+    assert not list(folder.rglob("ran"))
 
 
 def lesson(course: Path, name: str) -> str:
@@ -50,10 +50,10 @@ def lesson(course: Path, name: str) -> str:
 
 
 def test_a_missing_module_costs_the_cells_that_use_it(
-    here: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     write_notebook(
-        here / "old/a.ipynb",
+        folder / "old/a.ipynb",
         f"import math\nimport {ABSENT} as absent",
         "print(round(math.pi, 3))",
         "value = absent.compute()",
@@ -63,7 +63,7 @@ def test_a_missing_module_costs_the_cells_that_use_it(
     )
     assert main(["import", "old", "--out", "new"]) == 0
     assert main(["-C", "new", "import", "--prove"]) == 0
-    text = lesson(here / "new", "1.1-a")
+    text = lesson(folder / "new", "1.1-a")
     head = "python file=examples/l1_1_a.py"
     assert f"```{head}\nimport math\n```" in text
     assert f"```{head} part\nprint(round(math.pi, 3))\n```\n\n```output\n3.142\n```" in text
@@ -73,62 +73,62 @@ def test_a_missing_module_costs_the_cells_that_use_it(
     assert "```python\nprint(value)\n```\n\n*Not run here:* it needs `value`" in text
     assert f"```{head} part\nvalue = 2\n```" in text
     assert "```output\nvalue 2\n```" in text
-    assert "2 cells shown, not run" in (here / "new" / "IMPORT.md").read_text()
+    assert "2 cells shown, not run" in (folder / "new" / "IMPORT.md").read_text()
     assert "everything holds" in capsys.readouterr().out
 
 
-def test_a_cell_that_fails_costs_only_those_that_need_it(here: Path) -> None:
+def test_a_cell_that_fails_costs_only_those_that_need_it(folder: Path) -> None:
     plot = "import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.title('A line')\n"
     write_notebook(
-        here / "old/a.ipynb",
+        folder / "old/a.ipynb",
         "import matplotlib.pyplot as plt\nplt.plot([3])\nheight = 1 / 0",
         "print(height)",
         plot + "plt.show()",
         "print(missing)",
         "print('at the end')",
     )
-    write_notebook(here / "old/b.ipynb", "1 / 0")
-    write_notebook(here / "old/c.ipynb", f"import {ABSENT}", f"{ABSENT}.run()")
+    write_notebook(folder / "old/b.ipynb", "1 / 0")
+    write_notebook(folder / "old/c.ipynb", f"import {ABSENT}", f"{ABSENT}.run()")
     assert main(["import", "old", "--out", "new", "--prove"]) == 0
-    text = lesson(here / "new", "1.1-a")
+    text = lesson(folder / "new", "1.1-a")
     names = ["l1-1-a-1.svg", "l1-1-a-2.svg"]
     assert names[0] not in text
     assert f"```python file=examples/l1_1_a.py figure={names[1]}\n{plot}" in text
     assert f"Figure: ![A line]({names[1]}) A line" in text
-    assert (here / "new/content/lessons" / names[1]).read_bytes().startswith(b"<")
+    assert (folder / "new/content/lessons" / names[1]).read_bytes().startswith(b"<")
     assert "height = 1 / 0\n```\n\n*Not run here:* `ZeroDivisionError: division by zero`" in text
     assert "print(height)\n```\n\n*Not run here:* it needs `height`" in text
     assert "*Not run here:* `NameError: name 'missing' is not defined`" in text
     assert "```output\nat the end\n```" in text
-    assert lesson(here / "new", "1.2-b").startswith(
+    assert lesson(folder / "new", "1.2-b").startswith(
         "```python\n1 / 0\n```\n\n*Not run here:* `Zero"
     )
-    assert lesson(here / "new", "1.3-c").startswith(
+    assert lesson(folder / "new", "1.3-c").startswith(
         f"```python file=examples/l1_3_c.py requires={ABSENT}\n"
     )
 
 
-def test_what_a_notebook_recorded_is_replaced_unless_somebody_edited_it(here: Path) -> None:
+def test_what_a_notebook_recorded_is_replaced_unless_somebody_edited_it(folder: Path) -> None:
     for name in "ab":
-        write_notebook(here / f"old/{name}.ipynb", "print('mass', 4.79)", printed="mass 3\n")
+        write_notebook(folder / f"old/{name}.ipynb", "print('mass', 4.79)", printed="mass 3\n")
     assert main(["import", "old", "--out", "new"]) == 0
-    edited = here / "new/content/lessons/1.2-b.md"
-    edited.write_text(edited.read_text().replace("mass 3", "mass 5"))
+    lesson_path = folder / "new/content/lessons/1.2-b.md"
+    lesson_path.write_text(lesson_path.read_text().replace("mass 3", "mass 5"))
     assert main(["-C", "new", "import", "--prove"]) == 1
-    assert "```output\nmass 4.79\n```" in lesson(here / "new", "1.1-a")
-    assert "```output\nmass 5\n```" in edited.read_text()
-    account = (here / "new/IMPORT.md").read_text()
+    assert "```output\nmass 4.79\n```" in lesson(folder / "new", "1.1-a")
+    assert "```output\nmass 5\n```" in lesson_path.read_text()
+    account = (folder / "new/IMPORT.md").read_text()
     assert "1.1-a.md: the recorded output does not hold here" in account
-    before = files_of(here / "new")
+    before = files_of(folder / "new")
     assert main(["-C", "new", "import", "--prove"]) == 1
-    assert files_of(here / "new") == before
+    assert files_of(folder / "new") == before
 
 
-def test_a_script_gets_the_folder_that_it_writes_to(here: Path) -> None:
+def test_a_script_gets_the_folder_that_it_writes_to(folder: Path) -> None:
     code = "import os\nos.makedirs('runs', exist_ok=True)\nopen('runs/a.txt', 'w').write('x')"
-    write_notebook(here / "old/a.ipynb", f"{code};")
+    write_notebook(folder / "old/a.ipynb", f"{code};")
     assert main(["import", "old", "--out", "new", "--prove"]) == 0
-    assert " writes=runs/\n" in lesson(here / "new", "1.1-a")
+    assert " writes=runs/\n" in lesson(folder / "new", "1.1-a")
 
 
 def import_until(number: int) -> int:
@@ -165,23 +165,23 @@ def import_until(number: int) -> int:
         os._exit(status)
 
 
-def test_an_import_that_is_killed_can_be_said_again(here: Path) -> None:
+def test_an_import_that_is_killed_can_be_said_again(folder: Path) -> None:
     """At each of its file operations; nothing of what was there before is ever lost."""
     for name in "ab":
-        write_notebook(here / f"old/{name}.ipynb", "print(1)", printed="1\n")
-    (here / "new").mkdir()
-    (here / "new" / "mine.txt").write_text("mine")
+        write_notebook(folder / f"old/{name}.ipynb", "print(1)", printed="1\n")
+    (folder / "new").mkdir()
+    (folder / "new" / "mine.txt").write_text("mine")
     expected: dict[str, bytes] = {}
     number, numbers = 1, 0
     while (status := import_until(number)) == 9:
         numbers += 1
-        assert (here / "new" / "mine.txt").read_text() == "mine", number
+        assert (folder / "new" / "mine.txt").read_text() == "mine", number
         assert import_until(0) == 0, f"killed at operation {number}"
-        expected = expected or files_of(here / "new")
-        assert files_of(here / "new") == expected, f"killed at operation {number}"
+        expected = expected or files_of(folder / "new")
+        assert files_of(folder / "new") == expected, f"killed at operation {number}"
         for path in expected:
             if path != "mine.txt":
-                (here / "new" / path).unlink()
+                (folder / "new" / path).unlink()
         number += 1
     assert status == 0
     assert numbers > 10

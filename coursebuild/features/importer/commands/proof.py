@@ -27,11 +27,11 @@ from coursebuild.api import (
     Source,
     Span,
     Store,
+    marks,
+    model,
 )
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Script
 from coursebuild.core.model.results import Change, EffectKind, Sign
-from coursebuild.core.pages.marks import fence
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
 from coursebuild.core.scripts.extract import Extraction
@@ -144,7 +144,7 @@ def _run(
     return [(extraction, reruns.get(extraction.path, run)) for extraction, run in runs]
 
 
-def _missing_keys(script: Script, script_run: ScriptRun) -> Iterator[str]:
+def _missing_keys(script: model.Script, script_run: ScriptRun) -> Iterator[str]:
     """Yield the keys that a script's fence needs after this run, as `key=value`."""
     module = missing_module(script_run) if script_run.outcome is Outcome.FAILED else ""
     if module and not script.requires:
@@ -175,7 +175,11 @@ def _missing_keys(script: Script, script_run: ScriptRun) -> Iterator[str]:
 
 
 def _record_outputs(
-    script: Script, script_run: ScriptRun, course: Course, options: Options, remarks: list[str]
+    script: model.Script,
+    script_run: ScriptRun,
+    course: Course,
+    options: Options,
+    remarks: list[str],
 ) -> Iterator[Edit]:
     """Yield the edits that write what a script printed where nothing or a notebook's is recorded.
 
@@ -200,7 +204,7 @@ def _record_outputs(
         printed = script_run.output_of(part)
         is_recorded = any(recording.part == part for recording in recordings)
         if printed.strip() and not is_recorded:
-            end, text = block.span.end, fence("output", printed.rstrip("\n"))
+            end, text = block.span.end, marks.fence("output", printed.rstrip("\n"))
             below = textwrap.indent(f"\n\n{text}", block.prefix, lambda line: True)
             yield Edit(Span(block.span.source, end, end), below.removeprefix(block.prefix))
 
