@@ -37,7 +37,7 @@ from coursebuild.features.importer.source_files import (
 )
 
 TRIED = "tried-lessons"
-"""The kind of entries that say: a lesson as it was converted became this when it was tried."""
+"""The kind of entries that say of what proving made of a file: what it was made from at first."""
 _GITIGNORE = b"public/\nexamples/\n.coursebuild/\n"
 
 
@@ -170,8 +170,8 @@ def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, stor
         if os.path.lexists(target / path):
             with contextlib.suppress(EffectError):  # which leaves `None`: it is no file of ours
                 old = read_bytes(target, path)
-            trial = fingerprint((path, data, old))
-            if old != data and (old is None or store.peek(TRIED, trial, bytes) is None):
+            is_ours = old is not None and _origin(path, old, store) == fingerprint((path, data))
+            if old != data and not is_ours:
                 raise UsageError(f"{target} already has {path}; name an empty folder with --out")
         if old != data:
             changes.append(FileChange(path, old, data))
@@ -185,8 +185,15 @@ def write_course(course: ConvertedCourse, target: Path, files: SourceFiles, stor
 def change_tried_lessons(target: Path, changes: Sequence[FileChange], store: Store) -> None:
     """Change lessons to what trying their scripts has shown, so that `write_course` knows them."""
     for change in changes:
-        store.put(TRIED, fingerprint((change.path, change.old, change.new)), b"")
+        origin = _origin(change.path, change.old or b"", store)
+        store.put(TRIED, fingerprint((change.path, change.new)), origin.encode())
     change_files(target, changes)
+
+
+def _origin(path: str, data: bytes, store: Store) -> str:
+    """The fingerprint of what a file was before proving changed it; else that of what it is."""
+    own = fingerprint((path, data))
+    return store.peek(TRIED, own, bytes.decode) or own
 
 
 def _encode(text: str) -> bytes:

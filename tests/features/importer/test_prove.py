@@ -1,10 +1,8 @@
-"""`coursebuild import --prove`: what running shows, and imports that end before their time."""
+"""`coursebuild import --prove`: what running shows, and what becomes of cells that cannot run."""
 
 from __future__ import annotations
 
 import json
-import os
-import sys
 from pathlib import Path
 
 import pytest
@@ -129,59 +127,3 @@ def test_a_script_gets_the_folder_that_it_writes_to(folder: Path) -> None:
     write_notebook(folder / "old/a.ipynb", f"{code};")
     assert main(["import", "old", "--out", "new", "--prove"]) == 0
     assert " writes=runs/\n" in lesson(folder / "new", "1.1-a")
-
-
-def import_until(number: int) -> int:
-    """Import in a process that ends without a word at its file operation of this number.
-
-    Returns its exit status: 9 where it ended so.
-    """
-    process = os.fork()
-    if process:
-        return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-    count = 0
-
-    def end(event: str, arguments: tuple[object, ...]) -> None:
-        nonlocal count
-        writes = event in (
-            "os.rename",
-            "os.remove",
-            "os.mkdir",
-            "os.rmdir",
-            "os.link",
-            "os.symlink",
-        )
-        if event == "open" and isinstance(arguments[2], int):
-            writes = bool(arguments[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT))
-        count += writes
-        if writes and count == number:
-            os._exit(9)
-
-    status = 1
-    try:
-        sys.addaudithook(end)
-        status = main(["import", "old", "--out", "new", "--quiet", "--cache", "cache"])
-    finally:
-        os._exit(status)
-
-
-def test_an_import_that_is_killed_can_be_said_again(folder: Path) -> None:
-    """At each of its file operations; nothing of what was there before is ever lost."""
-    for name in "ab":
-        write_notebook(folder / f"old/{name}.ipynb", "print(1)", printed="1\n")
-    (folder / "new").mkdir()
-    (folder / "new" / "mine.txt").write_text("mine")
-    expected: dict[str, bytes] = {}
-    number, numbers = 1, 0
-    while (status := import_until(number)) == 9:
-        numbers += 1
-        assert (folder / "new" / "mine.txt").read_text() == "mine", number
-        assert import_until(0) == 0, f"killed at operation {number}"
-        expected = expected or files_of(folder / "new")
-        assert files_of(folder / "new") == expected, f"killed at operation {number}"
-        for path in expected:
-            if path != "mine.txt":
-                (folder / "new" / path).unlink()
-        number += 1
-    assert status == 0
-    assert numbers > 10

@@ -50,8 +50,8 @@ _LONG_TIMEOUT = 900.0
 """Seconds allowed in the second run of a script that exceeded the usual time."""
 _TIME_FACTOR = 3.0
 """A script's new time limit, as a multiple of the time it took here."""
-_ROUNDS, _PATIENCE = 8, 5.0
-"""How often cells are taken out of a script, and after how many seconds of a run just once."""
+_ROUNDS = 8
+"""How often cells are taken out of a script; the last time, all from the failing one on."""
 _HEADING = "\n## What running showed\n\n"
 
 
@@ -70,8 +70,7 @@ def prove(options: Options) -> tuple[str, ...]:
         edits: dict[Source, list[Edit]] = {}
         for extraction, script_run in runs:
             if script_run.outcome is Outcome.FAILED and number < _ROUNDS:
-                is_slow = number > 0 and script_run.seconds > _PATIENCE
-                is_last = is_slow or number == _ROUNDS - 1
+                is_last = number == _ROUNDS - 1
                 recordings = recorded_outputs(course)
                 chain = Chain(extraction.script, script_run, recordings)
                 changes = [*chain.edits(is_prefix=is_last)]
