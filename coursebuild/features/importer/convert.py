@@ -192,8 +192,8 @@ def change_tried_lessons(target: Path, changes: Sequence[FileChange], store: Sto
 
 def _origin(path: str, data: bytes, store: Store) -> str:
     """The fingerprint of what a file was before proving changed it; else that of what it is."""
-    own = fingerprint((path, data))
-    return store.peek(TRIED, own, bytes.decode) or own
+    key = fingerprint((path, data))
+    return store.peek(TRIED, key, bytes.decode) or key
 
 
 def _encode(text: str) -> bytes:
