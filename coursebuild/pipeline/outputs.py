@@ -139,7 +139,7 @@ class _Updater:
             e for e in self.extracted_scripts.extractions if e.path not in asked_paths
         )
         reason = "update runs what is recorded"
-        scripts, labs = _unasked_lines(self.course, unasked_scripts, self.documents, reason)
+        scripts, labs = unasked_lines(self.course, unasked_scripts, self.documents, reason)
         report = judge(
             self.course,
             diagnostics,
@@ -300,13 +300,13 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
         diagnostics = [*parsed_course.diagnostics, *extracted_scripts.diagnostics, *refusals]
         if not remarks and all(not d.is_error for d in diagnostics):
             remarks.append("every script is extracted already")
-        scripts, labs = _unasked_lines(
+        scripts, labs = unasked_lines(
             course, extracted_scripts.extractions, None, "extract runs nothing"
         )
         return judge(course, diagnostics, began, scripts=scripts, labs=labs, remarks=tuple(remarks))
 
 
-def _unasked_lines(
+def unasked_lines(
     course: Course,
     extractions: Iterable[Extraction],
     documents: Collection[str] | None,

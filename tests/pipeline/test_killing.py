@@ -241,10 +241,12 @@ def test_import_killed_at_any_call_is_completed_by_the_same_command(
     template = Folder(tmp_path / "template")
     clock = "import time\nprint(time.time_ns())"
     template.write("old/1-one.md", "# One\n\n![x](x.png)\n\n" + python_cell(clock))
+    cells = ("1 / 0", "print(2)", "print(missing)", "print(3)")
     template.write("old/2-two.md", "# Two\n\n" + python_cell("import nowhere_to_be_found"))
+    template.write("old/3-three.md", "# Three\n\n" + "\n".join(map(python_cell, cells)))
     template.write("old/part/x.png", b"\x89PNG")
     template.write("new/mine.txt", "Mine.")
-    trials = Trials(mortals, template, tmp_path, "import", "old", "--out", "new")
+    trials = Trials(mortals, template, tmp_path, "import", "old", "--out", "new", "--prove")
     new, report = trials.new, remarks(mortals)
     assert "requires=nowhere_to_be_found" in report
     assert {"replace", "link", "write", "mkdir", "unlink"} <= {*trials.calls}

@@ -46,7 +46,7 @@ COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "help": (("help",), ("help", "bench"), ("--version",)),
     "import": tuple(
         ("import", "content/lessons", "--out", "../new", *options)
-        for options in ((), ("--sandbox",))
+        for options in ((), ("--prove", "--sandbox"))
     ),
     "init": (("init", "new"),),
     "new": (("new", "lesson", "1.2", "B"), ("new", "feature", "x"), ("new", "model", "y")),

@@ -14,7 +14,7 @@ FEATURE = Feature(
         Command(
             name="import",
             summary="convert a course that was written for another tool",
-            module="coursebuild.features.importer.commands",
+            module="coursebuild.features.importer.commands.import_course",
         ),
     ),
 )

@@ -10,7 +10,6 @@ import itertools
 import json
 import posixpath
 import re
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -20,13 +19,13 @@ from coursebuild.api import UsageError
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
+from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
 from coursebuild.features.importer.segments import read_segments
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedCourse,
     ImportedLevel,
     ImportedText,
-    Leftover,
     SourceFiles,
     stem_of,
     title_of_file,
@@ -47,6 +46,8 @@ _FIELD_NAMES: dict[str, str] = {
 }
 """The names of fields here, by the names they have in other dialects."""
 _COURSE_FIELDS = ("id", "title", "summary", "levels", "pages", "language")
+_GROUPS = ("levels", "lessons", "pages")
+"""Fields that hold further objects."""
 _LEVEL_FIELDS = ("id", "title", "summary", "lessons", "checkpoint")
 _LESSON_FIELDS = (
     *("id", "slug", "title", "summary", "file", "objectives", "prerequisites", "minutes"),
@@ -61,6 +62,7 @@ def read_course_json(path: str, files: SourceFiles) -> ImportedCourse:
         UsageError: it is no JSON, or holds no levels.
     """
     text = files.read_text(path)
+    files.account.changed["map", "content/course.toml"] += 1
     try:
         # A number such as 4.10 is the name of a lesson.
         data = json.loads(text, parse_float=str, parse_int=str)
@@ -68,7 +70,7 @@ def read_course_json(path: str, files: SourceFiles) -> ImportedCourse:
         raise UsageError(f"{path} is not JSON: the text is nested too deeply") from None
     except ValueError as error:
         raise UsageError(f"{path} is not JSON: {error}") from None
-    reader = _Reader(files)
+    reader = _Reader(path, files)
     course = reader.fields(data, _COURSE_FIELDS)
     levels = tuple(map(reader.level, _read_items(course, "levels")))
     if not levels:
@@ -80,27 +82,32 @@ def read_course_json(path: str, files: SourceFiles) -> ImportedCourse:
         levels=levels,
         pages=tuple(map(reader.lesson, _read_items(course, "pages"))),
         camera_is_position=True,
-        leftovers=tuple(
-            Leftover(path, "", f"`{key}` ({count} times), which a course map does not have")
-            for key, count in reader.unknown.items()
-        ),
     )
 
 
 class _Reader:
-    """Reads the objects of the file, and counts the fields that it does not know."""
+    """Reads the objects of the file, and notes the fields that a course map does not have."""
 
-    def __init__(self, files: SourceFiles) -> None:
-        self.files = files
-        self.unknown: Counter[str] = Counter()
-        """How often each unknown field occurs."""
+    def __init__(self, path: str, files: SourceFiles) -> None:
+        self.path, self.files = path, files
 
     def fields(self, value: Any, names: tuple[str, ...]) -> dict[str, Any]:
         """Return the fields of an object, by their names here; of these, `names` are expected."""
         if not isinstance(value, dict):
             raise UsageError("course.json: a level or a lesson is not an object")
-        self.unknown.update(key for key in value if _field_name(key) not in names)
-        return {_field_name(key): item for key, item in value.items()}
+        fields = {_field_name(key): item for key, item in value.items()}
+        owner = _read_text(fields, "id") or _read_text(fields, "title")
+        for key, item in value.items():
+            name = _field_name(key)
+            items = item if isinstance(item, list) else [item]
+            is_text = all(isinstance(part, str) for part in items)
+            if name in names and (is_text or name in _GROUPS):
+                self.files.account.taken[f"field `{name}` of the map"] += 1
+            else:
+                whole = json.dumps(item, ensure_ascii=False)
+                message = f"`{key}` of the map ({whole}), which has no field for it"
+                self.files.leave(self.path, message, f"field `{name}` of the map", owner)
+        return fields
 
     def level(self, value: object) -> ImportedLevel:
         level = self.fields(value, _LEVEL_FIELDS)
@@ -185,10 +192,12 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
 
     def read(text: ImportedText, id: str, used_ids: set[str] | None = None) -> ImportedText:
         try:
-            return _read_file(text, id, files, used_ids)
+            hides = course.has_hidden_lines
+            return _read_file(text, id, files, used_ids, has_hidden_lines=hides)
         except UsageError as error:
             errors.append(error)
-            files.leave(text.file, f"it {str(error).removeprefix(f'{text.file} ')}")
+            message = f"it {str(error).removeprefix(f'{text.file} ')}: a lesson without a text"
+            files.leave(text.file, message, "text")
             planned = replace(text, file="", title=text.title or title_of_file(text.file))
             return _read_file(planned, id, files)
 
@@ -207,6 +216,10 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
         title = level.title or f"Level {id}"
         levels.append(replace(level, id=id, title=title, lessons=tuple(lessons)))
     used_ids = {*RESERVED_IDS}
+    for page in course.pages:
+        if not page.file:
+            message = f"the page {page.title or page.old_id} of the map, whose file is not there"
+            files.leave(page.old_id or page.title, message, "page")
     pages = [read(page, "", used_ids) for page in course.pages if page.file]
     if errors and not any(
         t.path for t in (*pages, *(t for level in levels for t in level.lessons))
@@ -224,7 +237,12 @@ def _free_id(id: str, other_ids: Iterator[str], used_ids: set[str]) -> str:
 
 
 def _read_file(
-    text: ImportedText, id: str, files: SourceFiles, used_ids: set[str] | None = None
+    text: ImportedText,
+    id: str,
+    files: SourceFiles,
+    used_ids: set[str] | None = None,
+    *,
+    has_hidden_lines: bool = False,
 ) -> ImportedText:
     """Read the file of a lesson with this id, or of a page, whose id is made from its title.
 
@@ -235,12 +253,29 @@ def _read_file(
         title = title or id
         return replace(text, id=id, slug=slug_of(slug or title), title=title)
     try:
-        read = read_segments(files.read_text(text.file), text.file)
+        source = files.read_text(text.file)
+        if not text.file.endswith(".ipynb"):
+            source = expand_includes(source, text.file, files)
+        if text.file.endswith(".qmd"):  # there a tag need not be apart from a block
+            source = re.sub(
+                r"^([ \t]*</?[a-z][^<>\n]*>)[ \t]*\n(?=[ \t]*`{3})",
+                r"\1\n\n",
+                source,
+                flags=re.MULTILINE,
+            )
+            source = re.sub(
+                r"^([ \t]*`{3,}[ \t]*\n)(?=[ \t]*</)", r"\1\n", source, flags=re.MULTILINE
+            )
+        if has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
+            files.account.changed["hidden lines of Rust", "dropped: readers did not see them"] += 1
+            source = visible_text
+        read = read_segments(source, text.file)
     except RecursionError:
         raise UsageError(f"{text.file} is nested too deeply") from None
-    if read.lost:
-        names = ", ".join(f"`{name}`" for name in read.lost)
-        files.leave(text.file, f"metadata without a counterpart: {names}")
+    for name in read.lost:
+        message = f"`{name}` of its metadata, which a lesson does not have"
+        files.leave(text.file, message, "metadata of a text")
+    files.account.changed["text", "a lesson" if id else "a page"] += 1
     title = " ".join((title or read.title or title_of_file(text.file)).split())
     slug = slug_of(slug or title_of_file(text.file))
     if not re.search("[a-z]", slug):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.features.importer.prose import LessonContext
+from coursebuild.features.importer.context import LessonContext
 
 _BRACES = r"\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
 _STATEMENT = (
@@ -44,11 +44,12 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
         return part[0]
     if name is None:
         if part["statement"]:
-            context.add_leftover(f"`{part[0].splitlines()[0]}`, which is JavaScript")
+            message = f"`{part[0].splitlines()[0]}`, which is JavaScript"
+            context.leave("statement of JavaScript", message)
         return ""
     if name[0].isupper():
         if not part["end"]:
-            context.add_leftover(f"the component `<{name}>`; what it holds is shown")
+            context.leave("component", f"the component `<{name}>`; what it holds is shown")
         label = _LABEL.search(attributes)
         return f"**{label[1]}**" if label else ""
     attributes = _COMPUTED.sub(

@@ -8,132 +8,16 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Mapping
-from urllib.parse import unquote, urlsplit
+from urllib.parse import urlsplit
 
-from msgspec import Struct, field
-from msgspec.structs import replace
-
-from coursebuild.features.importer.source_files import (
-    TEXTS,
-    Leftover,
-    SourceFiles,
-    stem_of,
-    title_of_file,
+from coursebuild.features.importer.context import (
+    LessonContext,
+    formula_anchor,
+    label_anchor,
+    to_anchor,
 )
-
-
-class LessonContext(Struct, frozen=True, kw_only=True):
-    """Resolves what a lesson names while it is converted, and collects files and leftovers.
-
-    Lessons of a course, and places in a lesson, have contexts that collect together.
-    """
-
-    targets: Mapping[str, str]
-    """New addresses of lessons and pages, by the path of the old file without extension."""
-    ids: Mapping[str, str]
-    """New ids of lessons, by the old ones."""
-    labels: Mapping[str, str]
-    """The address of the lesson or page that sets an anchor, by the anchor."""
-    files: SourceFiles
-    camera_is_position: bool
-    path: str = ""
-    """The lesson's file, relative to the folder that is imported."""
-    pictures: Mapping[str, bytes] = {}
-    """Pictures that this file contains, by name."""
-    folder: str = ""
-    """The folder of the new file, such as `content/lessons`."""
-    place: str = ""
-    """The place in the lesson that is converted, as `line 12` or `cell 3`."""
-    is_mdx: bool = False
-    """Whether tags of the lesson may be components of JavaScript."""
-    depth: int = 0
-    """How many blocks are around the place."""
-    leftovers: list[Leftover] = field(default_factory=list)
-    copies: dict[str, bytes] = field(default_factory=dict)
-    """The files and pictures that the lesson uses, by their new paths."""
-    notebook_outputs: dict[str, str] = field(default_factory=dict)
-    """The notebooks whose recorded outputs are kept, by the paths of their scripts."""
-    callouts: dict[str, str] = field(default_factory=dict)
-    """Labels of kinds of callouts that coursebuild does not have, by kind."""
-
-    def at(self, place: str) -> LessonContext:
-        """Return the context of a place in the lesson."""
-        return replace(self, place=place)
-
-    def line_below(self, lines: int) -> LessonContext:
-        """Return the context of so many lines further down; a cell is a single place."""
-        kind, _, number = self.place.partition(" ")
-        return self.at(f"line {int(number) + lines}") if kind == "line" else self
-
-    def add_leftover(self, message: str) -> None:
-        """Note that something has no counterpart."""
-        self.leftovers.append(Leftover(self.path, self.place, message))
-
-    def resolve_link(self, address: str) -> str:
-        """Return the new address of a link; empty where nothing in the course has it."""
-        route = re.fullmatch(r"#?/lessons?/([^#?/]+)/?(#.*)?", address)
-        if route is not None:
-            id = self.ids.get(unquote(route[1]))
-            if id is None:
-                self.add_leftover(f"a link to `{address}`, a lesson that the map does not have")
-            return "" if id is None else f"lesson:{id}{route[2] or ''}"
-        parts = urlsplit(address)
-        if parts.scheme or parts.netloc or not parts.path:
-            return address
-        path = self.resolve_path(parts.path)
-        anchor = f"#{parts.fragment}" if parts.fragment else ""
-        target = self.targets.get(stem_of(path)) or self.targets.get(path)
-        if target is not None:
-            return target + anchor
-        if path in self.files:
-            return self.add_file(path)
-        if resolved := self.resolve_anchor(to_anchor(address)):
-            return resolved
-        self.add_leftover(f"a link to `{address}`, which is not in the folder")
-        return ""
-
-    def resolve_file(self, address: str) -> str:
-        """Return the new address of a file that HTML names; empty where the folder lacks it."""
-        path = self.resolve_path(urlsplit(address).path)
-        if path.endswith(TEXTS) or stem_of(path) in self.targets or path not in self.files:
-            return ""
-        return self.add_file(path)
-
-    def resolve_anchor(self, anchor: str) -> str:
-        """Return the address of an anchor; empty where no text of the course sets it."""
-        target = self.labels.get(anchor)
-        if target is None:
-            return ""
-        is_here = target == self.targets.get(stem_of(self.path))
-        return f"#{anchor}" if is_here else f"{target}#{anchor}"
-
-    def resolve_path(self, path: str) -> str:
-        """Return a path that the lesson names, relative to the folder that is imported."""
-        path = unquote(path)
-        resolved = posixpath.normpath(posixpath.join(posixpath.dirname(self.path), path))
-        if path.startswith("/"):
-            resolved = posixpath.normpath(path.lstrip("/"))
-        if file := self.files.find(resolved):
-            return file
-        if stem_of(resolved) in self.targets:
-            return resolved
-        return next((f for f in self.files if f.endswith("/" + path.lstrip("./"))), resolved)
-
-    def add_picture(self, name: str) -> str:
-        """Copy a picture that the lesson's file contains, and return its new address."""
-        file = re.sub(r"[^\w.+-]", "-", name)  # it is a name, whatever path it looks like
-        return self._add_copy(f"{stem_of(self.path)}/{file}", self.pictures[name])
-
-    def add_file(self, path: str) -> str:
-        """Copy a file of the folder, and return its new address."""
-        return self._add_copy(path, self.files.read(path))
-
-    def _add_copy(self, name: str, data: bytes) -> str:
-        path = f"content/files/{name}"
-        self.copies[path] = data
-        return posixpath.relpath(path, self.folder).replace(" ", "%20")
-
+from coursebuild.features.importer.roles import convert_code, convert_role, write_link
+from coursebuild.features.importer.source_files import title_of_file
 
 _ATTRIBUTES = (
     r"\{(?:[ ]*(?:#[\w:.-]+|\.[A-Za-z][\w:-]*"
@@ -148,18 +32,21 @@ _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`))"
     r"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>[^()\s]+)(?:[ \t]+\"[^\"\n]*\")?\)"
-    r"(?:\{[^{}\n]*\})?)"
+    r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
     r"\((?P<address>(?:[^()\s]|\([^()\s]*\))+)(?P<title>[ \t]+\"[^\"\n]*\")?\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
     r"|(?P<paren>\\\((?P<inner>(?>(?:(?!\\[()])[^\n])+))\\\))"
+    r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
     r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
     r"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@\w[\w:./-]*(?:[;,\s][^\[\]\n]*)?\])"
     r"|(?P<substitution>\{\{[^{}\n]*\}\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     r"|(?P<tail>\]\((?P<rest>[^()\s]+)(?=\)))"  # of a link whose text began a line above
+    r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:)"
+    r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>[a-z][a-z0-9-]*(?:\+[a-z0-9-]+)*)\+\+(?![\w+]))"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     r"|(?P<tag><(?i:a|img|source|video)[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
     r"|(?P<markdown>(?P<before><[a-z]\w*(?:[ ][^<>\n]*?)?)[ ]markdown(?:=[\"'\w]+)?(?=[ >]))"
@@ -191,6 +78,10 @@ _CAPTION = re.compile(
     re.MULTILINE,
 )
 """A caption of Quarto, below its table."""
+_MEANING = re.compile(
+    r"^(?<![^\n]\n)(?![|:#>\s<]|[-*+][ ])([^\n]*[^\s\n:])[ \t]*\n:[ \t]+(?=\S)", re.MULTILINE
+)
+"""A term in a paragraph of its own, and the mark of what it means."""
 _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
@@ -205,6 +96,52 @@ _CONTENTS = re.compile(r'<div class="toc">.*?</div>', re.DOTALL)
 """What an extension of Jupyter writes into the first cell; the page has its own."""
 
 
+_KEPT = {
+    re.compile(r"^[ >]*#{1,6}[ \t]+\S", re.MULTILINE): "heading",
+    re.compile(
+        r"^[ >]*\|?[ \t]*:?-+:?[ \t]*(?:\|[ \t]*:?-+:?[ \t]*)+\|?[ \t]*$", re.MULTILINE
+    ): "table",
+    re.compile(r"^\[\^[^\[\]\n]+\]:", re.MULTILINE): "footnote",
+    re.compile(r"^[ >]*(?:[-+*]|\d+[.)])[ \t]+\S", re.MULTILINE): "item of a list",
+    re.compile(r"<!--.*?-->", re.DOTALL): "comment",
+    re.compile(r"\$\$[^$]+\n[^$]*\$\$"): "formula",
+}
+"""What is Markdown here as well."""
+_OVER_LINES = re.compile(
+    r"\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
+    r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
+)
+"""A role or a note that goes on in the next line."""
+_FIGURE = re.compile(
+    r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"
+    r"\{#fig-(?P<label>[\w-]+)(?:[^{}\n]*?fig-alt=\"(?P<alternative>[^\"\n]*)\")?[^{}\n]*\}(?=\n|\Z)"
+)
+_KINDS = {
+    "role": ("", "Markdown"),
+    "code": ("code in a line", "code without the tool's mark"),
+    "image": ("picture", "its file is in content/files"),
+    "link": ("link", "its new address"),
+    "digits": ("formula", "the digits behind it are in it"),
+    "math": ("formula", "without blanks at its ends"),
+    "paren": ("formula", "between dollar signs"),
+    "note": ("footnote", "stands at the end of the lesson"),
+    "cross": ("cross-reference", "a link"),
+    "cite": ("citation", "in the words of BibTeX's keys"),
+    "substitution": ("substitution", "dropped: it changes no word"),
+    "mention": ("mention of a lesson", "its new number"),
+    "route": ("link", "its new address"),
+    "tail": ("link", "its new address"),
+    "icon": ("icon", "dropped: it is a picture of its tool"),
+    "keys": ("keys", "their names"),
+    "definition": ("link by reference", "its new address"),
+    "tag": ("tag of HTML", "its new address"),
+    "markdown": ("tag of HTML", "without `markdown`: its text always is"),
+    "attributes": ("attributes", "an anchor, or dropped: a page has its own look"),
+    "span": ("attributes", "its words alone"),
+}
+"""The kind of what a group of `_LINE` is, and how it is changed."""
+
+
 def rewrite_prose(text: str, context: LessonContext) -> str:
     """Return prose of any dialect as Markdown of coursebuild."""
 
@@ -214,10 +151,32 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
             return f'<a id="{anchor}"></a>'
         return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
+    account = context.files.account
     for active in _ACTIVE.finditer(text):
-        context.add_leftover(f"`<{active['name'].lower()}>`, which a page cannot have")
-    text = normalize_formulas(_COMMENT.sub("", _CONTENTS.sub("", _ACTIVE.sub("", text))))
-    text = _CAPTION.sub(_move_caption, _TARGET.sub(write_target, text))
+        message = (
+            f"`<{active['name'].lower()}>`, which a page cannot have: use a theme or a feature"
+        )
+        context.leave("tag of HTML", message)
+    text = _ACTIVE.sub("", text)
+    for pattern, kind in ((_CONTENTS, "table of contents"), (_COMMENT, "comment of MyST")):
+        text, count = pattern.subn("", text)
+        if count:
+            account.changed[kind, "dropped: readers did not see it, or the site has its own"] += (
+                count
+            )
+    for pattern, kind in _KEPT.items():
+        if count := len(pattern.findall(text)):
+            account.taken[kind] += count
+    text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
+    text, count = _TARGET.subn(write_target, text)
+    if count:
+        account.changed["label", "an anchor"] += count
+    text, count = _MEANING.subn(r"**\1**: ", text)
+    if count:
+        account.changed["definition", "behind its term, which is bold"] += count
+    text, count = _CAPTION.subn(_move_caption, text)
+    if count:
+        account.changed["caption of a table", "stands above it"] += count
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         fence_line = _FENCE.match(line)
@@ -226,11 +185,32 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         elif fence_line is not None and fence_line[1].startswith(mark):
             mark = "" if mark else fence_line[1]
         out.append(line)
-    return "\n".join(out)
+    return _FIGURE.sub(_write_figure, "\n".join(out))
+
+
+def _join_lines(match: re.Match[str]) -> str:
+    """Return a role or note on one line, and behind it the line ends that stood in it."""
+    lines = match[0].split("\n")
+    return " ".join(line.strip() for line in lines) + "\n" * (len(lines) - 1)
+
+
+def _write_figure(match: re.Match[str]) -> str:
+    """Return a labelled picture in a paragraph of its own, as Quarto has it, with its caption."""
+    alt = match["alternative"] or match["alt"]
+    return (
+        f"Figure: ![{alt}]({match['source']}) {match['alt']} {{#fig:{to_anchor(match['label'])}}}"
+    )
 
 
 def _rewrite_line(line: str, context: LessonContext) -> str:
-    return _LINE.sub(lambda match: _rewrite_match(match, context), line)
+    def rewrite(match: re.Match[str]) -> str:
+        group = match.lastgroup or ""
+        kind, change = _KINDS[group]
+        if group == "role":
+            kind = f"role `{{{match['name']}}}`"
+        return context.convert(kind, change, match[0], lambda: _rewrite_match(match, context))
+
+    return _LINE.sub(rewrite, line)
 
 
 def normalize_formulas(text: str) -> str:
@@ -263,73 +243,109 @@ def _label_formula(match: re.Match[str]) -> str:
     return f"$${tex}$$ {{#eq:{formula_anchor(label)}}}"
 
 
-def formula_anchor(label: str) -> str:
-    """Return the anchor of a formula, without the `eq` that other tools put before its name."""
-    return to_anchor(re.sub(r"^eq[-:._]", "", label))
-
-
-def to_anchor(name: str) -> str:
-    """Turn a name into an anchor."""
-    return re.sub("[^A-Za-z0-9]+", "-", name).strip("-").lower() or "x"
+_FIGURE_NAME = re.compile(
+    r"\{(?P<kind>figure|table|list-table)\}[^\n]*\n"
+    r"(?:[ \t]*(?::(?!name|label)[\w-]+:|---|(?!name)\w+:)[^\n]*\n)*"
+    r"[ \t]*:?(?:name|label):[ \t]*(?P<name>\S+)"
+)
 
 
 def find_anchors(text: str) -> set[str]:
     """Return the anchors that a text of any dialect sets, `eq:name` of formulas among them."""
+    labelled = [*_FIGURE_NAME.finditer(text)]
+    figures = {label_anchor(m["name"]) for m in labelled if m["kind"] == "figure"}
+    figures |= {to_anchor(match["label"]) for match in _FIGURE.finditer(text)}
+    cells = re.findall(r"^#\|[ \t]*label:[ \t]*fig-([\w-]+)", text, re.MULTILINE)
+    figures |= {to_anchor(label) for label in cells}
     anchors = {to_anchor(match["name"]) for match in _TARGET.finditer(text)}
     anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)\}", text)}
     for match in _DISPLAY.finditer(normalize_formulas(text)):
         anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", _label_formula(match)))
     labels = re.findall(r"^\s*:(?:label|name):[ \t]*(\S+)", text, re.MULTILINE)
     anchors |= {to_anchor(label) for label in labels}
-    return anchors | {f"eq:{formula_anchor(label)}" for label in labels}
+    anchors |= {f"eq:{formula_anchor(label)}" for label in labels}
+    anchors |= {f"tab:{to_anchor(label)}" for label in re.findall(r"\{#tbl-([\w-]+)", text)}
+    anchors |= {f"fig:{name}" for name in figures}
+    anchors |= {f"tab:{label_anchor(m['name'])}" for m in labelled if m["kind"] != "figure"}
+    return anchors - {to_anchor(match["name"]) for match in labelled}
 
 
 def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
     whole = match[0]
     match match.lastgroup:
         case "role":
-            return _convert_role(match["name"], match["body"], context)
+            return convert_role(match["name"], match["body"], context)
         case "image":
             alt = match["alt"]
             source = match["source"]
             if re.match("[a-z]+://|//", source):
-                context.add_leftover(f"a picture from another host, `{source}`; it is a link now")
+                message = f"a picture from another host, `{source}`; it is a link now"
+                context.leave("picture", message)
                 text, end = match.string, match.end()
                 is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
                 return (alt or source) if is_in_link else f"[{alt or source}]({source})"
             name, path = source.removeprefix("attachment:"), context.resolve_path(source)
+            dressing = match["dressing"] or ""
+            label = dressing if dressing.startswith("{#fig-") else ""
             if name in context.pictures:
-                return f"![{alt}]({context.add_picture(name)})"
+                return f"![{alt}]({context.add_picture(name)}){label}"
             if path in context.files:
-                return f"![{alt}]({context.add_file(path)})"
-            context.add_leftover(f"the picture `{source}`, which is not in the folder")
+                return f"![{alt}]({context.add_file(path)}){label}"
+            context.leave("picture", f"the picture `{source}`, which is not in the folder")
             return alt
         case "link":
             text, address = match["text"], context.resolve_link(match["address"])
             if not text and not re.match("#|lesson:|page:", address):  # its tool knows a title
                 text = title_of_file(re.split("[:#]", match["address"])[-1])
-            return _write_link(_rewrite_line(text, context), address, match["title"] or "")
+            return write_link(_rewrite_line(text, context), address, match["title"] or "")
         case "paren":
             return f"${match['inner'].strip()}$"
+        case "note":
+            context.notes.append(_rewrite_line(match["remark"], context))
+            return f"[^note-{len(context.notes)}]"
+        case "math":
+            return (
+                whole if _WORD.search(whole) else _TIGHT.sub(lambda m: f"${m[1].strip()}$", whole)
+            )
+        case "code":
+            return convert_code(whole, context)
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":
             kind = match["kind"]
             label = match["label"]
             if kind == "eq":
-                return _write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
+                return write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
             if kind == "sec":
-                return _write_link(
-                    "this section", context.resolve_anchor(f"sec-{to_anchor(label)}")
-                )
-            context.add_leftover(f"the reference `{whole}`: figures and tables have no numbers")
-            return {"fig": "the figure", "tbl": "the table", "lst": "the listing"}[kind]
-        case "cite" | "substitution":
-            context.add_leftover(f"`{whole}`, which is shown as code")
+                return write_link("this section", context.resolve_anchor(f"sec-{to_anchor(label)}"))
+            kind = kind.replace("tbl", "tab")
+            if address := context.resolve_anchor(f"{kind}:{to_anchor(label)}"):
+                return write_link("", address)
+            message = f"the reference `{whole}` to what no text labels: write what is meant"
+            context.leave("cross-reference", message)
+            return {"fig": "the figure", "tab": "the table", "lst": "the listing"}[kind]
+        case "cite":
+            keys = _CITED_KEY.findall(whole)
+            if keys and context.are_sources(keys):
+                return whole
+            message = f"`{whole}`, a source that no BibTeX file of the folder has; it is code now"
+            context.leave("citation", message)
+            return f"`{whole}`"
+        case "substitution":
+            if re.fullmatch(r"\{\{<\s*pagebreak\s*>\}\}", whole):
+                return ""
+            message = (
+                f"`{whole}`, which its tool replaces; it is code now: write what it stands for"
+            )
+            context.leave("substitution", message)
             return f"`{whole}`"
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
+        case "icon":
+            return ""
+        case "keys":
+            return "+".join(key.capitalize() for key in match["stroke"].split("+"))
         case "route":
             return context.resolve_link(whole) or whole
         case "tail":
@@ -371,45 +387,22 @@ def _convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
     if re.match(r"[a-z][a-z+.-]*:|//|#", address):
         if name not in ("img", "source") or not re.match("https?://|//", address):
             return tag
-        context.add_leftover(f"a picture from another host, `{address}`; it is a link now")
+        message = f"a picture from another host, `{address}`; it is a link now"
+        context.leave("tag of HTML", message)
         words = words or posixpath.basename(urlsplit(address).path)
         link = words if is_in_link else f'<a href="{address}">{words}</a>'
         return link if name == "img" else ""
     before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
     if new_address := context.resolve_file(address):
         return before + new_address + after
-    context.add_leftover(f"the file `{address}`, which is not in the folder")
+    context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
     if name == "img":
         return words
     return tag[: attribute.start()].rstrip() + after[1:]
 
 
-def _write_link(text: str, address: str, title: str = "") -> str:
-    return f"[{text}]({address}{title})" if address else text
-
-
-def _convert_role(name: str, body: str, context: LessonContext) -> str:
-    parts = re.fullmatch(r"(?P<words>.*\S)\s*<(?P<target>[^<>]+)>", body)
-    words, target = (parts["words"], parts["target"]) if parts else ("", body)
-    match name:
-        case "math":
-            return f"${body}$"
-        case "eq":
-            return _write_link(words, context.resolve_anchor(f"eq:{formula_anchor(target)}"))
-        case "doc":
-            return _write_link(words or title_of_file(target), context.resolve_link(f"{target}.md"))
-        case "ref" | "numref":
-            return _write_link(
-                words or title_of_file(target), context.resolve_anchor(to_anchor(target))
-            )
-        case "download":
-            return _write_link(words or target, context.resolve_link(target))
-        case "term":
-            return words or target
-        case "abbr" | "kbd" | "sub" | "sup":
-            return body
-        case "code" | "file" | "command" | "func" | "class" | "mod" | "py:func" | "py:class":
-            return f"`{words or target}`"
-        case _:
-            context.add_leftover(f"the role `{{{name}}}`; its text is shown as code")
-            return f"`{body}`"
+_CITED_KEY = re.compile(r"(?<![\w@])@([\w][\w:./-]*\w|\w)")
+_TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*)\$(?!\$)")
+"""A formula with blanks at its ends, which some tools allow."""
+_WORD = re.compile(r"(?<![\\A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
+"""What no formula holds outside of its commands, but a sentence between two prices does."""

@@ -44,22 +44,56 @@ class _Text(Struct, frozen=True):
 def complete_texts(
     texts: Mapping[str, tuple[str, str]],
     resolve_label: Callable[[str, str], str],
+    leave_tag: Callable[[str, str], None],
     callouts: frozenset[str],
 ) -> Iterator[str]:
     """Yield the new texts of lessons and pages, each by its link and with its title, completed.
 
     `resolve_label` gives the address of an anchor for a link in a text; empty if no text sets it.
+    `leave_tag` is told of the HTML in a text that a page cannot hold, and that is dropped.
     """
-    read = {link: _read(link, title, text, callouts) for link, (title, text) in texts.items()}
+    read = {
+        link: _read(link, title, text, leave_tag, callouts) for link, (title, text) in texts.items()
+    }
     for link, text in read.items():
         edits = {edit.span.start: edit for edit in _edit_links(link, read, resolve_label)}
         edits |= {edit.span.start: edit for edit in _carry_macros(text.document)}
         yield _GONE.sub("", apply_edits(text.document.source.text, edits.values()))
 
 
-def _read(link: str, title: str, text: str, callouts: frozenset[str]) -> _Text:
-    source = Source(link, text)
-    document = parse_document(source, callouts, lesson=link.startswith("lesson:")).value
+_PASSES = 3
+"""How often HTML is dropped: an end whose beginning was dropped is seen the next time."""
+_WITH_CONTENT = re.compile(r"<(script|style)\b.*?(?:</\1\s*>|\Z)", re.DOTALL | re.IGNORECASE)
+
+
+def _read(
+    link: str,
+    title: str,
+    text: str,
+    leave_tag: Callable[[str, str], None],
+    callouts: frozenset[str],
+) -> _Text:
+    for _ in range(_PASSES):
+        source = Source(link, text)
+        parse = parse_document(source, callouts, lesson=link.startswith("lesson:"))
+        document, edits = parse.value, dict[int, Edit]()
+        spans = [
+            *(part.span for html in _raw_html(document) for part in html.forbidden),
+            *(d.span for d in parse.diagnostics if d.rule == "html-unbalanced"),
+        ]
+        for span in spans:
+            whole = _WITH_CONTENT.match(text, span.start)
+            end = whole.end() if whole is not None else span.end
+            if span.start not in edits:
+                edits[span.start] = Edit(Span(source, span.start, end), "")
+                leave_tag(link, text[span.start : end])
+        for html in _raw_html(document):
+            for media in html.media:
+                if re.match("https?://|//", media.url):
+                    edits |= _link_to_picture(source, media.span, link, leave_tag)
+        if not edits:
+            break
+        text = apply_edits(text, _without_overlaps(edits))
     names = [name for name, _, _ in model.document_anchors(document)]
     headings = {
         block.anchor: re.sub(r"^#+[ \t]*|[ \t]*(?:\{#[^{}]*\}|#+)?\s*$", "", block.span.text)
@@ -70,6 +104,33 @@ def _read(link: str, title: str, text: str, callouts: frozenset[str]) -> _Text:
     }
     anchors |= {_letters(name): name for name in reversed(names)} | {name: name for name in names}
     return _Text(document, title, anchors, headings)
+
+
+def _link_to_picture(
+    source: Source, address: Span, link: str, leave_tag: Callable[[str, str], None]
+) -> dict[int, Edit]:
+    """Return the edit that makes a picture from another host in HTML a link; none in other tags."""
+    start, end = source.text.rfind("<", 0, address.start), source.text.find(">", address.end) + 1
+    tag = source.text[start:end]
+    if not tag.lower().startswith("<img"):
+        return {}
+    leave_tag(link, tag)
+    alt = re.search(r"\salt=[\"']([^\"']+)", tag)
+    words = alt[1] if alt else address.text.rpartition("/")[2]
+    return {start: Edit(Span(source, start, end), f'<a href="{address.text}">{words}</a>')}
+
+
+def _raw_html(document: model.Document) -> Iterator[model.HtmlBlock | model.RawInline]:
+    yield from model.find_blocks(document, model.HtmlBlock)
+    yield from model.find_inlines(document, model.RawInline)
+
+
+def _without_overlaps(edits: Mapping[int, Edit]) -> Iterator[Edit]:
+    end = 0
+    for start, edit in sorted(edits.items()):
+        if start >= end:
+            yield edit
+            end = edit.span.end
 
 
 def _letters(anchor: str) -> str:
@@ -105,7 +166,9 @@ def _edit_links(
             text = texts.get(start or link, text)
             if target_anchor not in text.anchors:
                 if reference := _REFERENCE.fullmatch(inline.span.text):
-                    yield Edit(inline.span, reference[1] or title_of_file(anchor))
+                    yield Edit(
+                        inline.span, reference[1] or title_of_file(anchor.rpartition(":")[2])
+                    )
                 continue
             yield Edit(span, address)
         if inline.span.text.startswith("[]("):

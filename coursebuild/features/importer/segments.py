@@ -7,7 +7,6 @@ import binascii
 import json
 import re
 import textwrap
-import tomllib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -18,7 +17,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import UsageError
-from coursebuild.features.importer.source_files import Segment, read_yaml
+from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
 _TAB = re.compile(r" {0,3}===[!+]?[ \t]+([\"'])(.*)\1[ \t]*\n?")
@@ -38,7 +37,7 @@ _TITLE = re.compile(
 
 _SUMMARIES = ("description", "abstract", "subtitle")
 """Keys of front matter whose text becomes a lesson's summary; the first that there is."""
-_NEEDLESS = ("title", "jupyter", "jupytext", "kernelspec", "language_info")
+_NEEDLESS = ("title", "jupyter", "jupytext", "kernelspec", "language_info", "sidebar_position")
 """Further keys of which nothing is lost."""
 
 
@@ -111,6 +110,27 @@ def read_segments(text: str, name: str) -> ReadText:
     )
 
 
+_GATES = re.compile(
+    r"^(?P<mark>`{3,}|~{3,}|:{3,})\{(?P<name>exercise|solution)-start\}"
+    r"(?P<head>.*\n(?:[ \t]*:.*\n)*)"
+    r"(?P=mark)[ \t]*\n(?P<body>.*?)^(?P=mark)\{(?P=name)-end\}[ \t]*\n(?P=mark)[ \t]*$",
+    re.MULTILINE | re.DOTALL,
+)
+"""An exercise or a solution of MyST between a block that begins it and one that ends it."""
+
+
+_HINT = re.compile(
+    r"^\{% hint style=\"(\w+)\" %\}[ \t]*\n(.*?)\n?^\{% endhint %\}[ \t]*$",
+    re.MULTILINE | re.DOTALL,
+)
+"""A callout of GitBook."""
+
+
+def _join_gates(gates: re.Match[str]) -> str:
+    mark = "`" * 12
+    return f"{mark}{{{gates['name']}}}{gates['head']}\n{gates['body']}\n{mark}"
+
+
 def lower_titles(text: str) -> str:
     """Return prose within another block with its headings of level 1 on level 2."""
     return _TITLE.sub(lambda heading: f"## {heading['line'] or heading['text']}", text)
@@ -119,10 +139,7 @@ def lower_titles(text: str) -> str:
 def _read_front_matter(match: re.Match[str]) -> Any:
     if match["toml"] is None:
         return read_yaml(match["yaml"] or "{}")
-    try:
-        return tomllib.loads(match["toml"])
-    except (tomllib.TOMLDecodeError, RecursionError):
-        return None
+    return read_toml(match["toml"])
 
 
 def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[Segment]:
@@ -131,6 +148,7 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
     Plain blocks in quotations and lists remain part of the prose. Around others, a quotation is a
     block.
     """
+    text = _HINT.sub(r"::::::\1\n\2\n::::::", _GATES.sub(_join_gates, text))
     lines = text.split("\n")
     at = 0
     for (start, end), mark, head, content in (*_find_blocks(text), ([len(lines)] * 2, "", "", "")):
@@ -200,6 +218,37 @@ def _parse_div(state: StateBlock, start: int, end: int, silent: bool) -> bool:
     return True
 
 
+_SLASHES = re.compile(r" {0,3}(/{3,})[ \t]*(.*?)[ \t]*\n?")
+
+
+def _parse_slashes(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """Parse a block between slashes, as extensions of MkDocs have it: they nest by their number."""
+
+    def match_slashes(number: int) -> re.Match[str] | None:
+        return _SLASHES.fullmatch(state.getLines(number, number + 1, state.blkIndent, False))
+
+    opening = match_slashes(start)
+    if opening is None or not re.match(r"[A-Za-z]", opening[2]):
+        return False
+    last = next(
+        (
+            number
+            for number in range(start + 1, end)
+            if (slashes := match_slashes(number)) and slashes[1] == opening[1] and not slashes[2]
+        ),
+        None,
+    )
+    if last is None:
+        return False
+    if not silent:
+        token = state.push("slashes", "", 0)
+        token.markup, token.info = opening[1], opening[2]
+        token.content = state.getLines(start + 1, last, state.sCount[start], True)
+        state.line = last + 1
+        token.map = [start, state.line]
+    return True
+
+
 def _parse_tab(state: StateBlock, start: int, end: int, silent: bool) -> bool:
     """Parse a tab of MkDocs: a title, and indented lines."""
     title = _TAB.fullmatch(state.getLines(start, start + 1, state.blkIndent, False))
@@ -221,9 +270,9 @@ def _parse_tab(state: StateBlock, start: int, end: int, silent: bool) -> bool:
 
 
 _QUOTE = re.compile(r"^ {0,3}> ?")
-_BLOCKS = ("fence", "div", "tab", "admonition_open")
+_BLOCKS = ("fence", "div", "slashes", "tab", "admonition_open")
 _PARSER = MarkdownIt("commonmark").use(admon_plugin)
-for _name, _parse in (("div", _parse_div), ("tab", _parse_tab)):
+for _name, _parse in (("div", _parse_div), ("slashes", _parse_slashes), ("tab", _parse_tab)):
     _PARSER.block.ruler.before("fence", _name, _parse, {"alt": ["paragraph", "list", "blockquote"]})
 
 
@@ -266,6 +315,11 @@ def _read_cells(
                 shows_value=bool(values),
                 printed="".join(_join_lines(stream.get("text") or "") for stream in streams),
                 value="\n".join(map(_join_lines, value_texts)),
+                has_picture=any(
+                    kind.startswith("image/") for o in outputs for kind in o.get("data") or ()
+                )
+                if outputs
+                else None,
             )
             segments.append(cell_segment)
         elif source.strip():

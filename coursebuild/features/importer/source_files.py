@@ -11,6 +11,7 @@ import os
 import posixpath
 import re
 import stat
+import tomllib
 from collections.abc import Iterator, Mapping, ValuesView
 from pathlib import Path
 from typing import Any, Literal
@@ -21,16 +22,7 @@ from msgspec import Struct
 from coursebuild.api import UsageError
 from coursebuild.core.files.errors import reason
 from coursebuild.core.values import DAMAGE
-
-
-class Leftover(Struct, frozen=True, order=True):
-    """Something that has no counterpart, or that the author has to look at."""
-
-    path: str
-    """The file, relative to the folder that is imported."""
-    place: str
-    """Where in the file, as `line 12` or `cell 3`; may be empty."""
-    message: str
+from coursebuild.features.importer.account import Account, Leftover
 
 
 class Segment(Struct, frozen=True, kw_only=True):
@@ -54,6 +46,8 @@ class Segment(Struct, frozen=True, kw_only=True):
     """Of a cell: what it printed, as recorded."""
     value: str = ""
     """Of a cell: the value that was shown, as recorded."""
+    has_picture: bool | None = None
+    """Of a cell: whether a picture is recorded below it; `None` where no output is recorded."""
 
 
 class ImportedText(Struct, frozen=True, kw_only=True):
@@ -104,9 +98,10 @@ class ImportedCourse(Struct, frozen=True, kw_only=True):
     language: str = ""
     levels: tuple[ImportedLevel, ...]
     pages: tuple[ImportedText, ...] = ()
+    has_hidden_lines: bool = False
+    """Whether lines of Rust that begin with `# ` are hidden from readers."""
     camera_is_position: bool = False
     """Whether the angles of a lab's camera give its position as seen from its target."""
-    leftovers: tuple[Leftover, ...] = ()
 
 
 _YAML_SIZE, _YAML_DEPTH = 100_000, 100
@@ -139,6 +134,14 @@ def read_yaml(text: str) -> Any:
         if count > _YAML_SIZE or depth > _YAML_DEPTH:
             return None
     return value
+
+
+def read_toml(text: str) -> Mapping[str, Any] | None:
+    """Return the value of a TOML text; `None` where it is invalid."""
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return None
 
 
 def stem_of(path: str) -> str:
@@ -196,7 +199,7 @@ class SourceFiles:
         self.folder = place.parent if self.is_single else place
         self.name = stem_of(place.name) if self.is_single else place.name
         """What the new folder is called, and the course where nothing else gives it a title."""
-        self.leftovers: list[Leftover] = []
+        self.account = Account()
         self.read_paths: set[str] = set()
         self._real_paths: dict[str, str] = {}
         """The path of each file without links, by its path."""
@@ -319,11 +322,9 @@ class SourceFiles:
         is_public = not any(map(_is_skipped, (*path.split("/"), *real.split("/"))))
         return is_public and Path(self.folder, real).is_file()
 
-    def leave(self, path: str, message: str) -> None:
+    def leave(self, path: str, message: str, kind: str = "file", place: str = "") -> None:
         """Note that something is not imported, and why."""
-        leftover = Leftover(path, "", " ".join(message.split()))
-        if leftover not in self.leftovers:
-            self.leftovers.append(leftover)
+        self.account.leave(Leftover(path, place, " ".join(message.split()), kind))
 
 
 _LINK_OUT = "a link leads out of the folder, and nothing behind it is read"

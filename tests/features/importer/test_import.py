@@ -49,7 +49,7 @@ def test_imported_course_builds_without_an_edit(
     shutil.copytree(HERE / case / "source", source)
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
-    assert main(["import", str(source)]) == 0
+    assert main(["import", str(source), "--prove"]) == 0
     report = capsys.readouterr().out.split("\n\n")[1].replace(str(tmp_path), "…") + "\n"
     files = {**texts(tmp_path / "here" / case), "report.txt": report.encode()}
     assert main(["-C", case, "build", "--quiet"]) == 0, capsys.readouterr().out
@@ -237,6 +237,7 @@ def test_single_file_is_imported_with_what_it_names(
     files = texts(tmp_path / "beats")
     assert sorted(files) == [
         ".gitignore",
+        "IMPORT.md",
         "content/course.toml",
         "content/files/beats/1-..-..-..-..-a.png",
         "content/files/img/x.png",
@@ -261,9 +262,10 @@ def test_cells_of_strangers_run_in_the_sandbox_or_not_at_all(
     assert "`--sandbox` needs Bubblewrap" in capsys.readouterr().err
     assert not (tmp_path / "one").exists() and not escape.exists()
     require_sandbox(tmp_path)
-    assert main(["import", "one.ipynb", "--sandbox"]) == 0
+    assert main(["import", "one.ipynb", "--sandbox", "--prove"]) == 0
     assert (tmp_path / "one" / "examples" / "l1_1_one.py").exists() and not escape.exists()
-    assert main(["import", "one.ipynb", "--out", "trusted"]) == 0 and escape.exists()
+    assert main(["import", "one.ipynb", "--out", "trusted"]) == 0 and not escape.exists()
+    assert main(["-C", "trusted", "import", "--prove"]) == 0 and escape.exists()
 
 
 @pytest.mark.parametrize("opening", ["::: {.callout-tip}\n", "````{note}\n"])

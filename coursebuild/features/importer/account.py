@@ -1,0 +1,122 @@
+"""The account of an import: everything that the source holds, by kind: taken, changed or left.
+
+A thing counts once: as taken where it is as it was, as changed where it says the same in another
+way, and as left where something of it is missing in the new course, with what can be done.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator
+
+from msgspec import Struct
+
+from coursebuild.report.values import plural
+
+
+class Leftover(Struct, frozen=True, order=True):
+    """Something that has no counterpart, or that the author has to look at."""
+
+    path: str
+    """The file, relative to the folder that is imported."""
+    place: str
+    """Where in the file, as `line 12` or `cell 3`; may be empty."""
+    message: str
+    """Why it is left, and what can be done."""
+    kind: str = "file"
+
+    @property
+    def position(self) -> str:
+        """The file, and the place in it."""
+        return f"{self.path}, {self.place}" if self.place else self.path
+
+
+_MOST_PLACES = 12
+"""Places of one sort of leftover that are named."""
+_MOST_LINES = 40
+"""Leftovers that a report of the command names one by one."""
+
+
+class Account:
+    """Collects what became of everything."""
+
+    def __init__(self) -> None:
+        self.taken: Counter[str] = Counter()
+        self.changed: Counter[tuple[str, str]] = Counter()
+        """How often something of a kind was changed in a way."""
+        self._left: dict[Leftover, None] = {}
+
+    @property
+    def leftovers(self) -> list[Leftover]:
+        """What is left, in the order of files and places."""
+        return sorted(self._left, key=lambda leftover: (leftover.path, _numbers(leftover.place)))
+
+    def leave(self, leftover: Leftover) -> None:
+        """Note that something is left; the same twice is one."""
+        self._left[leftover] = None
+
+    def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
+        """Return what a part of a text becomes, and note what that is: kept, changed or left.
+
+        It is left where a leftover of this kind is noted meanwhile.
+        """
+        before = len(self._left)
+        new = convert()
+        if any(leftover.kind == kind for leftover in [*self._left][before:]):
+            return new
+        if new.strip() == old.strip():
+            self.taken[kind] += 1
+        else:
+            self.changed[kind, change] += 1
+        return new
+
+    def summary(self) -> Iterator[str]:
+        """Yield the lines of a report: counts, then what is left, the first of many."""
+        left = self.leftovers
+        counts = f"{self.taken.total()} taken, {self.changed.total()} changed, {len(left)} left"
+        yield f"{counts}: IMPORT.md lists them by kind"
+        for leftover in left[:_MOST_LINES]:
+            yield f"left: {leftover.position}: {leftover.message}"
+        if rest := left[_MOST_LINES:]:
+            yield f"left: {len(rest)} more, which are in IMPORT.md"
+
+    def text(self, name: str) -> str:
+        """The text of IMPORT.md for a course that was called so."""
+        self.taken, self.changed = +self.taken, +self.changed
+        left = Counter(leftover.kind for leftover in self._left)
+        changed: Counter[str] = Counter()
+        for (kind, _), count in self.changed.items():
+            changed[kind] += count
+        lines = [
+            f"# What was imported from {name}",
+            "",
+            "Nothing here is part of the course: read it, and delete it.",
+            "",
+            "| what | as it was | changed | left |",
+            "| --- | ---: | ---: | ---: |",
+        ]
+        for kind in sorted({*self.taken, *changed, *left}):
+            counts = (self.taken[kind], changed[kind], left[kind])
+            lines.append(f"| {kind} | {' | '.join(str(count or '') for count in counts)} |")
+        if self.changed:
+            lines += ["", "## Changed", ""]
+            lines += (
+                f"- {kind}: {change} ({plural(count, 'time')})"
+                for (kind, change), count in sorted(self.changed.items())
+            )
+        if self._left:
+            lines += ["", "## Left", ""]
+        places = defaultdict[str, list[str]](list)
+        for leftover in self.leftovers:
+            places[leftover.message].append(leftover.position)
+        for message, positions in places.items():
+            lines.append(f"- {message}")
+            lines += (f"  - {position}" for position in positions[:_MOST_PLACES])
+            if rest := positions[_MOST_PLACES:]:
+                lines.append(f"  - {len(rest)} more")
+        return "\n".join(lines) + "\n"
+
+
+def _numbers(place: str) -> list[int]:
+    return [int(number) for number in re.findall(r"\d+", place)]

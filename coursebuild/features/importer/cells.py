@@ -1,0 +1,257 @@
+"""Cells of code: those of a lesson share their names, and become the parts of one script."""
+
+from __future__ import annotations
+
+import ast
+import re
+import warnings
+from collections.abc import Mapping
+
+from coursebuild.api import marks
+from coursebuild.features.importer.context import LessonContext, to_anchor
+from coursebuild.features.importer.prose import rewrite_prose
+from coursebuild.features.importer.source_files import Segment, read_yaml
+
+_OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULTILINE)
+"""An option of a cell, as Quarto and as MyST write it."""
+_TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
+_WINDOW = re.compile(r"^([ \t]*)plt\.show\(\)[ \t;]*$", re.MULTILINE)
+"""What opens a window where there is none."""
+_FIGURE = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
+_ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
+"""What colours text or moves the cursor in a terminal."""
+_MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
+
+
+def write_cell(cell: Segment, context: LessonContext) -> str:
+    """Return a cell as a part of the lesson's script, with what it prints and draws; or as code."""
+    context = context.at(cell.place)
+    account = context.files.account
+    if is_styling(cell):
+        context.leave("cell", "a cell that changes the look of its page, which the site has itself")
+        return ""
+    code = runnable_code(cell, context)
+    if not code:
+        if (magic := re.match(r"\s*%%(\w+).*\n", cell.text)) is not None:
+            return marks.fence(magic[1], cell.text[magic.end() :].strip("\n"))
+        shown_code = code_for_readers(cell)
+        return marks.fence("python", shown_code) if shown_code else ""
+    code, figure = _with_new_paths(code, context), ""
+    if _draws(cell, code):
+        if any(_PYPLOT.search(part) for part in (*context.parts, code)):
+            code, figure = _save_figure(cell, code, context)
+        else:
+            message = "a figure: save it in the script, and name it by `figure=`"
+            context.leave("figure of a cell", message)
+    word = " part" if context.parts else ""
+    context.parts.append(code)
+    account.changed["cell", "a part of the lesson's script"] += 1
+    blocks = [marks.fence(f"python file={context.script_path}{word}{how_shown(cell)}", code)]
+    if output := recorded_output(cell, code):
+        blocks.append(marks.fence("output", output))
+        account.taken["output that is recorded"] += 1
+        context.notebook_outputs.append((context.script_path, output))
+    return "\n\n".join((*blocks, figure) if figure else blocks)
+
+
+_PYPLOT = re.compile(
+    r"^[ \t]*(?:import matplotlib\.pyplot as plt|from matplotlib import pyplot as plt)", re.M
+)
+_DRAWN_TITLE = re.compile(r"\.(?:set_)?(?:sup)?title\(\s*[rf]?([\"'])((?:(?!\1).)+)\1")
+
+
+def _draws(cell: Segment, code: str) -> bool:
+    """Whether there is a figure below a cell, as it is recorded, or as its own statements say."""
+    if cell.has_picture is not None:
+        return cell.has_picture
+    return any(
+        _FIGURE.search(ast.unparse(statement))
+        for statement in ast.parse(code).body
+        if not isinstance(statement, ast.FunctionDef | ast.ClassDef | ast.AsyncFunctionDef)
+    )
+
+
+def _save_figure(cell: Segment, code: str, context: LessonContext) -> tuple[str, str]:
+    """Return code that saves what it draws, and the paragraph that shows it."""
+    options = options_of(cell)
+    title = _DRAWN_TITLE.search(code)
+    caption = options.get("fig-cap") or options.get("caption") or (title[2] if title else "")
+    caption = rewrite_prose(caption.strip("\"' ") or context.title, context)
+    alt = options.get("fig-alt", options.get("alt", "")).strip("\"' ") or caption
+    alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)
+    label = options.get("label", "")
+    mark = f" {{#fig:{to_anchor(label.removeprefix('fig-'))}}}" if label.startswith("fig-") else ""
+    stem = context.script_path.removeprefix("examples/").removesuffix(".py").replace("_", "-")
+    context.figures.append(f"{stem}-{len(context.figures) + 1}.svg")
+    name = context.figures[-1]
+    context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
+    lines = code.rstrip("\n").split("\n")
+    if lines[-1] == "pass":
+        del lines[-1]
+    code = "\n".join((*lines, f'plt.savefig("{name}")', 'plt.close("all")'))
+    return code, f"Figure: ![{alt}]({name}) {caption.rstrip()}{mark}"
+
+
+def options_of(cell: Segment) -> Mapping[str, str]:
+    """Return the options of a cell by their names, as Quarto and MyST write them."""
+    options = {quarto or myst: value.strip() for quarto, myst, value in _OPTION.findall(cell.text)}
+    if (head := _YAML_HEAD.match(cell.text)) is not None:
+        value = read_yaml(head[1])
+        pending = [value] if isinstance(value, dict) else []
+        while pending:
+            for name, inner in pending.pop().items():
+                if isinstance(inner, dict):
+                    pending.append(inner)
+                else:
+                    options[str(name)] = (
+                        " ".join(map(str, inner)) if isinstance(inner, list) else str(inner)
+                    )
+    return options
+
+
+def _with_new_paths(code: str, context: LessonContext) -> str:
+    """Return code that opens the files of the folder where they are in the new course."""
+    lines = code.encode().split(b"\n")
+    literals = [n for n in ast.walk(ast.parse(code)) if isinstance(n, ast.Constant)]
+    for literal in sorted(literals, key=lambda n: (n.lineno, n.col_offset), reverse=True):
+        if not isinstance(literal.value, str) or literal.lineno != literal.end_lineno:
+            continue
+        path = context.resolve_data(literal.value)
+        line, start, end = (
+            lines[literal.lineno - 1],
+            literal.col_offset,
+            literal.end_col_offset or 0,
+        )
+        if (
+            path
+            and path != literal.value
+            and line[start:end]
+            in (
+                f'"{literal.value}"'.encode(),
+                f"'{literal.value}'".encode(),
+            )
+        ):
+            lines[literal.lineno - 1] = line[:start] + f'"{path}"'.encode() + line[end:]
+            context.files.account.changed["path in a cell", "the new place of the file"] += 1
+    return b"\n".join(lines).decode()
+
+
+def is_styling(cell: Segment) -> bool:
+    """Whether a cell only changes the look of its page."""
+    return re.match(r"\s*%%(?:html|HTML|javascript|js|css)\b", cell.text) is not None or (
+        re.search(r"\bHTML\([\"']+\s*<style", cell.text) is not None
+    )
+
+
+def _without_host(text: str, context: LessonContext) -> str:
+    """Return code without the statements that import or use what only Google's Colab has."""
+    try:
+        statements = ast.parse(text).body
+    except (SyntaxError, ValueError, RecursionError):
+        return text
+    lines, names = text.split("\n"), set[str]()
+    for statement in statements:
+        match statement:
+            case ast.ImportFrom(module=str(module)) if (
+                module.partition(".")[0::2][0] == "google"
+                and "colab" in f"{module} {[a.name for a in statement.names]}"
+            ):
+                names |= {alias.asname or alias.name for alias in statement.names}
+            case ast.Import() if any(
+                alias.name.startswith("google.colab") for alias in statement.names
+            ):
+                pass
+            case ast.Expr() if names & {
+                n.id for n in ast.walk(statement) if isinstance(n, ast.Name)
+            }:
+                pass
+            case _:
+                continue
+        end = statement.end_lineno or statement.lineno
+        message = f"`{lines[statement.lineno - 1].strip()}`, which only Colab has"
+        context.leave("statement of a cell", message)
+        lines[statement.lineno - 1 : end] = [""] * (end - statement.lineno + 1)
+    return "\n".join(lines)
+
+
+_YAML_HEAD = re.compile(r"---[ \t]*\n(.*?)\n---[ \t]*(?:\n|\Z)", re.DOTALL)
+
+
+def recorded_output(cell: Segment, code: str) -> str:
+    """Return what is recorded of a cell which the script has as `code`: what it should print."""
+    output = ""
+    prints_value = code.count("print(") > cell.text.count("print(")
+    for text in (cell.printed, cell.value if prints_value else ""):
+        output += text and text.removesuffix("\n") + "\n"
+    return _ESCAPE.sub("", output).strip("\n")
+
+
+def how_shown(cell: Segment) -> str:
+    """Return the word for a cell whose code its tool folds or hides, after a blank."""
+    options = options_of(cell)
+    tags = cell.head + options.get("tags", "")
+    if "remove-input" in tags or options.get("echo") == "false":
+        return " hidden"
+    return " folded" if "hide-input" in tags or options.get("code-fold") == "true" else ""
+
+
+def code_for_readers(cell: Segment) -> str:
+    """Return a cell's code without the lines that only its tool understands."""
+    return _MAGIC.sub("", _OPTION.sub("", _YAML_HEAD.sub("", cell.text, count=1))).strip("\n")
+
+
+def runnable_code(cell: Segment, context: LessonContext) -> str:
+    """Return what the script runs of a cell; empty where that is nothing."""
+    options = options_of(cell)
+    text = _OPTION.sub("", _YAML_HEAD.sub("", cell.text, count=1))
+    if "raises-exception" in cell.head + options.get("tags", ""):
+        context.leave("cell", "a cell that is meant to fail is shown, not run")
+        return ""
+    if options.get("eval", "").lower() == "false":
+        context.leave("cell", "a cell that its tool does not run is shown, not run")
+        return ""
+    first, _, rest = text.lstrip("\n").partition("\n")
+    if _TIMING.fullmatch(first):
+        text = rest
+        context.leave("magic", f"`{first}`, which is for Jupyter alone")
+    elif first.startswith("%%"):
+        context.leave("cell", f"a cell of `{first.split()[0]}` is shown and not run")
+        return ""
+    for magic in _MAGIC.findall(text):
+        context.leave("magic", f"`{magic.strip()}`, which is for Jupyter alone")
+    text = _MAGIC.sub("", text)
+    text = _without_host(_WINDOW.sub(r"\1pass", text), context)
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            compile(text, "cell", "exec", dont_inherit=True)  # `await` outside functions too
+        tree = ast.parse(text)
+    except (SyntaxError, ValueError, RecursionError) as error:
+        context.leave("cell", f"a cell that is not Python is shown and not run: {error}")
+        return ""
+    if cell.shows_value is not False:
+        text = _print_last_value(cell, text, tree, context)
+    return text.strip()
+
+
+def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: LessonContext) -> str:
+    """Return the code with its last expression printed, since Jupyter shows its value."""
+    last = tree.body[-1] if tree.body else None
+    if not isinstance(last, ast.Expr) or text.rstrip().endswith(";"):
+        return text
+    if isinstance(last.value, ast.Call):
+        root: ast.expr = last.value.func
+        while isinstance(root, ast.Attribute | ast.Call):
+            root = root.func if isinstance(root, ast.Call) else root.value
+        drawing_names = ("print", "plt", "ax", "axs", "axes", "fig", "display")
+        if isinstance(root, ast.Name) and root.id in drawing_names:
+            return text
+        if not cell.shows_value:
+            name = ast.unparse(last.value.func)
+            context.leave(
+                "value of a cell", f"the value of `{name}(…)` is shown there if it has one"
+            )
+            return text
+    lines = text.split("\n")
+    before = "\n".join(lines[: last.lineno - 1])
+    lead = lines[last.lineno - 1].encode()[: last.col_offset].decode()
+    return f"{before}\n{lead}print({ast.get_source_segment(text, last.value)})"

@@ -1,0 +1,1 @@
+"""The command `import`, and what it does when it proves."""

@@ -1,0 +1,193 @@
+"""The map of a course as its tool has it: its order, its parts, and the titles that it gives.
+
+It is `_toc.yml` of Jupyter Book, `myst.yml` of MyST, `_quarto.yml` of Quarto, `mkdocs.yml` of
+MkDocs, `SUMMARY.md` of mdBook and GitBook, or the sidebars of Docusaurus; without one the files, in
+the order of their names, a folder for a level.
+"""
+
+from __future__ import annotations
+
+import itertools
+import posixpath
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from coursebuild.api import UsageError
+from coursebuild.features.importer.outlines import find_text, leave_entry, read_outline
+from coursebuild.features.importer.source_files import (
+    TEXTS,
+    ImportedCourse,
+    ImportedLevel,
+    ImportedText,
+    SourceFiles,
+    read_yaml,
+    title_of_file,
+)
+
+_NOT_LESSONS = ("readme", "license", "licence", "changelog", "contributing", "code_of_conduct")
+_PAGES = ("index", "intro", "introduction", "about")
+_TITLE_PATHS = ((), ("project",), ("book",), ("website",))
+"""Keys below which settings have the title of the course."""
+_LIST_KEYS = ("parts", "chapters", "sections", "children", "toc", "contents", "entries")
+_FILE_KEYS = ("file", "href", "part")
+_TITLE_KEYS = ("caption", "title", "section", "text", "part")
+_COURSE_KEYS = {"toc", "root", "site-url", "author", "authors", "version"}
+"""Keys that only the whole course has: a title next to them is not the title of a level."""
+
+
+def read_contents(files: SourceFiles) -> ImportedCourse:
+    """Read the course in a folder of notebooks or Markdown, or that of a single text.
+
+    Raises:
+        UsageError: there is nothing to import.
+    """
+    names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
+    myst, quarto, _, mkdocs = settings = [_read_settings(name, files) for name in names]
+    titles = [_get(mapping, *path, "title") for mapping in settings for path in _TITLE_PATHS]
+    titles.append(_get(mkdocs, "site_name"))
+    title = next((" ".join(text.split()) for text in titles if isinstance(text, str)), "")
+    parts = [
+        *_read_parts(_read_settings("_toc.yml", files), files),
+        *_read_parts(_get(myst, "project"), files),
+        *_read_parts(_get(quarto, "book", "chapters"), files),
+        *_read_parts(_get(quarto, "website", "sidebar"), files),
+        *_read_parts(_get(quarto, "book", "appendices"), files),
+        *_read_nav(_get(mkdocs, "nav"), str(_get(mkdocs, "docs_dir") or "docs"), files),
+    ]
+    outline = None if parts else read_outline(files)
+    if outline is not None:
+        title, parts = outline.title or title, [*outline.parts]
+    parts = parts or [*_group_by_folder(files)]
+    if not parts:
+        left = [f"{left.path}: {left.message}" for left in files.account.leftovers[:3]]
+        message = "there is nothing to import: no course.json, no notebook and no Markdown file"
+        raise UsageError(message, help="; ".join(left))
+    for name, mapping in zip(names, settings, strict=True):
+        for key in _lost_keys(mapping):
+            message = f"the setting `{key}`, which a course does not have"
+            files.leave(name, message, "setting")
+    texts = [] if files.is_single else [part for part in parts if isinstance(part, ImportedText)]
+    pages = [text for text in texts if _base_name(text.file) in _PAGES]
+    if outline is not None:
+        pages = [*outline.pages]
+    # A level for each group, and one for each run of lessons outside groups
+    levels: list[ImportedLevel] = []
+    for kind, run in itertools.groupby((part for part in parts if part not in pages), type):
+        if kind is ImportedText:
+            levels.append(ImportedLevel(title=title or "Lessons", lessons=tuple(_flatten(run))))
+        else:
+            levels += (part for part in run if isinstance(part, ImportedLevel))
+    return ImportedCourse(
+        title=title or title_of_file(files.name),
+        levels=tuple(levels),
+        pages=tuple(pages),
+        has_hidden_lines=outline is not None and outline.has_hidden_lines,
+    )
+
+
+def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
+    path = next((path for path in (name, name.replace(".yml", ".yaml")) if path in files), None)
+    if path is None:
+        return {}
+    value = read_yaml(files.read_text(path))
+    files.account.changed["map", "content/course.toml"] += 1
+    if value is None:
+        raise UsageError(f"{path} is not YAML, or too large")
+    return value if isinstance(value, dict) else {"chapters": value}
+
+
+_SETTINGS = (
+    "bibtex_bibfiles",
+    "bibliography",
+    "appendices",
+    "title",
+    "site_name",
+    "nav",
+    "docs_dir",
+    "toc",
+    "chapters",
+    "sidebar",
+    "root",
+)
+"""Keys of settings that are read."""
+
+
+def _lost_keys(settings: Mapping[str, Any]) -> Iterator[str]:
+    for key, value in settings.items():
+        if key in ("project", "book", "website") and isinstance(value, Mapping):
+            yield from (f"{key}.{inner}" for inner in _lost_keys(value))
+        elif key not in _SETTINGS:
+            yield key
+
+
+def _get(settings: object, *path: str) -> object:
+    """Return the value at a path of nested keys; `None` where there is none."""
+    for key in path:
+        settings = settings.get(key) if isinstance(settings, Mapping) else None
+    return settings
+
+
+def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
+    if isinstance(value, str):
+        if path := find_text(value, files):
+            yield ImportedText(file=path)
+        elif "*" not in value and value != "auto":
+            leave_entry("the map", value, files)
+    elif isinstance(value, list):
+        for item in value:
+            yield from _read_parts(item, files)
+    elif isinstance(value, Mapping):
+        yield from _read_parts(value.get("root"), files)
+        inside = [part for key in _LIST_KEYS for part in _read_parts(value.get(key), files)]
+        path = next((path for key in _FILE_KEYS if (path := find_text(value.get(key), files))), "")
+        label = next((str(value[key]) for key in _TITLE_KEYS if value.get(key)), "")
+        title = "" if find_text(label, files) else label
+        heads = [ImportedText(file=path, title=title)] if path else []
+        if inside and (path or (title and not _COURSE_KEYS & value.keys())):
+            lessons = tuple(_flatten([*heads, *inside]))
+            yield ImportedLevel(title=title or title_of_file(path), lessons=lessons)
+        else:
+            yield from (*heads, *inside)
+
+
+def _flatten(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[ImportedText]:
+    for part in parts:
+        yield from (part,) if isinstance(part, ImportedText) else part.lessons
+
+
+def _read_nav(
+    entries: object, folder: str, files: SourceFiles
+) -> Iterator[ImportedText | ImportedLevel]:
+    """Yield the entries of MkDocs' `nav`: a file, or a title with a file or further entries."""
+    for entry in entries if isinstance(entries, list) else ():
+        for title, value in entry.items() if isinstance(entry, Mapping) else [("", entry)]:
+            if isinstance(value, list):
+                if inside := tuple(_flatten(_read_nav(value, folder, files))):
+                    yield ImportedLevel(title=str(title), lessons=inside)
+            elif path := find_text(posixpath.join(folder, str(value)), files):
+                yield ImportedText(file=path, title=str(title))
+            else:
+                leave_entry("mkdocs.yml", str(value), files)
+
+
+def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
+    def natural_order(path: str) -> list[tuple[int, int | str]]:
+        parts = re.split(r"(\d+)", path)
+        return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
+
+    texts = sorted((path for path in files if path.endswith(TEXTS)), key=natural_order)
+    for folder, paths in itertools.groupby(texts, posixpath.dirname):
+        lessons = [
+            ImportedText(file=path)
+            for path in paths
+            if files.is_single or _base_name(path) not in _NOT_LESSONS
+        ]
+        if folder and lessons:
+            yield ImportedLevel(title=title_of_file(folder), lessons=tuple(lessons))
+        else:
+            yield from lessons
+
+
+def _base_name(path: str) -> str:
+    return posixpath.basename(path).split(".")[0].lower()

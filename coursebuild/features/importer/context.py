@@ -1,0 +1,185 @@
+"""What a lesson names, while it is converted: files, other lessons, anchors, sources."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Callable, Mapping, Sequence
+from urllib.parse import unquote, urlsplit
+
+from msgspec import Struct, field
+from msgspec.structs import replace
+
+from coursebuild.features.importer.source_files import TEXTS, SourceFiles, stem_of
+
+
+class LessonContext(Struct, frozen=True, kw_only=True):
+    """Resolves what a lesson names while it is converted, and collects files and leftovers.
+
+    Lessons of a course, and places in a lesson, have contexts that collect together.
+    """
+
+    targets: Mapping[str, str]
+    """New addresses of lessons and pages, by the path of the old file without extension."""
+    ids: Mapping[str, str]
+    """New ids of lessons, by the old ones."""
+    labels: Mapping[str, str]
+    """The address of the lesson or page that sets an anchor, by the anchor."""
+    files: SourceFiles
+    models: Mapping[str, str]
+    """New paths of models and of what lies beside them, by their paths."""
+    camera_is_position: bool
+    path: str = ""
+    """The lesson's file, relative to the folder that is imported."""
+    pictures: Mapping[str, bytes] = {}
+    """Pictures that this file contains, by name."""
+    folder: str = ""
+    """The folder of the new file, such as `content/lessons`."""
+    place: str = ""
+    """The place in the lesson that is converted, as `line 12` or `cell 3`."""
+    is_mdx: bool = False
+    """Whether tags of the lesson may be components of JavaScript."""
+    depth: int = 0
+    """How many blocks are around the place."""
+    copies: dict[str, bytes] = field(default_factory=dict)
+    """The files and pictures that the lesson uses, by their new paths."""
+    title: str = ""
+    script_path: str = ""
+    """Of the script that the lesson's cells become."""
+    parts: list[str] = field(default_factory=list)
+    """The cells that are parts of it by now."""
+    figures: list[str] = field(default_factory=list)
+    """The files that it draws."""
+    notebook_outputs: list[tuple[str, str]] = field(default_factory=list)
+    """The outputs that are recorded in notebooks, each with the path of its script."""
+    sources: frozenset[str] = frozenset()
+    """The keys of the BibTeX files in the folder."""
+    cited: set[str] = field(default_factory=set)
+    """The sources that a text cites."""
+    notes: list[str] = field(default_factory=list)
+    """The texts of notes that stand within a line."""
+    callouts: dict[str, str] = field(default_factory=dict)
+    """Labels of kinds of callouts that coursebuild does not have, by kind."""
+
+    def at(self, place: str) -> LessonContext:
+        """Return the context of a place in the lesson."""
+        return replace(self, place=place)
+
+    def line_below(self, lines: int) -> LessonContext:
+        """Return the context of so many lines further down; a cell is a single place."""
+        kind, _, number = self.place.partition(" ")
+        return self.at(f"line {int(number) + lines}") if kind == "line" else self
+
+    def leave(self, kind: str, message: str) -> None:
+        """Note that something has no counterpart, why, and what to do."""
+        self.files.leave(self.path, message, kind, self.place)
+
+    def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
+        """Return what a part of the text becomes, which the account notes."""
+        return self.files.account.convert(kind, change, old, convert)
+
+    def resolve_link(self, address: str) -> str:
+        """Return the new address of a link; empty where nothing in the course has it."""
+        route = re.fullmatch(r"#?/lessons?/([^#?/]+)/?(#.*)?", address)
+        if route is not None:
+            id = self.ids.get(unquote(route[1]))
+            if id is None:
+                message = f"a link to `{address}`, a lesson that the map does not have"
+                self.leave("link", message)
+            return "" if id is None else f"lesson:{id}{route[2] or ''}"
+        parts = urlsplit(address)
+        if parts.scheme or parts.netloc or not parts.path:
+            return address
+        path = self.resolve_path(parts.path)
+        anchor = f"#{parts.fragment}" if parts.fragment else ""
+        target = self.targets.get(stem_of(path)) or self.targets.get(path)
+        if target is not None:
+            return target + anchor
+        if path in self.files:
+            return self.add_file(path)
+        if resolved := self.resolve_anchor(to_anchor(address)):
+            return resolved
+        self.leave("link", f"a link to `{address}`, which is not in the folder")
+        return ""
+
+    def are_sources(self, keys: Sequence[str]) -> bool:
+        """Whether all these are keys of sources; they are cited then."""
+        if not self.sources.issuperset(keys):
+            return False
+        self.cited.update(keys)
+        return True
+
+    def resolve_file(self, address: str) -> str:
+        """Return the new address of a file that HTML names; empty where the folder lacks it."""
+        path = self.resolve_path(urlsplit(address).path)
+        if path.endswith(TEXTS) or stem_of(path) in self.targets or path not in self.files:
+            return ""
+        return self.add_file(path)
+
+    def resolve_anchor(self, anchor: str) -> str:
+        """Return the address of an anchor; empty where no text of the course sets it."""
+        target = self.labels.get(anchor)
+        if target is None:
+            return ""
+        is_here = target == self.targets.get(stem_of(self.path))
+        return f"#{anchor}" if is_here else f"{target}#{anchor}"
+
+    def resolve_path(self, path: str) -> str:
+        """Return a path that the lesson names, relative to the folder that is imported."""
+        path = unquote(path)
+        resolved = posixpath.normpath(posixpath.join(posixpath.dirname(self.path), path))
+        if path.startswith("/"):
+            resolved = posixpath.normpath(path.lstrip("/"))
+        if file := self.files.find(resolved):
+            return file
+        if stem_of(resolved) in self.targets:
+            return resolved
+        return next((f for f in self.files if f.endswith("/" + path.lstrip("./"))), resolved)
+
+    def resolve_data(self, name: str) -> str:
+        """Return the new path of a file that a script names; empty where the folder lacks it."""
+        if "." not in name or "\n" in name or len(name) > 200 or re.match(r"\w+://|/", name):
+            return ""
+        folder = posixpath.dirname(self.path)
+        path = self.files.find(posixpath.normpath(posixpath.join(folder, name)))
+        if not path or path.endswith((".py", *TEXTS)):
+            return ""
+        if path in self.models:
+            return self.models[path]
+        self.add_file(path)
+        return f"content/files/{path}"
+
+    def add_picture(self, name: str) -> str:
+        """Copy a picture that the lesson's file contains, and return its new address."""
+        file = re.sub(r"[^\w.+-]", "-", name)  # it is a name, whatever path it looks like
+        return self._add_copy(f"{stem_of(self.path)}/{file}", self.pictures[name])
+
+    def add_file(self, path: str) -> str:
+        """Copy a file of the folder, and return its new address."""
+        return self._add_copy(path, self.files.read(path))
+
+    def _add_copy(self, name: str, data: bytes) -> str:
+        path = f"content/files/{name}"
+        self.copies[path] = data
+        return posixpath.relpath(path, self.folder).replace(" ", "%20")
+
+
+def script_path_of(document: str) -> str:
+    """Return the path of the script that the cells of a lesson or page become, by its own path."""
+    words = re.findall("[a-z0-9]+", posixpath.basename(stem_of(document)).lower())
+    return f"examples/{'' if words and words[0].isalpha() else 'l'}{'_'.join(words)}.py"
+
+
+def formula_anchor(label: str) -> str:
+    """Return the anchor of a formula, without the `eq` that other tools put before its name."""
+    return to_anchor(re.sub(r"^eq[-:._]", "", label))
+
+
+def label_anchor(label: str) -> str:
+    """Return the anchor of a figure or table, without what other tools put before its name."""
+    return to_anchor(re.sub(r"^(?:fig|tab|tbl)[-:._]", "", label))
+
+
+def to_anchor(name: str) -> str:
+    """Turn a name into an anchor."""
+    return re.sub("[^A-Za-z0-9]+", "-", name).strip("-").lower() or "x"

@@ -1,0 +1,255 @@
+"""Directives of MyST and Sphinx, as Markdown of coursebuild."""
+
+from __future__ import annotations
+
+import csv
+import functools
+import re
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
+
+from msgspec import Struct
+
+from coursebuild.api import marks
+from coursebuild.core.registry import missing_package
+from coursebuild.features.importer.context import LessonContext, label_anchor, to_anchor
+from coursebuild.features.importer.includes import lines_of
+from coursebuild.features.importer.prose import display_formula, rewrite_prose
+from coursebuild.features.importer.source_files import read_yaml
+
+
+class Directive(Struct, frozen=True):
+    """A directive as it was written."""
+
+    name: str
+    argument: str
+    options: Mapping[str, str]
+    text: str
+    nested: Callable[[str], str]
+    """Converts a text in it."""
+    callout: Callable[[str, str, str, bool], str]
+    """Writes a callout of a kind, with a title and a text, which may be folded."""
+
+    @property
+    def label(self) -> str:
+        """The name by which texts refer to it; may be empty."""
+        return self.options.get("name") or self.options.get("label") or ""
+
+
+_MYST_OPTION = re.compile(r":([\w-]+):[ \t]*(.*)")
+
+
+def split_options(text: str) -> tuple[Mapping[str, str], str]:
+    """Return the options that begin a directive (`:name: value`, or YAML), and its other lines."""
+    if text.startswith("---\n") and "\n---" in text[4:]:
+        head, _, rest = text[4:].partition("\n---")
+        value = read_yaml(head)
+        options = value if isinstance(value, dict) else {}
+        return {str(name): str(option) for name, option in options.items()}, rest.lstrip("-\n")
+    options, lines = {}, text.split("\n")
+    while lines and (option := _MYST_OPTION.fullmatch(lines[0].strip())) is not None:
+        options[option[1]] = option[2]
+        del lines[0]
+    return options, "\n".join(lines)
+
+
+_TITLED = frozenset(
+    "admonition dropdown sidebar topic exercise example margin aside details card".split()
+)
+"""Directives whose argument is a title; that of others is their first line."""
+_PROOFS = frozenset(
+    "theorem lemma definition algorithm axiom proof remark corollary proposition example property "
+    "criterion conjecture observation assumption".split()
+)
+_FRAMES = frozenset(
+    "div container grid grid-item tab-set card-carousel centered hlist rst-class table-of".split()
+)
+"""What only places what it holds."""
+_MAPS = frozenset(("tableofcontents", "toctree", "contents", "bibliography", "genindex"))
+"""Lists that the site makes itself."""
+_CHANGES = {
+    "versionadded": "New in",
+    "versionchanged": "Changed in",
+    "deprecated": "Deprecated since",
+    "versionremoved": "Removed in",
+}
+
+
+def convert_directive(directive: Directive, context: LessonContext, callouts: Sequence[str]) -> str:
+    """Return a directive in Markdown; `callouts` are those that are callouts here."""
+    anchor = ""
+    if directive.label and directive.name not in ("math", "figure", "table", "list-table"):
+        anchor = f'<a id="{to_anchor(directive.label)}"></a>\n\n'
+    return anchor + _write(directive, context, callouts)
+
+
+def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]) -> str:
+    name, argument, options, text = (
+        directive.name,
+        directive.argument,
+        directive.options,
+        directive.text,
+    )
+    kind = f"directive `{{{name}}}`"
+    match name:
+        case "math":
+            tex = "\n".join(part for part in (argument, text) if part.strip())
+            return display_formula(tex, directive.label)
+        case "figure" | "image":
+            return _write_figure(directive, context)
+        case "code" | "code-block" | "sourcecode" | "highlight" | "parsed-literal":
+            language = argument if name != "parsed-literal" else ""
+            caption = options.get("caption", "")
+            head = f"**{rewrite_prose(caption, context)}**\n\n" if caption else ""
+            return head + marks.fence(language or "text", text) if text.strip() else ""
+        case "literalinclude" | "include":
+            return _write_file(directive, context, kind)
+        case "list-table" | "csv-table" | "table":
+            return _write_table(directive, context)
+        case "glossary":
+            return _write_glossary(text, context)
+        case "raw" if argument.strip() == "html":
+            return rewrite_prose(text, context)
+        case (
+            "raw" | "index" | "sectionauthor" | "codeauthor" | "meta" | "tags" | "only" | "ifconfig"
+        ):
+            if name == "only" and "html" in argument:
+                return directive.nested(text)
+            words = " ".join(f"{argument} {text}".split())
+            context.leave(kind, f"{kind} (`{words.replace('`', '')}`), which no page here shows")
+            return ""
+        case "rubric" | "centered":
+            return f"**{rewrite_prose(argument, context)}**\n\n{directive.nested(text)}"
+        case "tab-item" | "grid-item-card" | "card":
+            return _write_card(directive, context)
+        case "iframe" | "youtube" | "video" | "button-link" | "button-ref":
+            words = " ".join(text.split()) or argument.strip()
+            address = argument.strip()
+            if name == "youtube":
+                address = f"https://www.youtube.com/watch?v={address}"
+            return rewrite_prose(f"[{words}]({address})", context)
+        case "epigraph" | "pull-quote" | "blockquote" | "highlights":
+            return marks.block_quote(directive.nested(text))
+        case _ if name in _MAPS:
+            return ""
+        case _ if name in _FRAMES:
+            return directive.nested(text)
+        case _ if name in _CHANGES:
+            version, _, rest = argument.partition(" ")
+            body = f"{rest}\n{text}".strip()
+            return directive.callout("version", f"{_CHANGES[name]} {version}", body, False)
+        case _ if name.startswith("prf:") and name[4:] in _PROOFS:
+            return directive.callout(name[4:], argument, text, False)
+        case "solution":  # its argument is the label of an exercise
+            return directive.callout(name, "", text, True)
+        case _ if name in callouts:
+            is_folded = "dropdown" in options.get("class", name)
+            title = argument if name in _TITLED else ""
+            body = text if title else f"{argument}\n{text}"
+            return directive.callout(name, title, body, is_folded)
+        case _ if package := missing_package(name):
+            message = f"a block of `{name}` is shown as text: install {package}, and name it so"
+            context.leave(kind, message)
+            return marks.fence("text", text)
+        case _ if name in highlighted_languages():
+            context.leave(kind, f"a block of `{name}` is shown and not run")
+            return marks.fence(name, text)
+        case _:
+            message = f"the directive `{{{name}}}`, whose text is shown as it was written"
+            context.leave(kind, message)
+            return marks.fence("text", f"{argument}\n{text}".strip("\n"))
+
+
+def _write_figure(directive: Directive, context: LessonContext) -> str:
+    caption = directive.nested(directive.text).strip() if directive.text.strip() else ""
+    if not directive.argument.strip():  # what it shows is in it
+        return caption
+    first, _, rest = caption.partition("\n\n")
+    first = " ".join(first.split())
+    alt = directive.options.get("alt") or first
+    alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$]", "", alt)
+    picture = rewrite_prose(f"![{alt}]({directive.argument.strip()})", context)
+    is_label = bool(directive.label) and directive.name == "figure"
+    label = f" {{#fig:{label_anchor(directive.label)}}}" if is_label else ""
+    if not picture.startswith("!["):  # it is on another host, or nowhere
+        anchor = f'<a id="fig-{to_anchor(directive.label)}"></a>\n\n' if label else ""
+        return f"{anchor}{picture}\n\n{caption}"
+    if not first.strip() and not label:
+        return picture
+    return f"Figure: {picture} {first}{label}\n\n{rest}".strip()
+
+
+def _write_file(directive: Directive, context: LessonContext, kind: str) -> str:
+    name, options = directive.argument.strip(), directive.options
+    path = context.resolve_path(name)
+    if path not in context.files:
+        context.leave(kind, f"the file `{name}`, which is not in the folder")
+        return ""
+    text = lines_of(context.files.read_text(path), options)
+    if directive.name == "include":
+        return directive.nested(text)
+    language = options.get("language") or path.rpartition(".")[2]
+    language = {"py": "python", "cpp": "cpp", "txt": "text", "yml": "yaml"}.get(language, language)
+    return marks.fence(
+        language if language in highlighted_languages() else "text", text.strip("\n")
+    )
+
+
+def _write_card(directive: Directive, context: LessonContext) -> str:
+    parts = re.split(r"^(?:\^{3,}|\+{3,})[ \t]*$", directive.text, flags=re.MULTILINE)
+    title = rewrite_prose(directive.argument.strip(), context)
+    link = directive.options.get("link", "")
+    if link and title:
+        is_text = directive.options.get("link-type") == "doc" or not re.search(r"[:.#/]", link)
+        address = context.resolve_link(f"{link}.md" if is_text else link)
+        title = f"[{title}]({address})" if address else title
+    inside = (directive.nested(part).strip() for part in parts)
+    return "\n\n".join(part for part in (f"**{title}**" if title else "", *inside) if part)
+
+
+def _write_table(directive: Directive, context: LessonContext) -> str:
+    title = rewrite_prose(directive.argument, context)
+    label = f" {{#tab:{label_anchor(directive.label)}}}" if directive.label else ""
+    caption = f"Table: {title}{label}\n\n" if title else ""
+    if directive.name == "table":
+        return caption + directive.nested(directive.text)
+    if directive.name == "csv-table":
+        rows = [row for row in csv.reader(directive.text.strip().splitlines()) if row]
+        if header := directive.options.get("header"):
+            rows = [next(csv.reader([header], skipinitialspace=True)), *rows]
+    else:
+        rows = [
+            [cell.strip() for cell in re.split(r"(?:\A|\n)[ \t]*-(?:[ \t]|(?=\n|\Z))", row)[1:]]
+            for row in re.split(r"(?:\A|\n)\*[ \t]", directive.text)[1:]
+        ]
+    width = max(map(len, rows), default=0)
+    if not width:
+        return caption
+    cells = [[_cell(cell, context) for cell in (*row, *[""] * (width - len(row)))] for row in rows]
+    lines = [f"| {' | '.join(row)} |" for row in cells]
+    return caption + "\n".join((lines[0], f"|{' --- |' * width}", *lines[1:]))
+
+
+def _cell(text: str, context: LessonContext) -> str:
+    return rewrite_prose(" ".join(text.split()), context).replace("|", "\\|")
+
+
+def _write_glossary(text: str, context: LessonContext) -> str:
+    """Return the entries of a glossary as paragraphs that mark their terms."""
+    out, terms = [], list[str]()
+    for entry in re.split(r"\n(?=\S)", text.strip("\n")):
+        term, _, meaning = entry.partition("\n")
+        terms.append(term.strip())
+        if meaning.strip():
+            words = rewrite_prose(" ".join(textwrap.dedent(meaning).split()), context)
+            out.append(f"{', '.join(f'[{term}]{{term}}' for term in terms)}: {words}")
+            terms = []
+    return "\n\n".join(out)
+
+
+@functools.cache
+def highlighted_languages() -> frozenset[str]:
+    """The names of languages that pages highlight."""
+    from pygments.lexers import get_all_lexers
+
+    return frozenset(alias for _, aliases, _, _ in get_all_lexers() for alias in aliases)

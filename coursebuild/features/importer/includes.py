@@ -1,0 +1,140 @@
+"""Texts and lines of other files that a text includes, put where it does so.
+
+mdBook writes `{{#include FILE:LINES}}` or `{{#include FILE:ANCHOR}}`, MkDocs `--8<-- "FILE:LINES"`
+or `--8<-- "FILE:SECTION"` or `{!FILE!}`, Quarto `{{< include FILE >}}`, MyST a directive with
+options.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+import textwrap
+from collections.abc import Mapping
+
+from coursebuild.features.importer.source_files import SourceFiles
+
+_MAX_DEPTH = 10
+"""Files that may include each other in a row."""
+_MARK = re.compile(
+    r"(?P<escape>\\)?\{\{[ ]*#(?P<command>include|rustdoc_include|playground|title)[ ]+"
+    r"(?P<mdbook>[^{}]*?)[ ]*\}\}"
+    r"|\{\{<[ ]*include[ ]+(?P<quarto>\S+)[ ]*>\}\}"
+    r"|\{!>?[ \t]*(?P<inclusion>[^{}!\s]+)[^{}!\n]*!\}"
+    r"|^(?P<indent>[ \t]*)-{1,}8<-{1,}[ \t]+[\"'](?P<mkdocs>[^\"'\n]+)[\"'][ \t]*$",
+    re.MULTILINE,
+)
+_ANCHOR = r"^.*?ANCHOR(?P<end>_END)?:[ \t]*(?P<name>[\w-]+).*\n?"
+_SECTION = (
+    r"^.*?-{1,}8<-{1,}[ \t]*\[[ \t]*(?P<end>end|start)[ \t]*:[ \t]*(?P<name>[\w-]+)[ \t]*\].*\n?"
+)
+
+
+def expand_includes(text: str, path: str, files: SourceFiles, depth: int = 0) -> str:
+    """Return the text of a file with what it includes; what is not in the folder is left."""
+
+    def expand(mark: re.Match[str]) -> str:
+        if mark["escape"]:
+            return mark[0][1:]
+        if mark["command"] == "title":
+            files.account.changed["title of the page", "the map has it"] += 1
+            return ""
+        name = mark["mdbook"] or mark["quarto"] or mark["mkdocs"] or mark["inclusion"]
+        line = f"line {text.count(chr(10), 0, mark.start()) + 1}"
+        file, _, part = name.split()[0].partition(":")
+        target = _find(file, path, files)
+        if not target or depth == _MAX_DEPTH:
+            message = f"`{name}`, which is not in the folder: what it holds is missing"
+            files.leave(path, message, "file that is included", line)
+            return ""
+        part_text = _part_of(files.read_text(target), part, by_lines=True)
+        if part_text is None:
+            message = f"`{name}`: the file has no such part"
+            files.leave(path, message, "file that is included", line)
+            return ""
+        files.account.changed["file that is included", "its lines stand in the text"] += 1
+        included = expand_includes(part_text, target, files, depth + 1).strip("\n")
+        if mark["command"] == "playground":
+            return f"```rust\n{included}\n```"
+        return textwrap.indent(included, mark["indent"] or "")
+
+    return _MARK.sub(expand, text)
+
+
+def _find(name: str, path: str, files: SourceFiles) -> str:
+    """Return the path of a file that a text names: beside it, or from a folder that holds it."""
+    folder = posixpath.dirname(path)
+    while True:
+        if place := files.find(posixpath.normpath(posixpath.join(folder, name.lstrip("/")))):
+            return place
+        if not folder:
+            return ""
+        folder = posixpath.dirname(folder)
+
+
+def _part_of(text: str, part: str, *, by_lines: bool) -> str | None:
+    """Return lines `2:5`, `:5`, `2:` or `2` of a text, or those of an anchor; else all of them.
+
+    Marks of anchors are left out. `None`: there is no such anchor.
+    """
+    text = text if text.endswith("\n") else f"{text}\n"
+    if by_lines and (lines := re.fullmatch(r"(\d*)(:?)(\d*)", part)) is not None and part:
+        first = int(lines[1] or 1)
+        last = int(lines[3]) if lines[3] else None if lines[2] else first
+        text = "".join(text.splitlines(keepends=True)[first - 1 : last])
+        part = ""
+    if not part:
+        return re.sub(_SECTION, "", re.sub(_ANCHOR, "", text, flags=re.M), flags=re.M)
+    for pattern in (_ANCHOR, _SECTION):
+        marks = [m for m in re.finditer(pattern, text, re.MULTILINE) if m["name"] == part]
+        if marks:
+            end = marks[1].start() if len(marks) > 1 else len(text)
+            return _part_of(text[marks[0].end() : end], "", by_lines=False)
+    return None
+
+
+def lines_of(text: str, options: Mapping[str, str]) -> str:
+    """Return the lines of a text that the options of a directive of Sphinx choose."""
+    lines = text.splitlines()
+    for option in ("start-after", "start-at", "end-before", "end-at"):
+        words = options.get(option)
+        at = next((n for n, line in enumerate(lines) if words and words in line), None)
+        if at is None:
+            continue
+        match option:
+            case "start-after":
+                lines = lines[at + 1 :]
+            case "start-at":
+                lines = lines[at:]
+            case "end-before":
+                lines = lines[:at]
+            case _:
+                lines = lines[: at + 1]
+    if selection := options.get("lines", ""):
+        numbers = list[int]()
+        for part in selection.split(","):
+            if bounds := re.fullmatch(r"\s*(\d*)\s*(-?)\s*(\d*)\s*", part):
+                first = int(bounds[1] or 1)
+                last = int(bounds[3]) if bounds[3] else len(lines) if bounds[2] else first
+                numbers += range(first, min(last, len(lines)) + 1)
+        lines = [lines[number - 1] for number in numbers if number <= len(lines)]
+    text = "\n".join(lines)
+    return textwrap.dedent(text) if "dedent" in options else text
+
+
+def without_hidden_lines(text: str) -> str:
+    """Return the text of an mdBook without the lines of its Rust that readers do not see."""
+
+    def show(block: re.Match[str]) -> str:
+        body = re.sub(r"^[ \t]*#(?:[ ].*)?\n", "", block["body"], flags=re.MULTILINE)
+        return (
+            block["head"] + re.sub(r"^([ \t]*)##", r"\1#", body, flags=re.MULTILINE) + block["end"]
+        )
+
+    return _RUST.sub(show, text)
+
+
+_RUST = re.compile(
+    r"^(?P<head>(?P<mark>[ \t]*`{3,})rust\b[^\n]*\n)(?P<body>.*?)(?P<end>^(?P=mark)[ \t]*$)",
+    re.MULTILINE | re.DOTALL,
+)

@@ -1,0 +1,267 @@
+"""The maps of mdBook, GitBook and Docusaurus, which are a text, a program and a folder.
+
+`SUMMARY.md` is a list of links: those before and after it are pages without a number, headings in
+it are parts, an empty address is a chapter that is only planned. `sidebars.js` is read where it is
+literal; where it is computed, or says so, the order is that of `sidebar_position`.
+"""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from collections.abc import Iterable, Iterator, Mapping
+
+from msgspec import Struct
+
+from coursebuild.features.importer.source_files import (
+    TEXTS,
+    ImportedLevel,
+    ImportedText,
+    SourceFiles,
+    read_toml,
+    read_yaml,
+    stem_of,
+    title_of_file,
+)
+
+
+class Outline(Struct, frozen=True, kw_only=True):
+    """The map of a course."""
+
+    title: str
+    """Empty where nothing gives it."""
+    parts: tuple[ImportedText | ImportedLevel, ...]
+    pages: tuple[ImportedText, ...] = ()
+    has_hidden_lines: bool = False
+    """Whether lines of Rust that begin with `# ` are hidden from readers."""
+
+
+def read_outline(files: SourceFiles) -> Outline | None:
+    """Return the map of a folder; `None` where it has none of these."""
+    book = read_toml(files.read_text("book.toml")) if "book.toml" in files else None
+    settings = (book or {}).get("book")
+    settings = settings if isinstance(settings, Mapping) else {}
+    folder = str(settings.get("src") or "src") if book is not None else ""
+    places = (posixpath.join(folder, "SUMMARY.md"), "SUMMARY.md", "docs/SUMMARY.md")
+    path = next((path for path in map(posixpath.normpath, places) if path in files), "")
+    if path:
+        files.account.changed["map", "content/course.toml"] += 1
+        return _read_summary(path, str(settings.get("title") or ""), files, book is not None)
+    config = next((p for p in files if re.fullmatch(r"docusaurus\.config\.[cm]?[jt]s", p)), "")
+    return _read_docusaurus(config, files) if config else None
+
+
+def find_text(name: object, files: SourceFiles) -> str:
+    """Return a text's path, given with or without its extension; empty where there is none."""
+    if not isinstance(name, str) or not name:
+        return ""
+    name = posixpath.normpath(name)
+    if path := files.find(name):
+        return path if path.endswith(TEXTS) else ""
+    return next((path for end in TEXTS if (path := files.find(name + end))), "")
+
+
+def leave_entry(path: str, name: str, files: SourceFiles, place: str = "") -> None:
+    """Note that a map names what is no text of the folder."""
+    message = f"the map names `{name}`, which is not in the folder or no text"
+    files.leave(path, message, "entry of the map", place)
+
+
+# --- mdBook, GitBook
+
+_ENTRY = re.compile(
+    r"(?P<indent>[ \t]*)(?P<item>[-*+][ \t]+)?\[(?P<title>(?:[^\[\]\\]|\\.|\[[^\[\]]*\])*)\]"
+    r"\(<?(?P<file>[^()<>\s]*)>?(?:[ \t]+\"[^\"]*\")?\)[ \t]*"
+)
+_PART = re.compile(r"#{1,3}[ \t]+(.*?)[ \t]*#*[ \t]*")
+
+
+class _Entry(Struct, frozen=True):
+    depth: int
+    """Blanks before it; -1 outside of the list."""
+    text: ImportedText
+
+
+def _read_summary(path: str, title: str, files: SourceFiles, is_mdbook: bool) -> Outline:
+    groups: list[tuple[str, list[_Entry]]] = [("", [])]
+    is_first = True
+    for number, line in enumerate(re.sub(r"<!--.*?-->", "", files.read_text(path)).split("\n"), 1):
+        entry, heading = _ENTRY.fullmatch(line), _PART.fullmatch(line)
+        if heading is not None:
+            if not is_first or not line.startswith("# "):  # the first is the title of the list
+                groups.append((heading[1], []))
+            is_first = False
+        elif entry is not None:
+            is_first = False
+            name = posixpath.join(posixpath.dirname(path), entry["file"].partition("#")[0])
+            file = find_text(name, files) if entry["file"] else ""
+            if entry["file"] and not file:
+                leave_entry(path, entry["file"], files, f"line {number}")
+            words = re.sub(r"\\(.)", r"\1", entry["title"]).replace("`", "")
+            depth = len(entry["indent"].expandtabs(4)) if entry["item"] else -1
+            groups[-1][1].append(_Entry(depth, ImportedText(file=file, title=words)))
+        elif line.strip() and not re.fullmatch(r"[ \t]*-{3,}[ \t]*", line):
+            files.leave(
+                path, f"`{line.strip()}`, which is no entry", "entry of the map", f"line {number}"
+            )
+    pages = [e.text for _, entries in groups for e in entries if e.depth < 0 and e.text.file]
+    parts: list[ImportedText | ImportedLevel] = []
+    for name, entries in groups:
+        lessons = [entry for entry in entries if entry.depth >= 0]
+        if name and lessons:
+            parts.append(ImportedLevel(title=name, lessons=tuple(e.text for e in lessons)))
+        else:
+            parts += _group_by_depth(lessons)
+    return Outline(title=title, parts=tuple(parts), pages=tuple(pages), has_hidden_lines=is_mdbook)
+
+
+def _group_by_depth(entries: Iterable[_Entry]) -> Iterator[ImportedText | ImportedLevel]:
+    """Yield chapters, one that has others below it as a level with them."""
+    groups: list[list[ImportedText]] = []
+    for entry in entries:
+        if entry.depth == 0 or not groups:
+            groups.append([])
+        groups[-1].append(entry.text)
+    for first, *sections in groups:
+        if sections:
+            yield ImportedLevel(title=first.title, lessons=(first, *sections))
+        else:
+            yield first
+
+
+# --- Docusaurus
+
+
+def _read_docusaurus(config: str, files: SourceFiles) -> Outline:
+    title = re.search(r"^\s*title:\s*([\"'`])(.+?)\1", files.read_text(config), re.MULTILINE)
+    name = next((path for path in files if re.fullmatch(r"sidebars\.[cm]?[jt]s(?:on)?", path)), "")
+    parts: list[ImportedText | ImportedLevel] = []
+    if name:
+        files.account.changed["map", "content/course.toml"] += 1
+        sidebars = _read_literal(files.read_text(name))
+        if sidebars is None:
+            message = "a program: the order of lessons is that of `sidebar_position` and of names"
+            files.leave(name, message, "map")
+        for sidebar in sidebars.values() if sidebars else ():
+            parts += _read_sidebar(sidebar, name, files)
+    parts = parts or [*_read_folder("docs", files)]
+    return Outline(title=title[2] if title else "", parts=tuple(parts))
+
+
+def _read_literal(text: str) -> Mapping[str, object] | None:
+    """Return the value of an object of JavaScript; `None` where it is not literal."""
+    comments = r"/\*(?s:.*?)\*/|^[ \t]*//.*$|(?<=[,\[{\]}])[ \t]*//.*$"
+    text = re.sub(comments, "", text, flags=re.MULTILINE)
+    start = re.search(
+        r"(?:module\.exports\s*=|sidebars\b[^=\n]*=|export default|\A)\s*(?=\{)", text
+    )
+    if start is None or "..." in text or "=>" in text:
+        return None
+    end = text.rfind("}")
+    # An object of JavaScript whose values are literal is a value of YAML, but for blanks.
+    literal = re.sub(r"([\"'\w])\s*:(?=\S)", r"\1: ", text[start.end() : end + 1]).replace(
+        "\t", " "
+    )
+    value = read_yaml(re.sub(r"(?<=[{,])\s*\?", "", literal))
+    return value if isinstance(value, dict) else None
+
+
+def _read_sidebar(
+    items: object, name: str, files: SourceFiles
+) -> Iterator[ImportedText | ImportedLevel]:
+    if isinstance(items, str):
+        if path := _find_doc(items, files):
+            yield ImportedText(file=path)
+        else:
+            leave_entry(name, items, files)
+    elif isinstance(items, list):
+        for item in items:
+            yield from _read_sidebar(item, name, files)
+    elif isinstance(items, Mapping):
+        match items.get("type"):
+            case "doc" | "ref":
+                yield from _read_sidebar(items.get("id"), name, files)
+            case "autogenerated":
+                folder = posixpath.normpath(f"docs/{items.get('dirName', '.')}")
+                yield from _read_folder(folder, files)
+            case "category":
+                link = items.get("link")
+                first = link.get("id") if isinstance(link, Mapping) else None
+                inside = [first, *_as_list(items.get("items"))] if first else items.get("items")
+                yield from _level(str(items.get("label") or ""), _read_sidebar(inside, name, files))
+            case None:
+                for label, inside in items.items():
+                    yield from _level(str(label), _read_sidebar(inside, name, files))
+            case kind:
+                words = items.get("label") or items.get("href") or kind
+                files.leave(name, f"`{words}` of the map, which is no text", "entry of the map")
+
+
+def _as_list(value: object) -> list[object]:
+    return value if isinstance(value, list) else []
+
+
+def _level(
+    title: str, parts: Iterable[ImportedText | ImportedLevel]
+) -> Iterator[ImportedText | ImportedLevel]:
+    lessons = [
+        text
+        for part in parts
+        for text in ((part,) if isinstance(part, ImportedText) else part.lessons)
+    ]
+    if lessons:
+        yield ImportedLevel(title=title, lessons=tuple(lessons))
+
+
+def _find_doc(id: str, files: SourceFiles) -> str:
+    """Return the text with an id of Docusaurus, which has no number that only gives an order."""
+    if path := find_text(f"docs/{id}", files):
+        return path
+    for path in files:
+        if path.startswith("docs/") and path.endswith(TEXTS):
+            plain = "/".join(re.sub(r"^\d+[\s._-]+", "", part) for part in path.split("/")[1:])
+            own_id = _front_matter(path, files).get("id")
+            folder = posixpath.dirname(plain)
+            if id in (stem_of(plain), posixpath.join(folder, str(own_id))):
+                return path
+    return ""
+
+
+def _read_folder(folder: str, files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
+    """Yield what is in a folder, in the order of `sidebar_position`, then of names."""
+    entries: list[tuple[float, str]] = []
+    below = [path for path in files if path.startswith(f"{folder}/")]
+    for child in {path.removeprefix(f"{folder}/").partition("/")[0] for path in below}:
+        path = f"{folder}/{child}"
+        if path in files and path.endswith(TEXTS) and not child.startswith("_"):
+            position = _front_matter(path, files).get("sidebar_position")
+        elif path not in files:
+            position = _category(path, files).get("position")
+        else:
+            continue
+        number = re.match(r"\d+", child)
+        value = position if isinstance(position, int | float) else None
+        entries.append((value if value is not None else int(number[0]) if number else 1e9, path))
+    for _, path in sorted(entries):
+        if path in files:
+            yield ImportedText(file=path)
+        else:
+            label = str(_category(path, files).get("label") or title_of_file(path))
+            yield from _level(label, _read_folder(path, files))
+
+
+def _category(folder: str, files: SourceFiles) -> Mapping[str, object]:
+    for name in ("_category_.json", "_category_.yml", "_category_.yaml"):
+        if (path := f"{folder}/{name}") in files:
+            value = read_yaml(files.read_text(path))  # JSON is YAML
+            return value if isinstance(value, dict) else {}
+    return {}
+
+
+def _front_matter(path: str, files: SourceFiles) -> Mapping[str, object]:
+    if not path.endswith((".md", ".mdx")):
+        return {}
+    text = files.read(path).decode("utf-8-sig", "replace")
+    match = re.match(r"---[ \t]*\n(.*?\n)---[ \t]*(?:\n|\Z)", text.replace("\r\n", "\n"), re.DOTALL)
+    value = read_yaml(match[1]) if match else None
+    return value if isinstance(value, dict) else {}

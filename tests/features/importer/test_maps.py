@@ -1,0 +1,151 @@
+"""The map of another tool gives the order of lessons, their titles, parts and pages."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+from coursebuild.features.importer.convert import convert
+from coursebuild.features.importer.source_files import SourceFiles
+
+Outline = list[tuple[str, list[str]]]
+"""The titles of levels, each with those of its lessons; `?` behind one that is only planned."""
+
+
+def import_map(folder: Path, files: dict[str, str]) -> tuple[Outline, list[str], list[str]]:
+    """Return the outline, the titles of pages, and what is left.
+
+    A file without a text has its path as its title.
+    """
+    for name, text in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text or f"# {name}\n\nText.\n", encoding="utf-8")
+    course = convert(SourceFiles(folder))
+    table = tomllib.loads(course.files["content/course.toml"].decode())
+    outline = [
+        (
+            level["title"],
+            [
+                entry["title"] + ("?" if entry["status"] == "planned" else "")
+                for entry in level["lesson"]
+            ],
+        )
+        for level in table["level"]
+    ]
+    left = [leftover.message for leftover in course.account.leftovers]
+    return outline, [page["title"] for page in table.get("page", ())], left
+
+
+SUMMARY = r"""# Summary
+
+[Before](before.md)
+
+- [Zeta \[1\]](zeta.md)
+    - [Below `z`](deep/below.md)
+        - [Further below](deep/further.md)
+- [Alone](alone.md)
+
+# Second part
+
+* [Alpha](<alpha.md>)
+- [To be written]()
+- [Lost](lost.md)
+
+---
+
+[After](after.md)
+"""
+
+
+def test_summary_of_mdbook_is_the_map(tmp_path: Path) -> None:
+    names = "before zeta deep/below deep/further alone alpha after unlisted".split()
+    files = {f"text/{name}.md": "" for name in names}
+    files |= {"book.toml": '[book]\ntitle = "A book"\nsrc = "text"\n', "text/SUMMARY.md": SUMMARY}
+    outline, pages, left = import_map(tmp_path, files)
+    assert outline == [
+        ("Zeta [1]", ["Zeta [1]", "Below z", "Further below"]),
+        ("A book", ["Alone"]),
+        ("Second part", ["Alpha", "To be written?", "Lost?"]),
+    ]
+    assert pages == ["Before", "After"]
+    assert [message for message in left if "lost.md" in message or "not taken" in message] == [
+        "the map names `lost.md`, which is not in the folder or no text",
+        "not taken for a lesson: add it to the map of the course, and import again",
+    ]
+
+
+def test_summary_of_gitbook_has_parts_as_headings_of_level_2(tmp_path: Path) -> None:
+    summary = "# Table of contents\n\n* [Start](README.md)\n\n## Part\n\n* [B](b.md)\n* [A](a.md)\n"
+    files = {"SUMMARY.md": summary, "README.md": "", "a.md": "", "b.md": ""}
+    outline, _, _ = import_map(tmp_path / "book", files)
+    assert outline == [("Lessons", ["Start"]), ("Part", ["B", "A"])]
+
+
+SIDEBARS = """
+// The order of the docs.
+module.exports = {
+  docs: [
+    'intro', // a comment
+    {
+      type: 'category',
+      label: "The basics",
+      link: {type: 'doc', id: 'basics/start'},
+      items: ['basics/z', {type: 'doc', id: 'basics/a', label: 'A'},],
+    },
+    {Short: ['gone', 'last']},
+    {type: 'link', label: 'Elsewhere', href: 'https://example.org'},
+  ],
+};
+"""
+CONFIG = "module.exports = {\n  title: 'A site',\n}\n"
+
+
+def test_literal_sidebars_of_docusaurus_are_the_map(tmp_path: Path) -> None:
+    names = "intro basics/start basics/z basics/01-a last".split()
+    files = {f"docs/{name}.md": "" for name in names}
+    files |= {"docusaurus.config.js": CONFIG, "sidebars.js": SIDEBARS}
+    outline, _, left = import_map(tmp_path, files)
+    assert outline == [
+        ("A site", ["docs/intro.md"]),
+        ("The basics", ["docs/basics/start.md", "docs/basics/z.md", "docs/basics/01-a.md"]),
+        ("Short", ["docs/last.md"]),
+    ]
+    assert left == [
+        "the map names `gone`, which is not in the folder or no text",
+        "`Elsewhere` of the map, which is no text",
+    ]
+
+
+def test_computed_sidebars_give_way_to_positions(tmp_path: Path) -> None:
+    files = {
+        "docusaurus.config.ts": CONFIG,
+        "sidebars.ts": "export default {docs: require('./list').map((id) => id)};\n",
+        "docs/b.md": "---\nsidebar_position: 1\n---\n# B\n\nText.\n",
+        "docs/a.md": "---\nsidebar_position: 2\n---\n# A\n\nText.\n",
+        "docs/03-part/_category_.json": '{"label": "Part", "position": 0}',
+        "docs/03-part/2-y.md": "",
+        "docs/03-part/10-x.md": "",
+    }
+    outline, _, left = import_map(tmp_path, files)
+    assert outline == [
+        ("Part", ["docs/03-part/2-y.md", "docs/03-part/10-x.md"]),
+        ("A site", ["B", "A"]),
+    ]
+    assert "a program: the order of lessons is that of `sidebar_position` and of names" in left
+
+
+def test_nav_of_mkdocs_and_chapters_of_quarto_keep_their_order(tmp_path: Path) -> None:
+    nav = (
+        "site_name: S\nnav:\n  - Z: z.md\n  - Part:\n    - B: b.md\n    - a.md\n  - Gone: gone.md\n"
+    )
+    files = {"mkdocs.yml": nav, "docs/z.md": "", "docs/a.md": "", "docs/b.md": ""}
+    outline, _, left = import_map(tmp_path / "m", files)
+    assert outline == [("S", ["Z"]), ("Part", ["B", "docs/a.md"])]
+    assert left == ["the map names `gone.md`, which is not in the folder or no text"]
+    chapters = "[z.qmd, {part: P, chapters: [b.qmd, gone.qmd]}]"
+    book = f"book:\n  title: Q\n  chapters: {chapters}\n  appendices: [a.qmd]\n"
+    files = {"_quarto.yml": book, "a.qmd": "", "b.qmd": "", "z.qmd": ""}
+    outline, _, left = import_map(tmp_path / "q", files)
+    assert outline == [("Q", ["z.qmd"]), ("P", ["b.qmd"]), ("Q", ["a.qmd"])]
+    assert left == ["the map names `gone.qmd`, which is not in the folder or no text"]
