@@ -436,6 +436,8 @@ def test_lab_of_a_kind_of_the_course_runs_two_simulations(lesson: Lesson) -> Non
 
 def test_lab_starts_by_itself_where_motion_is_welcome(lesson: Lesson) -> None:
     lab_element = lab(lesson.page, AUTO, "playing")
+    hand = lab_element.get_by_role("button", name="Grab bodies")
+    expect(hand).to_have_attribute("aria-pressed", "true")  # as the lab asks
     wait_for_condition(lesson.page, lambda: time_of(lab_element) > 0)
     press(lab_element, "Pause")
     reach(lesson.page, AUTO, "paused")

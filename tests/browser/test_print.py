@@ -56,7 +56,7 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
     assert len(headings) > 20
     known_headings = {words(heading).casefold() for heading in headings}
     sheets = printed(page)
-    assert 10 < len(sheets) < 35, "of text, five drawings and four labs"
+    assert 5 < len(sheets) <= 16, "without its further sections"
     for number, sheet in enumerate(sheets, 1):
         assert f"{number} / {len(sheets)}" in sheet
         assert ("Mass and inertia · Simulation with MuJoCo" in sheet) == (number > 1)
@@ -66,8 +66,19 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
     text = words(" ".join(sheets))
     for removed_text in ("On this page", "Course map", "Copy", "Download", "Mark as read"):
         assert removed_text not in text, removed_text
-    for visible_text in ("The centre of mass is at", "if __name__", "IEEE Robotics and Automation"):
-        assert visible_text in text, "what is folded on a screen"
+    assert text.index("The centre of mass is at") > text.index("joins this to translation"), (
+        "an answer comes after all questions"
+    )
+
+
+def test_a_further_section_is_printed_if_it_is_open(sites: Mapping[str, Site], page: Page) -> None:
+    page.goto(sites["real"].url(REAL))
+    wait_until_settled(page)
+    phrase = "a triangular factor"
+    text = words(" ".join(printed(page)))
+    assert phrase not in text and "Inertias, estimated from motion" in text
+    page.locator(".further-text > summary").last.click()
+    assert phrase in words(" ".join(printed(page)))
 
 
 def test_a_lab_on_paper_says_where_it_runs(sites: Mapping[str, Site], page: Page) -> None:

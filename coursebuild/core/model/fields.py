@@ -118,3 +118,6 @@ class CoursePath(Struct, frozen=True, forbid_unknown_fields=True):
     title: Annotated[Text, describe("plain text")]
     lessons: Annotated[tuple[Text, ...], describe("ids of lessons in the order of reading")]
     summary: Annotated[Summary, describe("for whom it is, or where it leads")] = ""
+    picture: Annotated[
+        Text | None, describe("the lesson whose picture it has; otherwise the last with one")
+    ] = None

@@ -152,10 +152,11 @@ class LessonCard(Struct, frozen=True):
 
 
 class CardGroup(Struct, frozen=True):
-    """Lessons of a path, or all that are in none."""
+    """Lessons of a path, with the picture that stands for it, or all that are in none."""
 
     title: str
     summary: str
+    picture: PictureLink | None
     cards: tuple[LessonCard, ...]
 
 
@@ -192,10 +193,12 @@ def home_inputs(library: Library, document: Document | None) -> PageInputs:
         pictures = _pictures_of(library, place, page)
         if len(pictures) > 1:
             galleries.append(Gallery(page.title, place.href(urls.page_path(page)), pictures))
+    card_groups = tuple(_card_groups(course.paths, cards))
     values = {
         "title": course.title,
         "summary": course.summary,
-        "card_groups": tuple(_card_groups(course.paths, cards)),
+        "paths": tuple(group for group in card_groups if group.title),
+        "card_groups": card_groups,
         "galleries": tuple(galleries),
         "levels": tuple(level_view(library, place, level, whole=True) for level in course.levels),
         "start": lesson_link(library, place, written_lessons[0]) if written_lessons else None,
@@ -218,13 +221,17 @@ def _card_groups(
     """Yield the cards of each path, then of the lessons in none."""
     rest = dict(cards)
     for path in paths:
-        steps = [name for name in path.lessons if name in cards]
+        steps = [cards[name] for name in path.lessons if name in cards]
+        chosen = cards.get(path.picture or "")
+        shown = steps if chosen is None else [chosen]
+        pictures = [card.picture for card in shown if card.picture is not None]
         if steps:
-            yield CardGroup(path.title, path.summary, tuple(cards[name] for name in steps))
-        for name in steps:
+            picture = pictures[-1] if pictures else None
+            yield CardGroup(path.title, path.summary, picture, tuple(steps))
+        for name in path.lessons:
             rest.pop(name, None)
     if rest:
-        yield CardGroup("", "", tuple(rest.values()))
+        yield CardGroup("", "", None, tuple(rest.values()))
 
 
 def _pictures_of(library: Library, place: urls.Place, owner: Owner) -> tuple[PictureLink, ...]:

@@ -284,7 +284,9 @@ def _check_paths(root: ObjectNode, lessons: Iterable[model.Lesson]) -> Iterator[
         items = [item for item in path.items("lessons") if isinstance(item, StringNode)]
         steps = [(item.value, item.span) for item in items]
         yield from check_unique(steps, "field-value", "the lesson `{}` is named twice")
-        for name, span in steps:
+        picture = path.get("picture")
+        pictured = [(picture.value, picture.span)] if isinstance(picture, StringNode) else []
+        for name, span in (*steps, *pictured):
             if name not in names:
                 message = f"no lesson of the map has the id `{shorten(name)}`"
                 yield diagnose("path-unknown", span, message, help=did_you_mean(name, names))

@@ -264,6 +264,9 @@ class SimLab(CommonLab, frozen=True, forbid_unknown_fields=True):
     ] = ()
     forceScale: Annotated[Positive | None, Meta(description="of drawn forces, in m/N")] = None  # noqa: N815
     autoplay: Annotated[bool, Meta(description="starts running")] = False
+    grab: Annotated[
+        bool, Meta(description="a mouse or a finger takes hold of bodies from the start")
+    ] = False
     stopAt: Annotated[  # noqa: N815
         Positive | None, Meta(description="pauses at this simulated time, in seconds")
     ] = None

@@ -1,4 +1,9 @@
-/** Prepares for print: sets the running title, and opens folds for browsers in which style sheets cannot. */
+/**
+ * Prepares for print: sets the running title, puts the answers of questions behind the text, and opens folds for browsers in which
+ * style sheets cannot. A further section that is closed is not printed.
+ */
+
+const CLOSED = '.further-text:not([open])'
 
 /** A text as a string of CSS. */
 export function cssString(text) {
@@ -6,15 +11,50 @@ export function cssString(text) {
 }
 
 export function openForPrint(window) {
-  const { documentElement } = window.document
+  const { document } = window
   let openedFolds = []
+  let putBack = () => {}
   window.addEventListener('beforeprint', () => {
-    documentElement.style.setProperty('--running-title', cssString(window.document.title))
-    openedFolds = [...window.document.querySelectorAll('details:not([open])')]
+    document.documentElement.style.setProperty('--running-title', cssString(document.title))
+    openedFolds = [...document.querySelectorAll('details:not([open], .further-text)')]
     for (const details of openedFolds) details.open = true
+    putBack = moveAnswers(document)
   })
   window.addEventListener('afterprint', () => {
+    putBack()
+    putBack = () => {}
     for (const details of openedFolds) details.open = false
     openedFolds = []
   })
+}
+
+/** Move the answers of all questions that are printed to a section behind the text. @returns {() => void} puts them back */
+function moveAnswers(document) {
+  const text = document.querySelector('.columns > .prose')
+  const section = document.createElement('section')
+  section.className = 'answers'
+  const places = []
+  for (const quiz of text?.querySelectorAll('.quiz') ?? []) {
+    const answers = [...quiz.querySelectorAll('.question > .answer:not(.is-empty)')]
+    if (answers.length === 0 || quiz.closest(CLOSED) !== null) continue
+    const title = document.createElement('p')
+    title.className = 'quiz-title'
+    title.textContent = quiz.getAttribute('aria-label')
+    const list = document.createElement('ol')
+    for (const answer of answers) {
+      const item = document.createElement('li')
+      item.value = Number(answer.closest('.question').dataset.number)
+      const mark = document.createComment('')
+      answer.replaceWith(mark)
+      item.append(answer)
+      list.append(item)
+      places.push([mark, answer])
+    }
+    section.append(title, list)
+  }
+  if (places.length > 0) text.after(section)
+  return () => {
+    for (const [mark, answer] of places) mark.replaceWith(answer)
+    section.remove()
+  }
 }

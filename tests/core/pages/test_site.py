@@ -290,6 +290,8 @@ def test_the_home_page_shows_paths_and_then_what_is_in_none(make: Make) -> None:
     names = [(title, re.findall(r'data-lesson="([^"]+)"', cards)) for title, cards in groups]
     assert names == [("A weekend", ["0.1"]), ("More lessons", ["1.1"])]
     assert "<p>Ends in an *arm*.</p>" in home
+    start = re.search(r'<h3>A weekend</h3>.*?<a class="button" href="([^"]+)"', home, re.DOTALL)
+    assert start is not None and start[1].startswith("lessons/0.1-")
 
 
 BASES = ("https://h/", "https://h/deep/er/", "file:///home/u/site/")

@@ -72,6 +72,7 @@ export class Instrument {
       pull: (request) => this.simulation.pull(request),
       keys: { ' ': () => this.togglePlay(), '.': () => this.step(1), ',': () => this.step(-1), r: () => this.reset() },
     })
+    this.hands.grabs = Boolean(config.grab)
     this.transport = buildTransport(words, {
       play: () => this.togglePlay(),
       step: null,
@@ -87,7 +88,7 @@ export class Instrument {
     })
     const { arrows, boxes } = buildOverlays(config, words, (name, isOn) => this.simulation.overlay(name, isOn))
     if (arrows !== null) this.transport.speed.after(arrows)
-    const grab = switchButton(icon('hand'), 'lab-icon', words('lab.live.grab'), false, (isOn) => (this.hands.grabs = isOn))
+    const grab = switchButton(icon('hand'), 'lab-icon', words('lab.live.grab'), this.hands.grabs, (isOn) => (this.hands.grabs = isOn))
     this.transport.speed.after(grab)
     this.readouts = buildReadouts(config.readouts, formatReadout)
     this.panel = new ModelPanel(words, {
