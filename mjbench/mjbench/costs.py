@@ -163,12 +163,7 @@ def scenario_job(
         states = [full_state(model, initial_data(scenario, model)) for scenario in scenarios]
     runs = []
     for scenario, state in zip(scenarios, states, strict=True):
-        commands: list[tuple[Array | None, int]] = [
-            (np.array(command) if command else None, round((end - begin) / timestep))
-            for begin, end, command in scenario.holds()
-        ]
-        if scenario.loop is not None:
-            commands = [*_loop_commands(model, scenario, timestep)]
+        commands = commands_of(model, scenario, timestep)
         parts = [(None if c is None else c[commanded], steps) for c, steps in commands]
         runs.append((state, parts))
 
@@ -185,11 +180,17 @@ def scenario_job(
     return job
 
 
-def _loop_commands(model: Any, scenario: Scenario, timestep: float) -> list[tuple[Array, int]]:
-    """What a controller commands, each with the number of steps for which that holds.
+def commands_of(model: Any, scenario: Scenario, timestep: float) -> list[tuple[Array | None, int]]:
+    """The commands of a scenario, each with the number of steps for which it holds.
 
-    What is timed is the engine under the same commands: the controller takes the same in all.
+    Those of a controller are what it commands from the beginning: what is timed is the engine under
+    the same commands, as the controller takes the same in all.
     """
+    if scenario.loop is None:
+        return [
+            (np.array(command) if command else None, round((end - begin) / timestep))
+            for begin, end, command in scenario.holds()
+        ]
     model = copy.copy(model)
     model.opt.timestep = timestep
     data, commands = initial_data(scenario, model), list[tuple[Array, int]]()
@@ -199,4 +200,4 @@ def _loop_commands(model: Any, scenario: Scenario, timestep: float) -> list[tupl
             commands[-1] = commands[-1][0], commands[-1][1] + 1
         else:
             commands.append((data.ctrl.copy(), 1))
-    return commands
+    return [*commands]
