@@ -17,10 +17,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjbench.costs import commands_of
+from mjbench.costs import inputs_of
 from mjbench.pilot import with_setting
-from mjbench.problem import Array
-from mjbench.reports.scene_report import PhaseProfile, WorkPrecisionRow
+from mjbench.problem import Array, Inputs
+from mjbench.reports.scene_report import PhaseProfile, WorkPrecisionRow, step_evaluations
 from mjbench.scene import Scene
 from mjbench.simulation import STATE, full_state, initial_data, silent
 
@@ -78,8 +78,8 @@ class _Job:
     def __init__(self, model: Any, scene: Scene, number: int, row: WorkPrecisionRow) -> None:
         self._number, self._row = number, row
         self._model = with_setting(model, row.setting)
-        commands = commands_of(self._model, scene.scenario, row.setting.timestep)
-        self._commands = list(_stretches(commands))
+        holds = inputs_of(self._model, scene.scenario, row.setting.timestep)
+        self._holds = list(_stretches(holds))
         self._data = initial_data(scene.scenario, self._model)
         self._state = full_state(self._model, self._data)
         variants = [self._model]
@@ -96,7 +96,7 @@ class _Job:
 
     def profile(self) -> PhaseProfile:
         """What all rounds say."""
-        steps = sum(count for _, count in self._commands)
+        steps = sum(count for _, count in self._holds)
         times, *others = (_quickest(np.array(tables)) / steps for _, tables in self._variants)
         phases = _phases(times)
         for without_sensors in others:
@@ -107,6 +107,7 @@ class _Job:
             row=self._number,
             name=self._row.name,
             steps=steps,
+            evaluations=steps * step_evaluations(self._row.setting.integrator),
             step=float(times[_TIMERS.mjTIMER_STEP]),
             phases=phases,
             contacts=(float(counts[:, 0].mean()), int(counts[:, 0].max())),
@@ -118,11 +119,10 @@ class _Job:
 
     def _timed_run(self, variant: Any) -> Array:
         """What each timer says of each stretch, (stretches, timers) in s."""
-        table = np.zeros((len(self._commands), int(_TIMERS.mjNTIMER)))
+        table = np.zeros((len(self._holds), int(_TIMERS.mjNTIMER)))
         data = self._begin()
-        for times, (command, steps) in zip(table, self._commands, strict=True):
-            if command is not None:
-                data.ctrl[:] = command
+        for times, (inputs, steps) in zip(table, self._holds, strict=True):
+            inputs.give(data)
             data.timer.duration[:] = 0
             mujoco.mj_step(variant, data, steps)
             times[:] = data.timer.duration
@@ -131,9 +131,8 @@ class _Job:
     def _count(self) -> Array:
         """Contacts, rows of constraints, iterations and islands after each step: (steps, 4)."""
         data, counts = self._begin(), []
-        for command, steps in self._commands:
-            if command is not None:
-                data.ctrl[:] = command
+        for inputs, steps in self._holds:
+            inputs.give(data)
             for _ in range(steps):
                 mujoco.mj_step(self._model, data)
                 counts.append((data.ncon, data.nefc, data.solver_niter.sum(), data.nisland))
@@ -145,13 +144,11 @@ class _Job:
         return self._data
 
 
-def _stretches(
-    commands: Sequence[tuple[Array | None, int]],
-) -> Iterator[tuple[Array | None, int]]:
-    """The same commands, none for more steps than a stretch has."""
-    for command, steps in commands:
+def _stretches(holds: Sequence[tuple[Inputs, int]]) -> Iterator[tuple[Inputs, int]]:
+    """The same inputs, none for more steps than a stretch has."""
+    for inputs, steps in holds:
         for begin in range(0, steps, _STRETCH):
-            yield command, min(_STRETCH, steps - begin)
+            yield inputs, min(_STRETCH, steps - begin)
 
 
 def _quickest(tables: Array) -> Array:

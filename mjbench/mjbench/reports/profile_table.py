@@ -26,27 +26,37 @@ def profile_text(
     most = f"{phase} takes the most of a step, {100 * share:.0f} %"
     if rival is None:
         return most
-    steps = math.log(rival.steps / own_profile.steps)
-    step = math.log(rival.step / own_profile.step) if rival.step and own_profile.step else 0.0
-    if is_alike or max(abs(steps), abs(step)) < _ALIKE:
+    often = math.log(rival.evaluations / own_profile.evaluations)
+    times = _evaluation(own_profile), _evaluation(rival)
+    length = math.log(times[1] / times[0]) if all(times) else 0.0
+    if is_alike or max(abs(often), abs(length)) < _ALIKE:
         return f"{most}; the verdict rests on errors, not on time"
-    times = f"a step {_text(own_profile.step)} → {_text(rival.step)} under {rival.name}"
-    if abs(steps) < abs(step):
-        return f"{most}; the verdict rests on {_changed(own_profile, rival)}: {times}"
-    number = f"{rival.name} makes {rival.steps / own_profile.steps:.2g} times as many"
-    length = "takes about as long"
-    if abs(step) >= _ALIKE:
-        length = f"is {'slower' if step > 0 else 'faster'}, by {_changed(own_profile, rival)}"
-    return f"{most}; the verdict rests on the number of steps: {number}, and each {length}"
+    if abs(often) < abs(length):
+        what = f"{_text(times[0])} → {_text(times[1])} under {rival.name}"
+        return f"{most}; the verdict rests on {_changed(own_profile, rival)}: an evaluation {what}"
+    number = f"{rival.evaluations / own_profile.evaluations:.2g} times as often"
+    text = f"the verdict rests on how often the dynamics are evaluated: {number} under {rival.name}"
+    each = "takes about as long"
+    if abs(length) >= _ALIKE:
+        each = f"is {'slower' if length > 0 else 'faster'}, by {_changed(own_profile, rival)}"
+    return f"{most}; {text}, and each {each}"
+
+
+def _evaluation(profile: PhaseProfile) -> float:
+    """What an evaluation of the forward dynamics takes, with its share of the step, s."""
+    return profile.step * profile.steps / profile.evaluations
 
 
 def _changed(own_profile: PhaseProfile, rival: PhaseProfile) -> str:
-    """The phase in which most of the difference of two steps lies, and what it takes in both."""
-    sign = math.copysign(1.0, rival.step - own_profile.step)
-    gaps = {n: sign * (rival.phases.get(n, 0.0) - t) for n, t in own_profile.phases.items()}
-    phase = max(gaps, key=lambda name: gaps[name])
-    before, after = (p.phases.get(phase, 0.0) for p in (own_profile, rival))
-    return f"{phase} ({_text(before)} → {_text(after)})"
+    """The phase with most of the difference, and what it takes of an evaluation in both."""
+    shares = [p.steps / p.evaluations for p in (own_profile, rival)]
+    sign = math.copysign(1.0, _evaluation(rival) - _evaluation(own_profile))
+    pairs = {
+        name: (shares[0] * time, shares[1] * rival.phases.get(name, 0.0))
+        for name, time in own_profile.phases.items()
+    }
+    phase = max(pairs, key=lambda name: sign * (pairs[name][1] - pairs[name][0]))
+    return f"{phase} ({_text(pairs[phase][0])} → {_text(pairs[phase][1])})"
 
 
 def _text(seconds: float) -> str:

@@ -308,6 +308,8 @@ class PhaseProfile(Record, frozen=True):
     name: str
     """The setting in words."""
     steps: int
+    evaluations: int
+    """Of the forward dynamics, over the scenario."""
     step: float
     """Wall time of a step, s: of each stretch of steps the quickest of all rounds."""
     phases: Mapping[str, float]
