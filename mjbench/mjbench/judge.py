@@ -27,10 +27,11 @@ from mjbench.columns import (
     ratios,
     spreads,
     times_text,
+    unresolved_columns,
     worse_columns,
 )
 from mjbench.reports import reach_bound
-from mjbench.reports.limits import reach_text
+from mjbench.reports.limits import stability_text
 from mjbench.reports.scene_report import (
     ErrorParts,
     RowVerdict,
@@ -179,7 +180,8 @@ def _judge_rival(
     everywhere = [own_ratios, *nearby]
     gain, worse = _gain(everywhere), tuple(worse_columns(spreads(everywhere)))
     if worse:
-        texts = tuple(part.text(figure) for part in worse)
+        unresolved = unresolved_columns(pair[0], leasts)
+        texts = tuple(part.text(figure, unresolved) for part in worse)
         return f"{none}{claim} here, but from starts nearby {texts[0]}", False, texts
     if cost > 1 - _WORTH_SAYING and gain.high > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, but is no better from starts nearby", False, ()
@@ -222,8 +224,10 @@ def _describe_rival(
         return "", ()
     share = row.cost.value / own_place.cost.value
     pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
-    own_ratios = ratios(pair[0], pair[1], leasts_of(report))
-    texts = tuple(part.text(report.figure) for part in worse_columns(spreads([own_ratios])))
+    leasts = leasts_of(report)
+    own_ratios, unresolved = ratios(pair[0], pair[1], leasts), unresolved_columns(pair[0], leasts)
+    worse = worse_columns(spreads([own_ratios]))
+    texts = tuple(part.text(report.figure, unresolved) for part in worse)
     if row.lucky or not texts:
         gain = _advantage(share, _gain([own_ratios]), report.figure)
         reason = row.lucky or "that is within what such runs differ by"
@@ -352,7 +356,7 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
         if quantity.name == "step_error" and row.seen is not None and row.seen > value:
             error += f", and by {row.seen:.2g} with the model of contacts"
     better, *_ = report.verdict.text.split("; the scene's own error")
-    lines = [speed, error + parts_text(report.parts), better, _stability_line(report)]
+    lines = [speed, error + parts_text(report.parts), better, stability_text(report)]
     missing = [f"{failure.part}: {failure.reason}" for failure in report.failures]
     if report.horizon < report.duration * (1 - 1e-9):
         missing.append(f"nothing beyond {seconds_text(report.horizon, 3)} can be predicted")
@@ -379,27 +383,6 @@ def parts_text(parts: ErrorParts | None) -> str:
         "rounding": "rounding's",
     }[parts.dominant]
     return f"; most of what is seen is {name}" + (f": {parts.mend}" if parts.mend else "")
-
-
-def _stability_line(report: ScenarioReport) -> str:
-    """How long the timestep of the own integrator may be, and for what."""
-    baseline = report.own_setting
-    row = next((r for r in report.stable if baseline and r.integrator == baseline.integrator), None)
-    if row is None:
-        return ""
-    parts = [f"{row.integrator} stays bounded at {_upto(row, row.shown)}"]
-    for limit, words, reason in (
-        (row.near, "near the motion of small steps", row.near_reason),
-        (row.through, "with nothing going through", row.through_reason),
-    ):
-        if limit is not None:
-            text = reach_text(limit, row.searched)
-            parts.append(f"{words} at {_upto(row, text)}" + (f" ({reason})" if reason else ""))
-    return ", ".join(parts)
-
-
-def _upto(row: StableRow, text: str) -> str:
-    return f"steps to {text}" if text[:1].isdigit() else text
 
 
 def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
