@@ -18,6 +18,7 @@ import tempfile
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 ROBOTS = """
 gymnasium==1.4.0 gymnasium/envs/mujoco/assets/ant.xml
@@ -58,7 +59,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=int, default=30, metavar="M", help=help)
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep wheels and reports there")
     arguments = parser.parse_args()
-    finished = []
+    outcomes = []
     with tempfile.TemporaryDirectory() as temporary:
         keep = arguments.keep or Path(temporary)
         for package, path in map(str.split, ROBOTS.strip().splitlines()):
@@ -66,9 +67,9 @@ def main() -> int:
                 continue
             model = _unpack(package, keep) / path
             report = keep / f"{package.partition('=')[0]}-{model.stem}.json"
-            finished.append(_measure(model, report, arguments.minutes, full=arguments.full))
-    print(f"{sum(finished)} of {len(finished)} robots are measured")
-    return 0 if all(finished) else 1
+            outcomes.append(_measure(model, report, arguments.minutes, full=arguments.full))
+    print(f"{sum(outcomes)} of {len(outcomes)} robots are measured")
+    return 0 if all(outcomes) else 1
 
 
 def _unpack(package: str, keep: Path) -> Path:
@@ -108,7 +109,7 @@ def _measure(model: Path, report: Path, minutes: int, *, full: bool) -> bool:
     return False
 
 
-def _lines(report: dict) -> Iterator[str]:
+def _lines(report: dict[str, Any]) -> Iterator[str]:
     """The verdicts of a report, and what of it failed."""
     for failure in report["failures"]:
         yield f"{failure['part']} failed: {failure['reason']}"

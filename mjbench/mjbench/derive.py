@@ -106,11 +106,13 @@ def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) ->
     if not profile:
         return report
     rival = rival_row(report)
-    other = next((p for p in profile if rival is report.rows[p.row]), None)
+    rival_profile = next((p for p in profile if rival is report.rows[p.row]), None)
     cost = None if rival is None else rival.cost
     is_alike = cost is not None and cost.low <= 1 <= cost.high
     return replace(
-        report, profile=profile, profile_text=profile_text(profile[0], other, is_alike=is_alike)
+        report,
+        profile=profile,
+        profile_text=profile_text(profile[0], rival_profile, is_alike=is_alike),
     )
 
 

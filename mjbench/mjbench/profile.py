@@ -97,9 +97,11 @@ class _Job:
     def profile(self) -> PhaseProfile:
         """What all rounds say."""
         steps = sum(count for _, count in self._holds)
-        times, *others = (_quickest(np.array(tables)) / steps for _, tables in self._variants)
+        times, *variant_times = (
+            _quickest(np.array(tables)) / steps for _, tables in self._variants
+        )
         phases = _phases(times)
-        for without_sensors in others:
+        for without_sensors in variant_times:
             phases["sensors"] = max(0.0, phases["other"] - _phases(without_sensors)["other"])
             phases["other"] -= phases["sensors"]
         counts = self._count()

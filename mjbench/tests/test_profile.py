@@ -51,8 +51,8 @@ def profile(
     model = mujoco.MjModel.from_xml_string(text)
     (scene,) = scenes(model, NO_DECLARATIONS, quick=True)
     setting = {"solver": "Newton", "iterations": 100, "cone": "pyramidal"}
-    measured = row(integrator, 0.01, name="its own", **{**setting, **fields})
-    (result,) = profile_rows(model, brief(scene), {3: measured}, quick=True, clock=ticks())
+    profiled_row = row(integrator, 0.01, name="its own", **{**setting, **fields})
+    (result,) = profile_rows(model, brief(scene), {3: profiled_row}, quick=True, clock=ticks())
     return result
 
 
@@ -61,15 +61,15 @@ def brief(scene: Scene) -> Scene:
 
 
 def test_phases_are_each_their_own_and_together_the_step() -> None:
-    found = profile()
-    assert (found.row, found.name, found.steps) == (3, "its own", 40)
-    assert sum(found.phases.values()) == pytest.approx(found.step)
+    result = profile()
+    assert (result.row, result.name, result.steps) == (3, "its own", 40)
+    assert sum(result.phases.values()) == pytest.approx(result.step)
     # A phase in which no other is timed takes the one tick between the two looks at the clock.
     for name in ("broad collision", "narrow collision", "velocity", "actuation", "solver"):
-        assert found.phases[name] == pytest.approx(1), name
-    assert found.phases["making constraints"] == pytest.approx(2), "made, and projected"
-    assert found.phases["other"] > 0 and found.phases["integration"] > 1
-    assert "sensors" not in found.phases, "there are none"
+        assert result.phases[name] == pytest.approx(1), name
+    assert result.phases["making constraints"] == pytest.approx(2), "made, and projected"
+    assert result.phases["other"] > 0 and result.phases["integration"] > 1
+    assert "sensors" not in result.phases, "there are none"
 
 
 def test_a_step_of_rk4_is_four_evaluations_and_what_lies_between_them() -> None:
@@ -82,8 +82,8 @@ def test_a_step_of_rk4_is_four_evaluations_and_what_lies_between_them() -> None:
 
 def test_sensors_are_what_a_step_takes_more_with_them() -> None:
     """Sensors read no clock, so they take none of this one's ticks; what they take is measured."""
-    found = profile(sensors=IMU)
-    assert found.phases["sensors"] == pytest.approx(0)
+    result = profile(sensors=IMU)
+    assert result.phases["sensors"] == pytest.approx(0)
     off = 'island="enable" sensor="disable"'
     assert "sensors" not in profile(sensors=IMU, flags=off).phases, "they are off anyway"
 
@@ -110,7 +110,7 @@ def phases(
 
 
 @pytest.mark.parametrize(
-    ("other", "text"),
+    ("rival", "text"),
     [
         (None, ""),
         (
@@ -134,17 +134,17 @@ def phases(
         ),
     ],
 )
-def test_a_sentence_says_what_the_verdict_rests_on(other: PhaseProfile | None, text: str) -> None:
+def test_a_sentence_says_what_the_verdict_rests_on(rival: PhaseProfile | None, text: str) -> None:
     most = "solver takes the most of a step, 67 %"
-    assert profile_text(phases(collision=3, solver=6), other) == "; ".join(
+    assert profile_text(phases(collision=3, solver=6), rival) == "; ".join(
         filter(None, (most, text))
     )
 
 
 def test_a_step_with_four_evaluations_is_compared_by_the_evaluation() -> None:
     """Else all that RK4 does four times would look like what the verdict rests on."""
-    rk4, other = phases(evaluations=4, collision=12, solver=24), phases(1, collision=3, solver=6)
-    text = profile_text(rk4, other)
+    rk4, euler = phases(evaluations=4, collision=12, solver=24), phases(1, collision=3, solver=6)
+    text = profile_text(rk4, euler)
     assert "evaluated: 0.25 times as often under Euler at 4 ms, and each takes about as" in text
 
 
@@ -157,8 +157,8 @@ def test_what_timing_cannot_tell_apart_rests_on_no_phase() -> None:
 def test_the_rival_of_a_verdict_is_profiled_and_named() -> None:
     mine = row(own=True, seen=0.5, cost=1, dominated_by=1, name="Euler at 2 ms")
     better = row(timestep=0.004, seen=0.4, cost=0.5, front=True, name="Euler at 4 ms")
-    other = row("RK4", seen=0.1, cost=4, front=True)
-    report = derive_scenario(scenario([mine, better, other]), lambda _: ())
+    dear_row = row("RK4", seen=0.1, cost=4, front=True)
+    report = derive_scenario(scenario([mine, better, dear_row]), lambda _: ())
     assert list(compared_rows(report)) == [0, 1]
     pair = phases(collision=3, solver=6), phases(1, collision=0.5, solver=5.5)
     report = derive_profile(report, pair)

@@ -71,8 +71,8 @@ def test_commands_hold_as_long_as_without_a_push() -> None:
     commands = "controls = [[1, 0], [2, 0], [3, 0]]\nhold = 0.25\n"
     model, scene = scene_of(commands + PUSH)
     assert scene.scenario.hold == pytest.approx(0.05)
-    given = [inputs.controls[0] for inputs in scene.scenario.inputs(0.01)]
-    assert given == [1.0] * 25 + [2.0] * 25 + [3.0] * 50, "the last to the end"
+    rows = [inputs.controls[0] for inputs in scene.scenario.inputs(0.01)]
+    assert rows == [1.0] * 25 + [2.0] * 25 + [3.0] * 50, "the last to the end"
     body = int(model.body("puck").id)
     data, pushed = mujoco.MjData(model), []
     for number, inputs in enumerate(scene.scenario.inputs(0.01)):
@@ -100,10 +100,10 @@ def test_poses_follow_each_other_and_others_stay() -> None:
     hand, target = (model.body(name).mocapid[0] for name in ("hand", "target"))
     assert data.mocap_pos[hand].tolist() == [1, 0, 0]
     assert data.mocap_quat[hand].tolist() == [1, 0, 0, 0], "lengths of quaternions are mended"
-    given = list(scene.scenario.inputs(0.01))
-    given[49].give(data)
+    rows = list(scene.scenario.inputs(0.01))
+    rows[49].give(data)
     assert data.mocap_pos[hand].tolist() == [1, 0, 0]
-    given[50].give(data)
+    rows[50].give(data)
     assert data.mocap_pos[hand].tolist() == [0, 0, 3]
     assert data.mocap_pos[target].tolist() == [0, 1, 0]
 
@@ -148,12 +148,14 @@ def test_a_controller_is_pushed_and_still_commands(tmp_path: Path) -> None:
     )
     loop = read_loop(policy, None, 0.0, 0.0)
     host = LocalHost(tmp_path, lambda _: None)
-    compiled = compile_subject(read_subject(tmp_path / "puck.xml"), host, quick=True, loop=loop)
-    scenario = compiled.scenarios[0].scenario
-    run = simulate(Setup(scenario=scenario), compiled.model)
+    compiled_model = compile_subject(
+        read_subject(tmp_path / "puck.xml"), host, quick=True, loop=loop
+    )
+    scenario = compiled_model.scenarios[0].scenario
+    run = simulate(Setup(scenario=scenario), compiled_model.model)
     assert run.states.qvel[-1, 0] == pytest.approx(0.5, abs=1e-12), "pushed"
     assert run.states.qvel[-1, 1] == pytest.approx(1.0, abs=1e-3), "and turned by the controller"
-    holds = inputs_of(compiled.model, scenario, 0.01)
+    holds = inputs_of(compiled_model.model, scenario, 0.01)
     assert sum(steps for _, steps in holds) == 100
     assert any(inputs.controls[0] and any(inputs.forces) for inputs, _ in holds)
 

@@ -32,14 +32,16 @@ def profile_text(
     if is_alike or max(abs(often), abs(length)) < _ALIKE:
         return f"{most}; the verdict rests on errors, not on time"
     if abs(often) < abs(length):
-        what = f"{_text(times[0])} → {_text(times[1])} under {rival.name}"
-        return f"{most}; the verdict rests on {_changed(own_profile, rival)}: an evaluation {what}"
+        change = f"{_text(times[0])} → {_text(times[1])} under {rival.name}"
+        return (
+            f"{most}; the verdict rests on {_changed(own_profile, rival)}: an evaluation {change}"
+        )
     number = f"{rival.evaluations / own_profile.evaluations:.2g} times as often"
     text = f"the verdict rests on how often the dynamics are evaluated: {number} under {rival.name}"
-    each = "takes about as long"
+    speed = "takes about as long"
     if abs(length) >= _ALIKE:
-        each = f"is {'slower' if length > 0 else 'faster'}, by {_changed(own_profile, rival)}"
-    return f"{most}; {text}, and each {each}"
+        speed = f"is {'slower' if length > 0 else 'faster'}, by {_changed(own_profile, rival)}"
+    return f"{most}; {text}, and each {speed}"
 
 
 def _evaluation(profile: PhaseProfile) -> float:
