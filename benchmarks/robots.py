@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import json
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -104,8 +105,11 @@ def _measure(model: Path, report: Path, minutes: int, *, full: bool) -> bool:
             print(f"  {line}", flush=True)
         if not run.returncode and not failures:
             return True
-    reason = f"more than {minutes} minutes" if run.returncode < 0 else run.stderr.strip()
-    print(f"  not measured: {reason or 'see the failures above'}", flush=True)
+    reason = run.stderr.strip() or f"ended by signal {-run.returncode}"
+    if -run.returncode in (signal.SIGXCPU, signal.SIGKILL):
+        reason = f"more than {minutes} minutes"
+    if run.returncode:
+        print(f"  not measured: {reason}", flush=True)
     return False
 
 
