@@ -135,7 +135,7 @@ def phases(
     ],
 )
 def test_a_sentence_says_what_the_verdict_rests_on(rival: PhaseProfile | None, text: str) -> None:
-    most = "solver takes the most of a step, 67 %"
+    most = "of the phases solver takes the most, 67 % of a step"
     assert profile_text(phases(collision=3, solver=6), rival) == "; ".join(
         filter(None, (most, text))
     )
@@ -146,6 +146,11 @@ def test_a_step_with_four_evaluations_is_compared_by_the_evaluation() -> None:
     rk4, euler = phases(evaluations=4, collision=12, solver=24), phases(1, collision=3, solver=6)
     text = profile_text(rk4, euler)
     assert "evaluated: 0.25 times as often under Euler at 4 ms, and each takes about as" in text
+
+
+def test_what_has_no_timer_is_no_phase() -> None:
+    text = profile_text(phases(solver=3, other=7), None)
+    assert text == "of the phases solver takes the most, 30 % of a step"
 
 
 def test_what_timing_cannot_tell_apart_rests_on_no_phase() -> None:

@@ -21,9 +21,10 @@ def profile_text(
     Without a `rival` only what takes the longest is known. `is_alike`: whether the costs of both
     scenarios are no more apart than timing can tell.
     """
-    phase = max(own_profile.phases, key=lambda name: own_profile.phases[name])
+    phases = [name for name in own_profile.phases if name != "other"]
+    phase = max(phases, key=lambda name: own_profile.phases[name])
     share = own_profile.phases[phase] / own_profile.step if own_profile.step else 0.0
-    most = f"{phase} takes the most of a step, {100 * share:.0f} %"
+    most = f"of the phases {phase} takes the most, {100 * share:.0f} % of a step"
     if rival is None:
         return most
     often = math.log(rival.evaluations / own_profile.evaluations)
