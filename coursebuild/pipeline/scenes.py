@@ -162,6 +162,7 @@ def _hash_file(file: Path) -> bytes:
 
 
 _LATER = ("room", "stable_for", "search", "limits", "expected", "precision", "horizon_error")
+_LATER += ("act", "push", "poses")
 _PLAIN = asdict(ScenarioTable("plain"))
 
 

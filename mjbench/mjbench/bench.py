@@ -203,14 +203,28 @@ def _with_task(
 
 
 def run_scenario(
-    compiled_model: CompiledModel, number: int, host: Host, *, quick: bool, timed: bool
+    compiled_model: CompiledModel,
+    number: int,
+    host: Host,
+    *,
+    quick: bool,
+    timed: bool,
+    profile: bool = False,
 ) -> ScenarioReport:
-    """Measure a scenario, given by its number; a `CannotMeasureError` where it cannot be done."""
+    """Measure a scenario, given by its number; a `CannotMeasureError` where it cannot be done.
+
+    `profile`: whether to say where the time goes.
+    """
     clock = time.thread_time_ns if timed else None
     with report_errors(compiled_model.subject), one_processor():
         scenario = compiled_model.scenarios[number]
         return measure_scenario(
-            compiled_model.model, scenario, quick=quick, clock=clock, tell=host.tell
+            compiled_model.model,
+            scenario,
+            quick=quick,
+            clock=clock,
+            tell=host.tell,
+            profile=profile,
         )
 
 

@@ -105,6 +105,8 @@ def _parser() -> argparse.ArgumentParser:
     help = "measure other engines instead: all, or some, as in mjx,warp"
     command.add_argument("--engines", nargs="?", const="", metavar="NAMES", help=help)
     command.add_argument("--quick", action="store_true", help="fewer settings and rough times")
+    help = "say where the time goes, by phase, under the settings that the verdict compares"
+    command.add_argument("--profile", action="store_true", help=help)
     help = "write a page with verdicts, plots and tables"
     command.add_argument("--html", type=Path, metavar="FILE", help=help)
     _add_report_options(command)
@@ -210,9 +212,12 @@ def _bench(arguments: argparse.Namespace) -> int:
         subject = msgspec.structs.replace(subject, digest=hashlib.sha256(code).hexdigest())
     elif options != (None, None, None):
         raise _UsageError("--period, --delay and --noise are of a controller: --control FILE")
+    if arguments.profile and arguments.check:
+        raise _UsageError("--check compares no times, and --profile is of nothing else")
     if arguments.engines is not None:
-        if loop or arguments.task:
-            raise _UsageError("other engines are measured without controller and task")
+        if loop or arguments.task or arguments.profile:
+            message = "other engines are measured without controller, task and profile"
+            raise _UsageError(message)
         if arguments.check:
             raise _UsageError("32 bits do not repeat from one device to the next: no --check")
         names = [name.strip() for name in arguments.engines.split(",") if name.strip()]
@@ -225,7 +230,9 @@ def _bench(arguments: argparse.Namespace) -> int:
     compiled_model = bench.compile_subject(
         subject, host, quick=quick, loop=loop, task=arguments.task
     )
-    scene, is_stopped = _measure_scene(compiled_model, host, quick=quick, timed=timed)
+    scene, is_stopped = _measure_scene(
+        compiled_model, host, quick=quick, timed=timed, profile=arguments.profile
+    )
     if recorded is not None:
         departures = scene_departures(recorded, scene, compiled_model.declarations.bench)
         _print(arguments, departures, text.departures_text(departures))
@@ -242,7 +249,12 @@ def _bench(arguments: argparse.Namespace) -> int:
 
 
 def _measure_scene(
-    compiled_model: bench.CompiledModel, host: LocalHost, *, quick: bool, timed: bool
+    compiled_model: bench.CompiledModel,
+    host: LocalHost,
+    *,
+    quick: bool,
+    timed: bool,
+    profile: bool,
 ) -> tuple[SceneReport, bool]:
     """A model in all of its scenarios and sweeps, and whether the user stopped it."""
     scenarios: list[ScenarioReport] = []
@@ -250,7 +262,9 @@ def _measure_scene(
 
     def scenario(number: int) -> None:
         try:
-            report = bench.run_scenario(compiled_model, number, host, quick=quick, timed=timed)
+            report = bench.run_scenario(
+                compiled_model, number, host, quick=quick, timed=timed, profile=profile
+            )
         except StoppedError as error:
             scenarios.append(error.report)
             raise KeyboardInterrupt from None

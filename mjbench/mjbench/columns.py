@@ -8,7 +8,7 @@ maximum over all of them would hide that a longer timestep doubles the rest.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 from msgspec import Struct
@@ -110,17 +110,31 @@ class Spread(Struct, frozen=True):
         """Whether it is larger from some starts and not from others."""
         return self.high > 1 + ERROR_SLACK and not self.is_worse
 
-    def text(self, figure: str) -> str:
-        """In words: what is how many times as large, and when."""
+    def text(self, figure: str, unresolved: Collection[Column] = ()) -> str:
+        """In words: what is how many times as large, and when.
+
+        `unresolved`: columns in which no error of the other setting is known, only that it is less
+        than can be: the factor is the least then.
+        """
         if self.column[0] == LOST:
             return "it is lost"
-        label = self.label(figure)
-        return f"{label} is {times_text(self.low, self.high)} as large {self.column[1]}"
+        least = "at least " if self.column in unresolved else ""
+        times = f"{least}{times_text(self.low, self.low if least else self.high)}"
+        return f"{self.label(figure)} is {times} as large {self.column[1]}"
 
     def label(self, figure: str) -> str:
         """What errs, in words."""
         name = self.column[0]
         return (figure.partition(" [")[0] or "the figure") if name == "figure" else LABELS[name]
+
+
+def unresolved_columns(columns: Columns, leasts: Mapping[str, float]) -> frozenset[Column]:
+    """The columns whose errors are too small for the reference to resolve, and not 0 exactly."""
+    return frozenset(
+        column
+        for column, value in columns.items()
+        if value <= (least := leasts.get(column[0], 0.0)) * (1 + 1e-9) and least
+    )
 
 
 def spreads(starts: Sequence[Mapping[Column, float]]) -> list[Spread]:

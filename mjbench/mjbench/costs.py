@@ -20,9 +20,10 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 
 from mjbench.pilot import apply, with_setting
-from mjbench.problem import Array, Scenario
+from mjbench.problem import Array, Inputs, Scenario
 from mjbench.reports import Interval
 from mjbench.reports.scene_report import MeasuredSetting
 from mjbench.scene import Scene
@@ -163,13 +164,16 @@ def scenario_job(
         states = [full_state(model, initial_data(scenario, model)) for scenario in scenarios]
     runs = []
     for scenario, state in zip(scenarios, states, strict=True):
-        commands: list[tuple[Array | None, int]] = [
-            (np.array(command) if command else None, round((end - begin) / timestep))
-            for begin, end, command in scenario.holds()
+        holds = inputs_of(model, scenario, timestep)
+        # Arrays take less time than rows of numbers, which would be part of what is timed.
+        parts = [
+            (
+                np.array(inputs.controls)[commanded] if inputs.controls else None,
+                replace(inputs, controls=()) if inputs.forces or inputs.poses else None,
+                steps,
+            )
+            for inputs, steps in holds
         ]
-        if scenario.loop is not None:
-            commands = [*_loop_commands(model, scenario, timestep)]
-        parts = [(None if c is None else c[commanded], steps) for c, steps in commands]
         runs.append((state, parts))
 
     def job() -> None:
@@ -177,26 +181,35 @@ def scenario_job(
             if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
                 mujoco.mj_resetData(model, data)  # a state does not say who sleeps
             mujoco.mj_setState(model, data, state, STATE)
-            for command, steps in parts:
+            for command, outside, steps in parts:
                 if command is not None:
                     data.ctrl[:] = command
+                if outside is not None:
+                    outside.give(data)
                 mujoco.mj_step(model, data, steps)
 
     return job
 
 
-def _loop_commands(model: Any, scenario: Scenario, timestep: float) -> list[tuple[Array, int]]:
-    """What a controller commands, each with the number of steps for which that holds.
+def inputs_of(model: Any, scenario: Scenario, timestep: float) -> list[tuple[Inputs, int]]:
+    """The inputs of a scenario, each with the number of steps for which it holds.
 
-    What is timed is the engine under the same commands: the controller takes the same in all.
+    Those of a controller are what it commands from the beginning: what is timed is the engine under
+    the same commands, as the controller takes the same in all.
     """
+    if scenario.loop is None:
+        return [
+            (inputs, round((end - begin) / timestep)) for begin, end, inputs in scenario.holds()
+        ]
     model = copy.copy(model)
     model.opt.timestep = timestep
-    data, commands = initial_data(scenario, model), list[tuple[Array, int]]()
-    for _ in range(round(scenario.duration / timestep)):
+    data, holds = initial_data(scenario, model), list[tuple[Inputs, int]]()
+    for outside in scenario.inputs(timestep):
+        outside.give(data)
         advance(model, data)
-        if commands and np.array_equal(commands[-1][0], data.ctrl):
-            commands[-1] = commands[-1][0], commands[-1][1] + 1
+        inputs = replace(outside, controls=tuple(data.ctrl.tolist()))
+        if holds and holds[-1][0] == inputs:
+            holds[-1] = inputs, holds[-1][1] + 1
         else:
-            commands.append((data.ctrl.copy(), 1))
-    return commands
+            holds.append((inputs, 1))
+    return holds

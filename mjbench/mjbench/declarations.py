@@ -28,6 +28,7 @@ SweepFigure: TypeAlias = Literal[
     "change", "figure", "penetration", "slip", "restitution",
     "residual", "iterations", "cost", "throughput"
 ]  # fmt: skip
+Pose: TypeAlias = tuple[float, float, float, float, float, float, float]
 SweepValue: TypeAlias = float | str | tuple[float, ...]
 
 
@@ -78,6 +79,16 @@ class Measured(Struct, frozen=True):
     name: str
 
 
+class PushTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A force on a body, for a while."""
+
+    body: Text
+    at: Annotated[float, Meta(ge=0)]
+    duration: Positive
+    force: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    torque: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
 class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     """What happens to the model: initial state, duration, commands."""
 
@@ -90,6 +101,9 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     sample: Positive | None = None
     controls: tuple[tuple[float, ...], ...] = ()
     hold: Positive | None = None
+    act: tuple[float, ...] = ()
+    push: tuple[PushTable, ...] = ()
+    poses: dict[str, Annotated[tuple[Pose, ...], Meta(min_length=1)]] = {}
     measure: Annotated[str, Meta(pattern=r"^(body|site|sensor):\S.*$")] | None = None
     reference: Annotated[str, Meta(pattern=r"^(ode|self|closed:\S.*)$")] | None = None
     conserved: tuple[Literal["energy", "angular-momentum"], ...] | None = None

@@ -12,7 +12,15 @@ from itertools import pairwise
 from msgspec.structs import asdict, replace
 
 from mjbench.columns import mark_dominated
-from mjbench.judge import Starts, find_parts, five_lines, judge_setting, largest_of, mark_luck
+from mjbench.judge import (
+    Starts,
+    find_parts,
+    five_lines,
+    judge_setting,
+    largest_of,
+    mark_luck,
+    rival_row,
+)
 from mjbench.reports import Interval
 from mjbench.reports.case_report import (
     RIGHT,
@@ -24,9 +32,11 @@ from mjbench.reports.case_report import (
 )
 from mjbench.reports.limits import limit_text, map_text, widest_gaps
 from mjbench.reports.model_report import SceneReport
+from mjbench.reports.profile_table import profile_text
 from mjbench.reports.scene_report import (
     ErrorQuantity,
     MeasuredRun,
+    PhaseProfile,
     ScenarioReport,
     StableRow,
     SweepReport,
@@ -89,6 +99,21 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
         lines = five_lines(report)
         report = replace(report, verdict=replace(report.verdict, lines=lines))
     return replace(report, charts=scenario_charts(report))
+
+
+def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) -> ScenarioReport:
+    """The report with where the time goes, the own setting first, and what the verdict rests on."""
+    if not profile:
+        return report
+    rival = rival_row(report)
+    rival_profile = next((p for p in profile if rival is report.rows[p.row]), None)
+    cost = None if rival is None else rival.cost
+    is_alike = cost is not None and cost.low <= 1 <= cost.high
+    return replace(
+        report,
+        profile=profile,
+        profile_text=profile_text(profile[0], rival_profile, is_alike=is_alike),
+    )
 
 
 def _missed(rows: tuple[StableRow, ...]) -> tuple[float, float] | None:

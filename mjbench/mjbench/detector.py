@@ -306,6 +306,8 @@ def driving_force(model: Any, scenario: Scenario) -> str:
             and (has_commands or is_pushing or model.na or np.any(model.actuator_biastype)),
             "actuators act",
         ),
+        (np.any(scenario.forces), "it is pushed"),
+        (len(scenario.poses) > 1, "mocap bodies are moved"),
         (np.any(model.geom_surfacevel), "a surface moves"),
         (np.any(model.geom_adhesion) or np.any(model.pair_adhesion), "contacts adhere"),
         (has_fluid and np.any(model.geom_fluid[:, 0]), "a fluid stores energy"),

@@ -196,9 +196,8 @@ def forward_states(
     state = np.concatenate([data.qpos, data.qvel, data.act])
     rate = _rate(model, data, evaluations)
     states = np.empty((len(times), len(state)))
-    for begin, end, command in scenario.holds(float(times[-1])):
-        if command:
-            data.ctrl[:] = command
+    for begin, end, inputs in scenario.holds(float(times[-1])):
+        inputs.give(data)
         selected = (times > begin + 1e-12) & (times <= end + 1e-12)
         offsets = np.append(times[selected] - begin, end - begin)
         part = method(rate, state, np.maximum.accumulate(offsets))

@@ -27,10 +27,11 @@ from mjbench.columns import (
     ratios,
     spreads,
     times_text,
+    unresolved_columns,
     worse_columns,
 )
 from mjbench.reports import reach_bound
-from mjbench.reports.limits import reach_text
+from mjbench.reports.limits import stability_text
 from mjbench.reports.scene_report import (
     ErrorParts,
     RowVerdict,
@@ -179,7 +180,8 @@ def _judge_rival(
     everywhere = [own_ratios, *nearby]
     gain, worse = _gain(everywhere), tuple(worse_columns(spreads(everywhere)))
     if worse:
-        texts = tuple(part.text(figure) for part in worse)
+        unresolved = unresolved_columns(pair[0], leasts)
+        texts = tuple(part.text(figure, unresolved) for part in worse)
         return f"{none}{claim} here, but from starts nearby {texts[0]}", False, texts
     if cost > 1 - _WORTH_SAYING and gain.high > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, but is no better from starts nearby", False, ()
@@ -216,27 +218,61 @@ def _describe_rival(
     report: ScenarioReport, own_place: FrontPoint, quantity: Quantity
 ) -> tuple[str, tuple[str, ...]]:
     """The cheapest setting that would be better by one number, and why it is not; empty if none."""
-    baseline = next(row for row in report.rows if row.own)
+    row = _cheapest_rival(report, own_place, quantity)
+    baseline = report.own_row
+    if row is None or row.cost is None or baseline is None:
+        return "", ()
+    share = row.cost.value / own_place.cost.value
+    pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
+    leasts = leasts_of(report)
+    own_ratios, unresolved = ratios(pair[0], pair[1], leasts), unresolved_columns(pair[0], leasts)
+    worse = worse_columns(spreads([own_ratios]))
+    texts = tuple(part.text(report.figure, unresolved) for part in worse)
+    if row.lucky or not texts:
+        gain = _advantage(share, _gain([own_ratios]), report.figure)
+        reason = row.lucky or "that is within what such runs differ by"
+        return f"no difference that holds: {row.name} {gain} here, but {reason}", ()
+    return f"no setting is better: {row.name} takes {share:.2g} of the time, but {texts[0]}", texts
+
+
+def _cheapest_rival(
+    report: ScenarioReport, own_place: FrontPoint, quantity: Quantity
+) -> WorkPrecisionRow | None:
     points = [
         (point, row)
         for row in report.rows
         if row.status == "ok" and (point := front_point(row, quantity))
     ]
     cheaper = [(p, r) for p, r in points if p.is_cheaper(own_place) and p.beats(own_place)]
-    if not cheaper:
-        return "", ()
-    place, row = min(cheaper, key=lambda pair: pair[0].cost.value)
-    cost = f"{place.cost.value / own_place.cost.value:.2g}"
-    pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
-    own_ratios = ratios(pair[0], pair[1], leasts_of(report))
-    texts = tuple(part.text(report.figure) for part in worse_columns(spreads([own_ratios])))
-    if row.lucky or not texts:
-        gain = _advantage(
-            place.cost.value / own_place.cost.value, _gain([own_ratios]), report.figure
-        )
-        reason = row.lucky or "that is within what such runs differ by"
-        return f"no difference that holds: {row.name} {gain} here, but {reason}", ()
-    return f"no setting is better: {row.name} takes {cost} of the time, but {texts[0]}", texts
+    return min(cheaper, key=lambda pair: pair[0].cost.value)[1] if cheaper else None
+
+
+def rival_row(report: ScenarioReport) -> WorkPrecisionRow | None:
+    """The setting that a verdict compares with the own one; `None` where there is none."""
+    baseline, quantity = report.own_row, quantity_of(report)
+    if baseline is None or baseline.status != "ok" or baseline.parted is not None:
+        return None
+    if baseline.dominated_by is not None:
+        return report.rows[baseline.dominated_by]
+    own_place = front_point(baseline, quantity)
+    return None if own_place is None else _cheapest_rival(report, own_place, quantity)
+
+
+def compared_rows(report: ScenarioReport) -> dict[int, WorkPrecisionRow]:
+    """The rows that a verdict speaks of, by number: the own one, its rival, what mends its error.
+
+    None where the own setting is lost.
+    """
+    baseline = report.own_row
+    if baseline is None or baseline.status != "ok":
+        return {}
+    rows = [baseline, rival_row(report)]
+    if report.parts is not None and report.parts.dominant:
+        rows.append(_mending_row(report, baseline, report.parts.dominant))
+    if baseline.seen is not None and baseline.seen >= 1:
+        rows.append(_cheapest_unseen(report.rows))
+    numbers = [next(n for n, r in enumerate(report.rows) if r is row) for row in rows if row]
+    return {number: report.rows[number] for number in dict.fromkeys(numbers)}
 
 
 def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
@@ -279,18 +315,22 @@ def _describe_error(report: ScenarioReport, own_row: WorkPrecisionRow) -> str:
         return f"; the scene's own error cannot be seen: it is {size} of what an eye can tell"
     text = "; the scene's own error can be seen: it is "
     text += f"{number_text(error)} times what an eye can tell"
-    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost and not r.lucky]
+    unseen = _cheapest_unseen(rows)
     if own_row.cost is None:
         return text
-    if unseen:
-        cost, first = min((r.cost.value, n) for n, r in enumerate(unseen) if r.cost)
-        times = cost / own_row.cost.value
+    if unseen is not None and unseen.cost is not None:
+        times = unseen.cost.value / own_row.cost.value
         share = f"{number_text(times)} times" if abs(times - 1) > ERROR_SLACK else "about"
-        text += f"; the cheapest without one that is seen is {unseen[first].name}, "
-        text += f"at {share} its cost"
+        text += f"; the cheapest without one that is seen is {unseen.name}, at {share} its cost"
     elif all(r.seen >= 1 for r in rows if r.seen is not None):
         text += ", and that of every other setting too"
     return text
+
+
+def _cheapest_unseen(rows: Rows) -> WorkPrecisionRow | None:
+    """The cheapest setting with an error that cannot be seen; `None` if there is none."""
+    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost and not r.lucky]
+    return min(unseen, key=lambda r: r.cost.value if r.cost else 0.0, default=None)
 
 
 def five_lines(report: ScenarioReport) -> tuple[str, ...]:
@@ -316,7 +356,7 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
         if quantity.name == "step_error" and row.seen is not None and row.seen > value:
             error += f", and by {row.seen:.2g} with the model of contacts"
     better, *_ = report.verdict.text.split("; the scene's own error")
-    lines = [speed, error + parts_text(report.parts), better, _stability_line(report)]
+    lines = [speed, error + parts_text(report.parts), better, stability_text(report)]
     missing = [f"{failure.part}: {failure.reason}" for failure in report.failures]
     if report.horizon < report.duration * (1 - 1e-9):
         missing.append(f"nothing beyond {seconds_text(report.horizon, 3)} can be predicted")
@@ -345,27 +385,6 @@ def parts_text(parts: ErrorParts | None) -> str:
     return f"; most of what is seen is {name}" + (f": {parts.mend}" if parts.mend else "")
 
 
-def _stability_line(report: ScenarioReport) -> str:
-    """How long the timestep of the own integrator may be, and for what."""
-    baseline = report.own_setting
-    row = next((r for r in report.stable if baseline and r.integrator == baseline.integrator), None)
-    if row is None:
-        return ""
-    parts = [f"{row.integrator} stays bounded at {_upto(row, row.shown)}"]
-    for limit, words, reason in (
-        (row.near, "near the motion of small steps", row.near_reason),
-        (row.through, "with nothing going through", row.through_reason),
-    ):
-        if limit is not None:
-            text = reach_text(limit, row.searched)
-            parts.append(f"{words} at {_upto(row, text)}" + (f" ({reason})" if reason else ""))
-    return ", ".join(parts)
-
-
-def _upto(row: StableRow, text: str) -> str:
-    return f"steps to {text}" if text[:1].isdigit() else text
-
-
 def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
     """The same with what dominates, and the cheapest measured setting that halves it."""
     names = ("timestep", "solver", "contact_model", "rounding")
@@ -378,6 +397,23 @@ def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
 
 
 def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
+    row = _mending_row(report, baseline, name)
+    if row is None or baseline.seen is None:
+        return ""
+    less = number_text(baseline.seen / row.seen) if row.seen else "far"
+    price = ""
+    if row.cost is not None and baseline.cost is not None:
+        times = row.cost.value / baseline.cost.value
+        is_same = abs(times - 1) <= ERROR_SLACK
+        price = " for as much time" if is_same else f" for {number_text(times)} times the time"
+    return f"{row.name} errs {less} times less in all{price}"
+
+
+def _mending_row(
+    report: ScenarioReport, baseline: WorkPrecisionRow, name: str
+) -> WorkPrecisionRow | None:
+    """The cheapest setting that halves the error by what is called `name`; `None` if none does."""
+
     def halves(row: WorkPrecisionRow) -> bool:
         setting, mine = row.setting, baseline.setting
         alike = setting.integrator == mine.integrator and setting.timestep == mine.timestep
@@ -390,16 +426,9 @@ def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
 
     matches = [row for row in report.rows if row.status == "ok" and not row.lucky and halves(row)]
     priced = [row for row in matches if row.cost is not None]
-    if not matches or baseline.seen is None:
-        return ""
-    row = min(priced, key=lambda r: r.cost.value if r.cost else 0.0) if priced else matches[0]
-    less = number_text(baseline.seen / row.seen) if row.seen else "far"
-    price = ""
-    if row.cost is not None and baseline.cost is not None:
-        times = row.cost.value / baseline.cost.value
-        is_same = abs(times - 1) <= ERROR_SLACK
-        price = " for as much time" if is_same else f" for {number_text(times)} times the time"
-    return f"{row.name} errs {less} times less in all{price}"
+    if priced:
+        return min(priced, key=lambda r: r.cost.value if r.cost else 0.0)
+    return matches[0] if matches else None
 
 
 def largest_of(rows: Sequence[StableRow]) -> dict[str, float]:

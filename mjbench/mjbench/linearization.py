@@ -160,9 +160,7 @@ def find_rest(model: Any, scenario: Scenario) -> FixedState | None:
     variant = _converged(model, Integrator.IMPLICITFAST, float(model.opt.timestep) / 2)
     variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data, before, strongest = initial_data(scenario, variant), 0.0, 0.0
-    *_, (_, _, command) = scenario.holds()
-    if command:
-        data.ctrl[:] = command
+    scenario.holds()[-1][2].give(data)
     data.qvel[:] = 0.0
     for _ in range(_RELAXING):
         advance(variant, data)

@@ -303,14 +303,13 @@ def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:
 
 
 def _samples(model: Any, scene: Scene, states: EngineStates) -> Iterator[Any]:
-    """`mjData` at every sample of a motion, with its command, and all that follows from these."""
+    """`mjData` at every sample of a motion, with its inputs, and all that follows from these."""
     data = initial_data(scene.scenario, model)
-    commands = scene.scenario.commands(scene.scenario.sample)
-    rows = zip(states.qpos, states.qvel, states.act, commands, strict=False)
-    for qpos, qvel, act, command in rows:
+    samples = scene.scenario.inputs(scene.scenario.sample)
+    rows = zip(states.qpos, states.qvel, states.act, samples, strict=False)
+    for qpos, qvel, act, inputs in rows:
         data.qpos[:], data.qvel[:], data.act[:] = qpos, qvel, act
-        if command:
-            data.ctrl[:] = command
+        inputs.give(data)
         mujoco.mj_forward(model, data)
         yield data
 

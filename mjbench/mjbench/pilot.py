@@ -101,9 +101,9 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
     peaks, half_thickness, passages = Peaks(), thickness(variant), Passages(variant)
     times, steps_per_sample = scenario.times, scenario.steps(step)
     gaps = np.full((len(twins), len(times)), np.nan)
-    for index, command in enumerate(scenario.commands(scenario.sample)):
-        for copy in (data, *twins) if command else ():
-            copy.ctrl[:] = command
+    for index, inputs in enumerate(scenario.inputs(scenario.sample)):
+        for copy in (data, *twins):
+            inputs.give(copy)
         for number in range(steps_per_sample):
             simulation.advance(variant, data)
             look(data)

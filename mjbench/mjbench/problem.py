@@ -10,7 +10,7 @@ from __future__ import annotations
 import enum
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from typing import Literal, Protocol, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias
 
 import numpy as np
 from msgspec import Struct
@@ -45,8 +45,29 @@ STANDARD: tuple[Integrator, ...] = tuple(map(Integrator, INTEGRATORS))
 """The integrators with a name of their own in MJCF."""
 
 
+class Inputs(Struct, frozen=True):
+    """What acts from outside for a while; what is empty stays as it is."""
+
+    controls: tuple[float, ...] = ()
+    """Commands of actuators (nu,)."""
+    forces: tuple[float, ...] = ()
+    """`xfrc_applied` in a row (6 nbody,): N and Nm in the world's frame."""
+    poses: tuple[float, ...] = ()
+    """Of mocap bodies in a row (7 nmocap,): m, and quaternions."""
+
+    def give(self, data: Any) -> None:
+        """Give them to `mjData`."""
+        if self.controls:
+            data.ctrl[:] = self.controls
+        if self.forces:
+            data.xfrc_applied[:] = np.reshape(self.forces, (-1, 6))
+        if self.poses:
+            table = np.reshape(self.poses, (-1, 7))
+            data.mocap_pos[:], data.mocap_quat[:] = table[:, :3], table[:, 3:]
+
+
 class Scenario(Struct, frozen=True):
-    """The initial state, the duration, the commands, and when the state is sampled."""
+    """The initial state, the duration, the inputs, and when the state is sampled."""
 
     duration: float
     """Seconds; a multiple of `sample`."""
@@ -59,7 +80,13 @@ class Scenario(Struct, frozen=True):
     controls: tuple[tuple[float, ...], ...] = ()
     """Commands one after the other, each for `hold` seconds, the last to the end."""
     hold: float = 0.0
-    """Seconds, a multiple of `sample`: commands change on a grid that all timesteps share."""
+    """Seconds, a multiple of `sample`: inputs change on a grid that all timesteps share."""
+    act: tuple[float, ...] = ()
+    """Initial activations; the model's own where there are none."""
+    forces: tuple[tuple[float, ...], ...] = ()
+    """As `controls`, of `Inputs.forces`."""
+    poses: tuple[tuple[float, ...], ...] = ()
+    """As `controls`, of `Inputs.poses`."""
     keyframe: int = -1
     """The keyframe of the model in which it begins, by number; -1: in none."""
     loop: Loop | None = None
@@ -75,24 +102,25 @@ class Scenario(Struct, frozen=True):
         """The number of timesteps (s) in a sample; a `ValueError` where it is no whole number."""
         return whole_number(self.sample, timestep, "the sampling interval", "the timestep")
 
-    def holds(self, end: float | None = None) -> list[tuple[float, float, tuple[float, ...]]]:
-        """The intervals in which commands hold, to `end` (s) or the last: begin, end and command.
+    def holds(self, end: float | None = None) -> list[tuple[float, float, Inputs]]:
+        """The intervals in which inputs hold, to `end` (s) or the last: begin, end and inputs.
 
-        There is one without commands.
+        There is one without inputs.
         """
         end = self.duration if end is None else end
-        begins = [index * self.hold for index in range(max(1, len(self.controls)))]
-        commands = self.controls or ((),)
+        tables = self.controls, self.forces, self.poses
+        rows = list(itertools.zip_longest(*tables)) or [((), (), ())]
+        begins = [index * self.hold for index in range(len(rows))]
         return [
-            (begin, min(until, end), command)
-            for begin, until, command in zip(begins, (*begins[1:], end), commands, strict=True)
+            (begin, min(until, end), Inputs(*(part or () for part in row)))
+            for begin, until, row in zip(begins, (*begins[1:], end), rows, strict=True)
             if begin < end
         ]
 
-    def commands(self, timestep: float) -> Iterator[tuple[float, ...]]:
-        """The command of each step, for a timestep (s); for `sample`, that of each sample."""
-        for begin, end, command in self.holds():
-            yield from itertools.repeat(command, round((end - begin) / timestep))
+    def inputs(self, timestep: float) -> Iterator[Inputs]:
+        """The inputs of each step, for a timestep (s); for `sample`, those of each sample."""
+        for begin, end, inputs in self.holds():
+            yield from itertools.repeat(inputs, round((end - begin) / timestep))
 
 
 def whole_number(length: float, part: float, length_name: str, part_name: str) -> int:

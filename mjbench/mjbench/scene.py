@@ -28,6 +28,7 @@ from mjbench.declarations import (
     keyframe_scenarios,
 )
 from mjbench.problem import Array, Scenario
+from mjbench.pushes import force_rows, pose_rows, with_pushes_on_grid
 from mjbench.simulation import EngineStates, initial_data
 
 LOOKS = 100
@@ -159,6 +160,7 @@ def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tu
 
 def _check_fit(declarations: Declarations, model: Any) -> None:
     """Check that a model has what scenarios name; a `SceneError` where it does not."""
+    step = float(model.opt.timestep)
     for scenario in declarations.scenarios:
         names = [str(model.key(number).name) for number in range(int(model.nkey))]
         keyframes = names if isinstance(scenario.keyframe, str) else range(len(names))
@@ -167,6 +169,7 @@ def _check_fit(declarations: Declarations, model: Any) -> None:
             raise SceneError(message, scenario.place("keyframe"))
         commands = [("controls", row, model.nu) for row in scenario.controls]
         state = [("qpos", scenario.qpos, model.nq), ("qvel", scenario.qvel, model.nv)]
+        state.append(("act", scenario.act, model.na))
         for field, values, count in (*state, *commands):
             if values and len(values) != count:
                 message = f"`{field}` has {len(values)} numbers, and the model takes {count}"
@@ -176,8 +179,24 @@ def _check_fit(declarations: Declarations, model: Any) -> None:
             if sample is not None and length is not None and not is_multiple(length, sample):
                 message = f"`{field}` ({length:g} s) is not a multiple of `sample` ({sample:g} s)"
                 raise SceneError(message, scenario.place(field))
-        if len(scenario.controls) > 1 and scenario.hold is None:
+        for length in (t for push in scenario.push for t in (push.at, push.duration)):
+            for name, part in (("timestep", step), ("`sample`", sample)):
+                if length and part is not None and not is_multiple(length, part):
+                    message = f"a time of `push`, {length:g} s, is no multiple of the {name}"
+                    raise SceneError(f"{message}, {part:g} s", scenario.place("push"))
+        follow = max(map(len, (scenario.controls, *scenario.poses.values())))
+        if follow > 1 and scenario.hold is None:
             raise SceneError("`hold` is missing: commands follow each other", scenario.table)
+        bodies = {str(model.body(n).name): n for n in range(1, int(model.nbody))}
+        for field, names in (
+            ("push", [p.body for p in scenario.push]),
+            ("poses", [*scenario.poses]),
+        ):
+            for name in names:
+                if name not in bodies:
+                    raise SceneError(f"the model has no body `{name}`", scenario.place(field))
+                if field == "poses" and model.body_mocapid[bodies[name]] < 0:
+                    raise SceneError(f"`{name}` is no mocap body", scenario.place(field))
         quantity = scenario.observable
         if quantity is not None:
             things = getattr(model, quantity.kind)
@@ -191,6 +210,7 @@ def _scene(
     model: Any, declaration: DeclaredScenario, bench: BenchTable, steps: Sequence[float]
 ) -> Scene:
     step, keyframe = float(model.opt.timestep), declaration.keyframe
+    declaration = with_pushes_on_grid(declaration, step)
     if isinstance(keyframe, str):
         keyframe = int(model.key(keyframe).id)
     qpos = np.array(declaration.qpos)
@@ -201,7 +221,13 @@ def _scene(
         qpos=tuple(qpos.tolist()),
         qvel=declaration.qvel,
         controls=declaration.controls,
+        act=declaration.act,
         keyframe=-1 if keyframe is None else keyframe,
+    )
+    scenario = replace(
+        scenario,
+        forces=force_rows(model, declaration.push, scenario.hold),
+        poses=pose_rows(model, declaration.poses, scenario),
     )
     for timestep in declaration.timesteps:
         if not is_multiple(scenario.sample, timestep):
@@ -234,7 +260,9 @@ def _scenario_times(step: float, declaration: DeclaredScenario) -> Scenario:
         if length is not None:
             whole[name] = round(length / step)
     hold_steps, sample_steps = whole.get("hold"), whole.get("sample")
-    count = len(declaration.controls)
+    count = max(map(len, (declaration.controls, *declaration.poses.values())))
+    end = max((push.at + push.duration for push in declaration.push), default=0.0)
+    count = max(count, round(end / hold) if hold else 0)
     last = hold_steps * count if hold_steps is not None and count > 1 else 0
     total = whole.get("duration") or max(last, min(round(DURATION / step), MOST_STEPS), 1)
     if sample_steps is None:

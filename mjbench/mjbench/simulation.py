@@ -184,8 +184,9 @@ def initial_data(scenario: Scenario, model: Any) -> Any:
         data.qpos[:] = scenario.qpos
     if scenario.qvel:
         data.qvel[:] = scenario.qvel
-    if scenario.controls:
-        data.ctrl[:] = scenario.controls[0]
+    if scenario.act:
+        data.act[:] = scenario.act
+    scenario.holds()[0][2].give(data)
     if scenario.loop is not None:
         close_loop(scenario.loop, model, data)
     return data
@@ -279,9 +280,8 @@ def simulate(setup: Setup, model: Any) -> Run:
     table[0] = invariants(model, scratch, data.qpos, data.qvel)
     peaks, steps = Peaks(penetration=deepest_contact(scratch)), 0
     passages = Passages(model, setup)
-    for index, command in enumerate(scenario.commands(scenario.sample)):
-        if command:
-            data.ctrl[:] = command
+    for index, inputs in enumerate(scenario.inputs(scenario.sample)):
+        inputs.give(data)
         peaks, steps_made = advance_watching(model, data, steps_per_sample, peaks, passages)
         steps += steps_made
         if not peaks.finite:
@@ -316,9 +316,8 @@ def run_steps(
 def count_iterations(model: Any, scenario: Scenario) -> int:
     """The iterations of the solver in a scenario, of the last evaluation of each step."""
     data, count = initial_data(scenario, model), 0
-    for command in scenario.commands(float(model.opt.timestep)):
-        if command:
-            data.ctrl[:] = command
+    for inputs in scenario.inputs(float(model.opt.timestep)):
+        inputs.give(data)
         advance(model, data)
         count += int(data.solver_niter.sum())
     return count

@@ -99,8 +99,8 @@ def run_trial(
     steps = step_count(span, timestep)
     interval = max(2, steps // _LOOKS)
     commands = {
-        min(math.ceil(begin / timestep - 1e-9), steps): command
-        for begin, _, command in setup.scenario.holds(span)
+        min(math.ceil(begin / timestep - 1e-9), steps): inputs
+        for begin, _, inputs in setup.scenario.holds(span)
     }
     times = () if motion is None or start else motion.states.times.tolist()
     samples = {round(time / timestep): number for number, time in enumerate(times)}
@@ -135,8 +135,8 @@ def run_trial(
             distance = motion.distance(model, data, samples[count])
             if not distance < 1:
                 astray = f"off by {motion.far} at {data.time:.3g} s"
-        if commands.get(stop):
-            data.ctrl[:] = commands[stop]
+        if stop in commands:
+            commands[stop].give(data)
         sizes.append((count, math.hypot(*data.qvel.tolist())))
     is_lost = is_lost or excess_end > _DECAY * span  # it shot up, and has not come down
     judgement = judge(model, data, count * timestep, now, setup if is_lost else limits)

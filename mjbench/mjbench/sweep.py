@@ -253,9 +253,8 @@ def with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     slides: dict[Pair, _Slide] = {}
     longest: float | None = None
     residual = force = iterations = 0.0
-    for number, command in enumerate(scenario.commands(step), 1):
-        if command:
-            data.ctrl[:] = command
+    for number, inputs in enumerate(scenario.inputs(step), 1):
+        inputs.give(data)
         advance(model_copy, data)
         residual = max(residual, float(data.solver_fwdinv.max()))
         force = max(force, float(np.linalg.norm(data.qfrc_constraint)))
@@ -314,8 +313,11 @@ def _rollouts(
     data = initial_data(scenario, model)
     mujoco.mj_getState(model, data, state, int(mujoco.mjtState.mjSTATE_FULLPHYSICS))
     begins, control = np.tile(state, (batch, 1)), None
+    if scenario.forces or scenario.poses:
+        raise SceneError("a rollout has no pushes and no poses", part.place)
     if scenario.controls:
-        control = np.tile([*islice(scenario.commands(step), steps)], (batch, 1, 1))
+        rows = [inputs.controls for inputs in islice(scenario.inputs(step), steps)]
+        control = np.tile(rows, (batch, 1, 1))
 
     def job(pool: mujoco.rollout.Rollout) -> Job:
         datas = [mujoco.MjData(model) for _ in range(max(1, pool.nthread))]

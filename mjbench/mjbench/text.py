@@ -16,6 +16,7 @@ from mjbench.reports.engine_report import EngineReport
 from mjbench.reports.limits import reach_text
 from mjbench.reports.model_report import SceneReport
 from mjbench.reports.plot_text import plot_lines
+from mjbench.reports.profile_table import profile_lines
 from mjbench.reports.records import Departure
 from mjbench.reports.scene_report import (
     MeasuredRun,
@@ -76,6 +77,7 @@ def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -
     for chart in report.charts[:1] if plot else ():
         yield ""
         yield from plot_lines(chart, style.width)
+    yield from profile_lines(report.profile, report.profile_text, style)
     yield from _stable(report.stable, style)
     yield from _orders(report.orders, style)
     for line in report.figures:

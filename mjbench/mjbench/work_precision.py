@@ -21,8 +21,9 @@ from mjbench import known_motion, measure, simulation
 from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
 from mjbench.costs import Clock, costs
 from mjbench.delays import loop_note
-from mjbench.derive import derive_scenario
+from mjbench.derive import derive_profile, derive_scenario
 from mjbench.detector import driving_force, pair_names
+from mjbench.judge import compared_rows
 from mjbench.measured_setting import Basis, measure_setting
 from mjbench.parts import Parts
 from mjbench.pilot import (
@@ -34,6 +35,7 @@ from mjbench.pilot import (
     settings,
     with_setting,
 )
+from mjbench.profile import profile_rows
 from mjbench.reports import reach_bound, scene_report
 from mjbench.reports.shown_errors import (
     horizon_error_text,
@@ -56,12 +58,13 @@ def measure_scenario(
     quick: bool = False,
     clock: Clock | None,
     tell: Callable[[str], None] = lambda _: None,
+    profile: bool = False,
 ) -> scene_report.ScenarioReport:
     """Measure a model (`mjModel`) in one of its scenarios.
 
     `clock`: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
-    `tell` gets a line about each stage. A `SceneError` where the scenario does not fit the model,
-    or diverges at every timestep.
+    `tell` gets a line about each stage; `profile`: whether to say where the time goes. A
+    `SceneError` where the scenario does not fit the model, or diverges at every timestep.
     """
     tell(f"{scene.name}: a first run")
     pilot = run_pilot(model, scene)
@@ -135,6 +138,9 @@ def measure_scenario(
         return parts.run(f"{scene.name}: starts nearby", near, None)
 
     report = parts.run(f"{scene.name}: verdict", lambda: derive_scenario(report, starts), report)
+    if profile:
+        phases = partial(profile_rows, model, scene, compared_rows(report), quick=quick)
+        report = derive_profile(report, parts.run(f"{scene.name}: where the time goes", phases, ()))
     report = replace(report, failures=tuple(parts.failures))
     if parts.stopped:
         raise StoppedError(report)

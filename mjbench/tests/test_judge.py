@@ -133,6 +133,14 @@ def test_an_error_that_all_share_does_not_hide_one_that_doubles() -> None:
     assert judged(masked(position=(0.005, 0.005)), contact_model=CONES).verdict.better == 1
 
 
+def test_a_factor_over_an_error_that_is_not_resolved_is_the_least() -> None:
+    """Of the own error only a bound is known, here 0.005: the other is at least twice as large."""
+    rows = masked(position=(0.0102, 0.0102))
+    rows[0] = replace(rows[0], position=(0.005, 0.005))
+    text = judged(rows, contact_model=CONES, floor=5e-4).verdict.text
+    assert "but the error of position is at least 2 times as large over the whole run; " in text
+
+
 def test_halves_count_as_much_as_the_whole() -> None:
     halves = {"position": (0.001, 0.0049)}
     rows = masked(position=(0.0049, 0.0049), halves={"position": (0.0017, 0.0049)})

@@ -162,7 +162,7 @@ def growth(period: float, late: int) -> float:
         ("period = ", [], "is no Python"),
         ("1 / 0", [], "fails: ZeroDivisionError"),
         (POLICY, ["--delay", "-1"], "a delay and a noise are 0 or more"),
-        (POLICY, ["--engines"], "other engines are measured without controller and task"),
+        (POLICY, ["--engines"], "other engines are measured without controller, task and profile"),
         (POLICY, ["--task", "t"], "no sensor, site or body `t`"),
         (POLICY, ["--task", "shake"], "the sensor `shake` reads what commands do"),
         ("def control(m, d): return [0, 0]", ["--period", "1"], "gives 2 commands, and the model"),

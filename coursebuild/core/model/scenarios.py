@@ -70,6 +70,19 @@ Expected: TypeAlias = Literal[
 ]
 
 
+class PushTable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A force on a body, for a while."""
+
+    body: Annotated[fields.Text, describe("its name")]
+    at: Annotated[float, describe("seconds, when it begins", ge=0)]
+    duration: Annotated[Positive, describe("seconds")]
+    force: Annotated[tuple[float, float, float], describe("N, in the world's frame")] = (0.0,) * 3
+    torque: Annotated[tuple[float, float, float], describe("Nm, in the world's frame")] = (0.0,) * 3
+
+
+Pose: TypeAlias = tuple[float, float, float, float, float, float, float]
+
+
 class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     """What happens to the model: initial state, duration, commands."""
 
@@ -95,6 +108,17 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
         describe("commands one after the other, each a number for every actuator"),
     ] = ()
     hold: Annotated[Positive | None, describe("seconds for which each command holds")] = None
+    act: Annotated[tuple[float, ...], describe("activations of actuators at the beginning")] = ()
+    push: Annotated[
+        tuple[PushTable, ...], describe("forces on bodies; commands then hold for parts of `hold`")
+    ] = ()
+    poses: Annotated[
+        dict[str, Annotated[tuple[Pose, ...], Meta(min_length=1)]],
+        describe(
+            "of mocap bodies, by name: places (m) and quaternions one after the other, each for "
+            "`hold` seconds, the last to the end"
+        ),
+    ] = {}
     measure: Annotated[
         Annotated[
             str, matching(r"^(body|site|sensor):\S.*$", "`body:NAME`, `site:NAME` or `sensor:NAME`")

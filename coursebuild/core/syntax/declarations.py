@@ -152,7 +152,7 @@ def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
                 help = "every timestep must end at the same times, or errors cannot be compared"
                 yield diagnose("field-value", span, message, help=help)
         yield from check_unique(pairs, "field-value", "the timestep {} s is named twice")
-        if hold is not None and not table.controls:
+        if hold is not None and not (table.controls or table.poses):
             help = "`controls` are the commands, each held for so long"
             yield diagnose("field-missing", node.place("hold"), "`controls` is missing", help=help)
         if len(table.controls) > 1 and hold is None:

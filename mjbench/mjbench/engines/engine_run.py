@@ -18,7 +18,12 @@ import mujoco
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from mjbench.bench import Subject, compile_subject, report_errors
+from mjbench.bench import (
+    CannotMeasureError,
+    Subject,
+    compile_subject,
+    report_errors,
+)
 from mjbench.engines import MODULES
 from mjbench.engines.child import EngineChild
 from mjbench.engines.engine_main import Reply
@@ -104,6 +109,10 @@ def measure_engines(
 ) -> EngineReport:
     """Report on a model in engines; a `CannotMeasureError` where it cannot be measured at all."""
     compiled_model = compile_subject(subject, host, quick=quick)
+    for scene in compiled_model.scenarios:
+        if scene.scenario.forces or scene.scenario.poses:
+            message = "other engines are measured without pushes and poses"
+            raise CannotMeasureError(message, scene.declaration.table, cause="scenario")
     load, scenarios = os.getloadavg()[0], []
     with report_errors(subject), tempfile.TemporaryDirectory() as folder:
         path = str(Path(folder, "model.mjb"))

@@ -167,9 +167,9 @@ def run_motion(batch: Batch, trial: EngineTrial) -> EngineMotion:
     steps = scenario.steps(float(batch.model.opt.timestep))
     with silent():
         worlds.reset()
-        for _, command in zip(range(trial.count), scenario.commands(scenario.sample), strict=False):
-            if command:
-                worlds.command(command)
+        for _, inputs in zip(range(trial.count), scenario.inputs(scenario.sample), strict=False):
+            if inputs.controls:
+                worlds.command(inputs.controls)
             worlds.advance(steps)
             states.append(worlds.state())
     qpos, qvel = (np.array(part) for part in zip(*states, strict=True))

@@ -26,7 +26,7 @@ from mjbench.declarations import Declarations, DeclaredScenario, Place
 from mjbench.detector import Passages, Peaks, RunJudgement, judge, update_peaks
 from mjbench.pilot import NUDGE, nudges
 from mjbench.problem import Array, Scenario, Setup
-from mjbench.scene import Scene, scenes
+from mjbench.scene import Scene, SceneError, scenes
 from mjbench.simulation import (
     STATE,
     advance,
@@ -154,6 +154,11 @@ def pruning_scenes(
         SceneError: a scenario does not fit the model.
     """
     declared_scenes = scenes(model, declarations, quick=quick)
+    for scene in declared_scenes:
+        if scene.scenario.forces or scene.scenario.poses:
+            raise SceneError(
+                "the diet does not know what pushes and poses need", scene.declaration.table
+            )
     if not declared_scenes:  # nothing moves, but there are things to be without
         step, place = float(model.opt.timestep), Place(declarations.path)
         scenario, start = Scenario(10 * step, step), DeclaredScenario("start", table=place)
@@ -203,9 +208,9 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
     touching: set[tuple[int, int]] = set()
     peaks, constrained, passages = Peaks(), False, Passages(model)
     gauge = _Gauge(model, model, index_map(model, {}), scene)
-    for command in scene.scenario.commands(scene.timestep):
-        if command:
-            data.ctrl[:] = twin.ctrl[:] = command
+    for inputs in scene.scenario.inputs(scene.timestep):
+        inputs.give(data)
+        inputs.give(twin)
         advance(model, data)
         steps_made += 1
         constrained = constrained or data.nefc > 0
@@ -245,9 +250,8 @@ def _small_steps(model: Any, scene: Scene) -> tuple[frozenset[tuple[int, int]], 
     step = scene.timestep / _FINER
     fine = without_sleep(with_integrator(model, integrator_of(model), step))
     data, peaks, passages = initial_data(scene.scenario, fine), Peaks(), Passages(fine)
-    for command in scene.scenario.commands(scene.timestep):
-        if command:
-            data.ctrl[:] = command
+    for inputs in scene.scenario.inputs(scene.timestep):
+        inputs.give(data)
         peaks, _ = advance_watching(fine, data, _FINER, peaks, passages, interval=_FINER)
         if not peaks.finite:
             return frozenset(), math.inf
@@ -320,10 +324,10 @@ def _follow(
     gauge = _Gauge(base, variant, index, scene)
     geoms = {int(number): i for i, number in enumerate(index["ngeom"])}
     own_geoms = {i: i for i in range(variant.ngeom)}
-    for step, command in enumerate(scene.scenario.commands(scene.timestep)):
-        if command:
-            data.ctrl[:] = np.take(command, base_index["nu"])
-            variant_data.ctrl[:] = np.take(command, variant_index["nu"])
+    for step, inputs in enumerate(scene.scenario.inputs(scene.timestep)):
+        if inputs.controls:
+            data.ctrl[:] = np.take(inputs.controls, base_index["nu"])
+            variant_data.ctrl[:] = np.take(inputs.controls, variant_index["nu"])
         advance(base, data)
         advance(variant, variant_data)
         if identical:

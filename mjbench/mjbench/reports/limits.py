@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 from mjbench.reports import Reach, reach_bound
-from mjbench.reports.scene_report import StableRow
+from mjbench.reports.scene_report import ScenarioReport, StableRow
 from mjbench.reports.shown_errors import seconds_text
 
 _TOGETHER, _MOST_DIGITS = 0.1, 4
@@ -85,3 +85,24 @@ def map_text(row: StableRow) -> str:
         return ""
     signs = "".join(_SIGNS[(lost > 0) + (lost == runs)] for _, runs, lost in tries)
     return f"{seconds_text(tries[0][0], 2)} {signs} {seconds_text(tries[-1][0], 2)}"
+
+
+def stability_text(report: ScenarioReport) -> str:
+    """How long the timestep of the own integrator may be, and for what."""
+    baseline = report.own_setting
+    row = next((r for r in report.stable if baseline and r.integrator == baseline.integrator), None)
+    if row is None:
+        return ""
+    parts = [f"{row.integrator} stays bounded at {_upto(row, row.shown)}"]
+    for limit, words, reason in (
+        (row.near, "near the motion of small steps", row.near_reason),
+        (row.through, "with nothing going through", row.through_reason),
+    ):
+        if limit is not None:
+            text = reach_text(limit, row.searched)
+            parts.append(f"{words} at {_upto(row, text)}" + (f" ({reason})" if reason else ""))
+    return ", ".join(parts)
+
+
+def _upto(row: StableRow, text: str) -> str:
+    return f"steps to {text}" if text[:1].isdigit() else text

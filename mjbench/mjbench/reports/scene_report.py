@@ -300,6 +300,32 @@ class ErrorParts(Record, frozen=True):
     """What makes that smaller, and what it costs; empty where no setting that was measured does."""
 
 
+class PhaseProfile(Record, frozen=True):
+    """Where the time of a step goes under a setting, by MuJoCo's timers."""
+
+    row: int
+    """The row of the setting, from 0."""
+    name: str
+    """The setting in words."""
+    steps: int
+    evaluations: int
+    """Of the forward dynamics, over the scenario."""
+    step: float
+    """Wall time of a step, s: of each stretch of steps the quickest of all rounds."""
+    phases: Mapping[str, float]
+    """By its name, what each phase takes of that, s; together they are the step. What has no timer
+    is `other`: accelerations without constraints, energy, callbacks."""
+    contacts: tuple[float, int]
+    """After a step: the mean, and the most."""
+    constraints: tuple[float, int]
+    """The same of the rows of constraints."""
+    iterations: float
+    """Of the solver in the last evaluation of a step, over all islands: the mean."""
+    islands: float
+    """In which constraints are solved apart: the mean; 0 where they are not."""
+    rounds: int
+
+
 class RowVerdict(Record, frozen=True):
     """Whether a scene's own setting is a good choice."""
 
@@ -396,6 +422,11 @@ class ScenarioReport(Record, frozen=True):
     """The name of the error that settings are compared by first, and that is drawn."""
     charts: tuple[Chart, ...] = ()
     """Error against cost, evaluations, and iterations of the solver."""
+    profile: tuple[PhaseProfile, ...] = ()
+    """Where the time goes under the settings that the verdict compares, the own first; empty where
+    it was not asked for."""
+    profile_text: str = ""
+    """What of that the verdict rests on."""
     missed: tuple[float, float] | None = None
     """Islands of lost timesteps can be missed where they are narrower: relative to the timestep,
     above half the largest stable one, and in all; `None` without a search."""

@@ -163,7 +163,7 @@ controls = [[1], [2]]\nqvel = [0, 5]\n"""
     model = mujoco.MjModel.from_xml_string(mjcf.replace("</mujoco>", motor))
     (scene,) = pruning_scenes(model, parse_declared(text))
     assert (scene.name, scene.scenario.qvel[-1]) == ("push", 5)
-    commands = [(step, command[0]) for step, command in enumerate(scene.scenario.commands(0.002))]
+    commands = [(n, i.controls[0]) for n, i in enumerate(scene.scenario.inputs(0.002))]
     assert commands == [(step, 1 if step < 100 else 2) for step in range(500)]
     (short,) = pruning_scenes(model, parse_declared(text), quick=True)
     assert short.scenario.duration == 0.5
