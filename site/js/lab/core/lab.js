@@ -300,17 +300,18 @@ export class Lab {
     const { data, tape } = this
     const numbers = this.advance()
     const before = this.began
-    const findings = this.watch.look(before)
+    const time = data.time // once, as each access goes through the bindings
+    const findings = this.watch.look(before, time)
     if (findings !== null) {
       this.warnings.push(...findings.warnings)
       if ((this.diverged = findings.diverged) !== null) return 'diverged'
     }
     const timestep = this.option.timestep
     if (this.sampler.due(this.steps, timestep)) this.sampler.record(this.sync())
-    tape?.after(numbers)
+    tape?.after(numbers, time)
     const { stopAt } = this.config
     const late = stopAt === null ? Infinity : stopAt - timestep / 2
-    if (before < late && data.time >= late) return 'stopAt'
+    if (before < late && time >= late) return 'stopAt'
     return this.interrupted ? 'code' : null
   }
 

@@ -8,6 +8,7 @@ import { Notices } from './notices.js'
 import { formatLabel, formatReadout, formatTime } from './numbers.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
+import { insertBody } from './shell.js'
 import { watchSight } from './sight.js'
 import { Simulation } from './simulation.js'
 import { prefersStillness } from './support.js'
@@ -53,9 +54,7 @@ export async function mountCustom(element, config, base, words) {
   const { mount } = await import(new URL(config.module, base).href)
   if (typeof mount !== 'function') throw new Error(`${config.kind}.js exports no function mount(element, config, api)`)
   const body = h('div', { class: 'lab-live' })
-  const still = element.querySelector('.lab-static')
-  if (still !== null) still.before(body)
-  else element.append(body)
+  insertBody(element, body)
   const kit = new Kit(element, body, config, base, words)
   try {
     const mounted = (await mount(body, config.data, kit.api())) ?? {}

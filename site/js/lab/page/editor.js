@@ -5,7 +5,7 @@
  *   editor.fail("Schema violation: unrecognized attribute: 'foo'\nElement 'geom', line 3")
  */
 
-import { freshId, h } from './dom.js'
+import { freshId, h, textButton } from './dom.js'
 import { LONGEST_MODEL } from './share.js'
 
 const ROWS = 22 // at most; what is longer scrolls
@@ -73,8 +73,7 @@ export class Editor {
     this.field.setAttribute('aria-invalid', 'true')
     this.numberLines(hasLine ? line : null)
     if (!hasLine) return
-    const go = h('button', { type: 'button', class: 'lab-text', onclick: () => this.goTo(line) })
-    go.textContent = this.words('lab.live.line', { line })
+    const go = textButton(this.words('lab.live.line', { line }), () => this.goTo(line), 'lab-text')
     this.error.prepend(go, ' ')
     this.reveal(line)
   }

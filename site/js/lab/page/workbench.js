@@ -5,7 +5,7 @@
  * stopped.
  */
 
-import { h } from './dom.js'
+import { h, textButton } from './dom.js'
 import { Editor } from './editor.js'
 import { Instrument } from './instrument.js'
 import { copyLink, writeLink } from './share.js'
@@ -19,7 +19,7 @@ export function openEditor({ element, config, base, words }, xml, leave) {
   const bare = { goal: null, exportPython: null, source: null, key: null, start: null, still: '', stopAt: null, trail: null, autoplay: false }
   const own = { kind: 'mjcf', xml, mjb: '', module: '', worker: `${config.worker}#${config.id}` }
   const bench = new Workbench(element, { ...config, ...bare, ...own, controls: [], readouts: [], plots: [] }, base, words)
-  bench.backButton.after(h('button', { type: 'button', class: 'lab-button', onclick: leave }, words('lab.live.leave')))
+  bench.backButton.after(textButton(words('lab.live.leave'), leave))
   bench.editor.field.focus()
   return bench
 }
@@ -30,8 +30,8 @@ export class Workbench extends Instrument {
     const { words, config } = this
     this.otherText = config.xml // the reader's text, while the lesson's is in the editor
     this.editor = new Editor(config.xml, words, { run: () => this.run(), input: () => this.labelBackButton() })
-    this.backButton = h('button', { type: 'button', class: 'lab-button', onclick: () => this.exchange() })
-    const run = h('button', { type: 'button', class: 'lab-button', onclick: () => this.run() }, words('lab.live.compile'))
+    this.backButton = textButton('', () => this.exchange())
+    const run = textButton(words('lab.live.compile'), () => this.run())
     const keys = h('span', {}, words('lab.live.keys_compile'))
     this.editor.element.append(h('div', { class: 'lab-buttons' }, run, this.backButton, keys))
     this.labelBackButton()
