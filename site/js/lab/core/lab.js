@@ -31,8 +31,9 @@ export class Lab {
    * @param {Record<string, any>} config the lab's data (coursebuild/features/lab/compile.py)
    * @param {Record<string, any>} code the lab's functions (ditto)
    * @param {{play?: () => void, pause?: () => void}} [host] called by `sim.play()` and `sim.pause()`
+   * @param {{main: string, files: Map<string, Uint8Array>} | null} [own] files of a model that is MJCF
    */
-  constructor(engine, source, config, code, host = {}) {
+  constructor(engine, source, config, code, host = {}, own = null) {
     this.engine = engine
     this.config = config
     this.code = code
@@ -41,7 +42,7 @@ export class Lab {
     this.tape = null // keeps the run, in a page
     this.began = 0 // s, the time before the last step
     this.panel = null // while the reader looks at the model's actuators and sensors
-    this.handles = engine.load(source)
+    this.handles = engine.load(source, own)
     try {
       this.build()
     } catch (error) {

@@ -20,7 +20,7 @@ export class Editor {
     this.field = h('textarea', {
       id,
       value: text,
-      rows: Math.min(ROWS, text.split('\n').length),
+      rows: rowsOf(text),
       wrap: 'off',
       maxLength: LONGEST_MODEL,
       spellcheck: false,
@@ -61,6 +61,7 @@ export class Editor {
 
   set text(text) {
     this.field.value = text
+    this.field.rows = rowsOf(text)
     this.clear()
   }
 
@@ -114,6 +115,8 @@ export class Editor {
 function range(first, last) {
   return Array.from({ length: Math.max(0, last - first + 1) }, (_, i) => first + i).join('\n')
 }
+
+const rowsOf = (text) => Math.min(ROWS, text.split('\n').length)
 
 /** The text of MuJoCo's error about a model, and the line that it names, or 0. */
 export function readError(message) {

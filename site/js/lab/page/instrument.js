@@ -301,9 +301,7 @@ export class Instrument extends Shell {
   /** Let the reader edit the model, in place of this lab. @param {Record<string, any> | null} [state] of a link to an edited model */
   async edit(state = null) {
     try {
-      const response = await fetch(new URL(this.config.source, this.base))
-      if (!response.ok) throw new Error(this.words('lab.live.not_found', { status: response.status }))
-      const text = await response.text()
+      const text = await this.fetchText(this.config.source)
       if (this.state === 'playing') this.simulation.pause()
       this.body.hidden = true
       this.bench = this.openEditor(this, text.trimEnd(), () => this.leaveEditor())
@@ -311,6 +309,13 @@ export class Instrument extends Shell {
     } catch (error) {
       this.notices.show(error.message, 'warning')
     }
+  }
+
+  /** The text at an address of the lab's JSON. */
+  async fetchText(address) {
+    const response = await fetch(new URL(address, this.base))
+    if (!response.ok) throw new Error(this.words('lab.live.not_found', { status: response.status }))
+    return response.text()
   }
 
   leaveEditor() {
