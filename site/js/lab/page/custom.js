@@ -6,7 +6,7 @@ import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
 import { Notices } from './notices.js'
 import { formatLabel, formatReadout, formatTime } from './numbers.js'
-import { Plot } from './plots.js'
+import { PLAIN_PLOT, Plot } from './plots.js'
 import { Hands } from './pointer.js'
 import { insertBody } from './shell.js'
 import { watchSight } from './sight.js'
@@ -16,17 +16,6 @@ import { buildTransport } from './transport.js'
 import { View } from './view.js'
 
 const HEIGHT = 240 // CSS pixels
-const PLAIN_PLOT = {
-  xlabel: '',
-  ylabel: '',
-  window: null,
-  ymin: null,
-  ymax: null,
-  height: null,
-  refLines: [],
-  traces: [],
-  log: false,
-}
 const PLAIN_LAB = {
   key: null, camera: null, toggles: [], overlays: [], forceScale: null, autoplay: false, stopAt: null, start: null, still: '',
   trail: null, seed: null,

@@ -88,6 +88,7 @@ export class Instrument extends Shell {
       actuate: (index, value) => this.simulation.actuate(index, value, !this.hasStarted),
       startAt: (index) => this.simulation.startAt(index),
       look: (camera) => this.view.look(camera),
+      seek,
     })
     this.plots = config.plots.map((plot) => new Plot(plot, words, seek))
     this.goal = this.makeGoal({ show: () => this.simulation.replay({ values: this.initial, events: config.goal.log }) })
@@ -197,6 +198,7 @@ export class Instrument extends Shell {
   }
 
   collect({ times, values, from }, fresh) {
+    if (fresh || from < Infinity) this.panel.cut(fresh ? -Infinity : from)
     for (const plot of this.plots) {
       if (fresh) plot.clear()
       else if (from < Infinity) plot.cut(from)
@@ -226,6 +228,7 @@ export class Instrument extends Shell {
       this.plotAt = now
       const marks = tape.marks.map(([at, i]) => ({ time: at, label: this.config.controls[i].label }))
       this.plots.forEach((plot) => plot.draw({ time, resting, marks }))
+      this.panel.draw(panel, { time, resting, marks })
     }
   }
 
@@ -379,6 +382,7 @@ export class Instrument extends Shell {
     clearTimeout(this.sayTimer)
     this.hands.dispose()
     this.plots.forEach((plot) => plot.dispose())
+    this.panel.closeCurves()
     this.simulation.dispose()
     super.dispose()
   }
