@@ -168,11 +168,50 @@ test('a long run with many changes keeps few states, and those are true', (t) =>
   }
 })
 
-test('a lab that keeps what cannot be copied has no tape, and runs as ever', (t) => {
-  const lab = taped(t, PENDULUM, {}, { setup: ({ ctx, data }) => Object.assign(ctx, { law: () => 1, view: data.qpos }) })
-  lab.step(100)
-  const { start, end } = lab.tape.range
-  assert.deepEqual([start, end], [lab.time, lab.time])
-  lab.tape.seek(0)
-  assert.equal(lab.steps, 100)
+test('functions, the engine\'s arrays and objects that hold themselves are no hindrance', (t) => {
+  const setup = ({ ctx, data, lib }) => {
+    Object.assign(ctx, { law: (x) => -3 * x, angle: data.qpos, seen: new Map(), hinge: lib.jointId('hinge'), ring: new Float64Array(3) })
+    ctx.self = ctx
+  }
+  const controller = ({ ctx, data }) => {
+    ctx.ring[ctx.seen.size % 3] = ctx.law(ctx.angle[ctx.hinge])
+    ctx.seen.set(Math.round(1e6 * data.time), ctx.ring[0])
+    data.ctrl[0] = Math.max(-1, Math.min(1, ctx.ring[1] + ctx.self.seen.size / 100))
+  }
+  const lab = taped(t, PENDULUM, {}, { setup, controller })
+  lab.setPaused(true)
+  const seen = [[lab.physics.read(), 0]]
+  for (let i = 1; i <= 200; i++) {
+    lab.step(1)
+    seen.push([lab.physics.read(), lab.ctx.seen.size])
+  }
+  for (const step of [199, 33, 150, 2, 200]) {
+    lab.tape.go(step)
+    assert.deepEqual([lab.physics.read(), lab.ctx.seen.size], seen[step])
+  }
+})
+
+test('a lab that keeps what cannot be copied, or too much, has no tape, and runs as ever', (t) => {
+  class Filter {}
+  for (const make of [() => new Filter(), () => new Date(0), () => new Array(1e9), () => new Float64Array(6000), () => new DataView(new ArrayBuffer(8))]) {
+    const lab = taped(t, PENDULUM, {}, { setup: ({ ctx }) => (ctx.kept = make()) })
+    lab.step(100)
+    const { start, end } = lab.tape.range
+    assert.deepEqual([start, end], [lab.time, lab.time])
+    lab.tape.seek(0)
+    assert.equal(lab.steps, 100)
+    lab.reset()
+    assert.equal(lab.time, 0)
+  }
+})
+
+test('what a lab keeps itself is counted, so that the tape of a long run stays small', (t) => {
+  const lab = taped(t, PENDULUM, {}, { setup: ({ ctx }) => (ctx.delays = new Float64Array(4000)), controller: ({ ctx, data }) => (ctx.delays[99] = data.time) })
+  lab.step(20_000)
+  const { states } = lab.tape
+  const numbers = states.reduce((sum, { numbers, before, ctx }) => sum + numbers.length + (before?.length ?? 0) + ctx.delays.length, 0)
+  assert.ok(numbers < 1_100_000, `${numbers} numbers`)
+  assert.ok(states.length > 100, `${states.length} states`)
+  lab.tape.seek(17)
+  assert.ok(Math.abs(lab.ctx.delays[99] - 17 + 0.002) < 1e-9)
 })

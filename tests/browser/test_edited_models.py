@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import re
+import zipfile
 from collections.abc import Iterator, Mapping
 
 import pytest
@@ -106,9 +108,19 @@ def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: 
     expect(place).to_have_text(re.compile(r"^\s0\.000$"))
     push.fill("4")
     expect(place).to_have_text(re.compile(r"^\s[1-9]\d*\.\d{3}$"))
+    lab_element.get_by_label("curve of place").check()
+    curve = lab_element.get_by_role("img", name="place")
+    expect(curve.locator("canvas")).to_be_visible()
+    wait_for_change(page, curve, curve.screenshot())
     assert violations(page, ".lab") == []
     press(lab_element, "Pause")
     expect(lab_element).to_have_attribute("data-state", "paused")
+    clock = lab_element.locator(".lab-time")
+    last_time = clock.inner_text()
+    curve.click(position={"x": 50, "y": 60})
+    expect(clock).not_to_have_text(last_time)
+    lab_element.get_by_label("curve of place").uncheck()
+    expect(curve).to_have_count(0)
     press(lab_element, "far")
     expect(place).to_have_text(re.compile(r"^\s3\.000$"))
     expect(push).to_have_attribute("aria-valuetext", "0.000")
@@ -144,6 +156,78 @@ def test_link_carries_the_edited_model(page: Page, base: str) -> None:
     text.fill("".join(str(i**0.5) for i in range(3000)))
     press(lab_element, "Copy link to this model")
     expect(lab_element.get_by_role("alert").filter(has_text="too long for a link")).to_be_visible()
+
+
+ROBOT = {
+    "robot/scene.xml": (
+        '<mujoco><compiler meshdir="assets"/><include file="body.xml"/>'
+        '<worldbody><geom type="plane" size="1 1 .1"/></worldbody></mujoco>'
+    ),
+    "robot/body.xml": (
+        '<mujoco><asset><mesh name="shell" file="shell.obj"/></asset><worldbody><body pos="0 0 1">'
+        '<freejoint/><geom type="mesh" mesh="shell"/></body></worldbody></mujoco>'
+    ),
+    "robot/assets/shell.obj": (
+        "v 0 0 0\nv .3 0 0\nv 0 .3 0\nv 0 0 .3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    ),
+}
+DROP = """(lab, [name, bytes]) => {
+  const data = new DataTransfer()
+  data.items.add(new File([new Uint8Array(bytes)], name))
+  const event = new DragEvent('drop', { dataTransfer: data, bubbles: true, cancelable: true })
+  lab.querySelector('textarea').dispatchEvent(event)
+}"""
+
+
+def archive(files: Mapping[str, str]) -> bytes:
+    """A zip of files."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as packed:
+        for path, text in files.items():
+            packed.writestr(path, text)
+    return content.getvalue()
+
+
+def test_reader_begins_with_another_model(page: Page) -> None:
+    lab_element, text = editor_of(page)
+    lab_element.get_by_label("Start from").select_option(label="pendulum")
+    expect(text).to_have_value(re.compile('<body name="arm"'))
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    lab_element.get_by_label("Start from").select_option(label="A lever")
+    expect(text).to_have_value(re.compile('range="-20 20"'))
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    press(lab_element, "Pause")
+
+
+def test_reader_opens_a_model_with_its_meshes_and_nothing_is_sent(page: Page) -> None:
+    lab_element, text = editor_of(page)
+    requests: list[str] = []
+    page.on("request", lambda request: requests.append(f"{request.method} {request.url}"))
+    with page.expect_file_chooser() as chooser:
+        press(lab_element, "Open a file")
+    chooser.value.set_files(
+        {"name": "robot.zip", "mimeType": "application/zip", "buffer": archive(ROBOT)}
+    )
+    expect(text).to_have_value(ROBOT["robot/scene.xml"])
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    expect(lab_element.locator(".lab-time")).not_to_have_text("0.00 s")
+    assert violations(page, ".lab") == []
+    press(lab_element, "Copy link to this model")
+    expect(lab_element.get_by_text("without the files beside it")).to_be_visible()
+    press(lab_element, "Back to the lesson’s model")
+    expect(text).to_have_value(re.compile('range="-20 20"'))
+    press(lab_element, "Back to my model")
+    expect(text).to_have_value(ROBOT["robot/scene.xml"])
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    lab_element.evaluate(DROP, ["cart.xml", list(CART.encode())])
+    expect(text).to_have_value(CART)
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    bare = archive({"scene.xml": ROBOT["robot/scene.xml"]})
+    lab_element.evaluate(DROP, ["bare.zip", list(bare)])
+    expect(lab_element.get_by_role("alert").filter(has_text="body.xml")).to_be_visible()
+    lab_element.evaluate(DROP, ["garbled.zip", [0x50, 0x4B, 3, 4, *range(99)]])
+    expect(lab_element.get_by_role("alert").filter(has_text="cannot be read")).to_be_visible()
+    assert [request for request in requests if not request.startswith("GET ")] == []
 
 
 def test_every_lab_opens_its_model_in_the_editor(page: Page) -> None:

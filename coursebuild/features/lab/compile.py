@@ -122,7 +122,7 @@ def compile_lab(lab: Lab, name: str) -> LabModule:
                 log += ((act.t, numbers[label], value) for label, value in act.do.items())
         config["goal"] = {"hold": fields.goal.hold, "log": log}
     if lab.kind == MJCF and lab.xml is not None:
-        config |= {"kind": MJCF, "xml": lab.xml.text.rstrip("\n")}
+        config |= {"kind": MJCF, "xml": lab.xml.text.rstrip("\n"), "starts": lab.starts}
     data: dict[str, Any] = to_builtins(config)
     return LabModule(name, code, f"({literal})", data)
 

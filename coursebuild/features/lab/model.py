@@ -22,6 +22,8 @@ BUILT_IN_KINDS = (SIMLAB, MJCF, PLOT, ODE)
 """The kinds that have trials; any other kind is a course's own."""
 START = "if (model.nkey > 0) mj.mj_resetDataKeyframe(model, data, 0);"
 """A `setup` that starts from the model's first keyframe, for labs whose author writes none."""
+LONGEST_MODEL = 100_000
+"""Characters of a model in the editor, as site/js/lab/page/share.js has it."""
 Entry: TypeAlias = tuple[str | int, ...]
 """The path to a value inside the lab's JSON: `("controls", 2, "set")`."""
 _POINTED_FIELDS = {"controls": ("set", "apply", "run", "label"), "expect": ("expr", "diverges")}
@@ -42,6 +44,8 @@ class Lab(FeatureBlock, frozen=True):
     note: tuple[Block, ...] = ()
     goal: tuple[Inline, ...] = ()
     xml: Excerpt | None = None
+    starts: tuple[str, ...] = ()
+    """Names of the models with which a reader may also begin to edit."""
     places: tuple[tuple[Entry, Span], ...] = ()
     """The place of each value in the JSON."""
     code: tuple[tuple[Entry, Excerpt], ...] = ()
@@ -89,6 +93,10 @@ class Lab(FeatureBlock, frozen=True):
     def models(self) -> tuple[str, ...]:
         """The name of its model, if it names one."""
         return () if self.fields.model is None else (self.fields.model,)
+
+    def mentioned_models(self) -> tuple[str, ...]:
+        """The names of models with which a reader may begin to edit."""
+        return self.starts
 
     def mjcf(self) -> Excerpt | None:
         """The model that it holds, if it holds one."""

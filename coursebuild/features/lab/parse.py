@@ -45,6 +45,7 @@ _CODE = ("setup", "controller", "set", "apply", "run", "expr")
 """Fields that hold JavaScript."""
 _KEYS = {
     "title": (str, "a text"),
+    "starts": (str, "names of models"),
     "height": (Height, "a whole number from 80 to 2000"),
     "seconds": (Positive, "a number above 0"),
     "rtol": (RelativeTolerance, "a number of at least 0 and below 1"),
@@ -76,10 +77,11 @@ def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Lab | None]:
     verify_keys = [key for key in ("seconds", "rtol", "deep") if key in values]
     verify = Verify(**{key: values.pop(key) for key in verify_keys})
     diverges = values.pop("diverges", None)
+    starts = tuple(values.pop("starts", "").split())
     claims = () if diverges is None else (Expect(t=diverges, diverges=True),)
     fields = SimLab(**values, toggles=OVERLAYS, setup=START, expect=claims, verify=verify)
     body = fence.body
-    lab = Lab(fence.span, MJCF, name.span, body.text, fields, xml=body)
+    lab = Lab(fence.span, MJCF, name.span, body.text, fields, xml=body, starts=starts)
     return Parsed(None if diagnostics else lab, tuple(diagnostics))
 
 

@@ -8,15 +8,13 @@ from pathlib import Path
 from coursebuild.api import Diagnostic, Excerpt, Source, Span, diagnose
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.run.mjcf import existing_files, read_tags
-from coursebuild.features.lab.model import MJCF, Lab
+from coursebuild.features.lab.model import LONGEST_MODEL, MJCF, Lab
 
 _NO_PLUGIN = "invalid plugin slot"
 _NO_MEMORY = "ould not allocate memory"
 """Parts of what MuJoCo says."""
 _PART_OF_MODEL = 20
 """Engine, model and states together take up to 16 times the memory of a large compiled model."""
-_LONGEST = 100_000
-"""Characters of a model in the editor, as site/js/lab/page/share.js has it."""
 
 
 def diagnose_refusal(lab: Lab, root: Path, model: Source, message: str) -> list[Diagnostic]:
@@ -59,7 +57,7 @@ def editable_source(lab: Lab, root: Path, model: Source) -> str:
 
     A lab that is an editor already needs none.
     """
-    if lab.kind == MJCF or len(model.text) > _LONGEST:
+    if lab.kind == MJCF or len(model.text) > LONGEST_MODEL:
         return ""
     return "" if existing_files(root, model.path, model.text) else model.text
 

@@ -21,6 +21,7 @@ from coursebuild.api import (
     did_you_mean,
     find_blocks,
 )
+from coursebuild.core.run.mjcf import read_tags
 from coursebuild.core.syntax.decode import check_unique, require_one_of
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
@@ -30,7 +31,7 @@ from coursebuild.core.syntax.nodes import (
     StringNode,
     format_value,
 )
-from coursebuild.features.lab.model import BUILT_IN_KINDS, Lab
+from coursebuild.features.lab.model import BUILT_IN_KINDS, LONGEST_MODEL, Lab
 from coursebuild.features.lab.schema import Button, Expect, Select, SimLab, Slider
 
 Structs = Mapping[ObjectNode, Struct]
@@ -212,16 +213,27 @@ def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagno
     """Report unknown kinds and models of the labs in some documents."""
     own_kinds = (match[1] for path in course.files if (match := _OWN_KIND.fullmatch(path)))
     kinds = frozenset((*BUILT_IN_KINDS, *own_kinds))
-    models = {model.name for model in course.models}
+    models = {model.name: model.source.text for model in course.models}
     for lab in (lab for document in documents for lab in find_blocks(document, Lab)):
         if lab.kind not in kinds:
             message = f"`{lab.kind}` is not a known kind of lab"
             help = did_you_mean(lab.kind, kinds)
             yield diagnose("lab-kind", lab.kind_span, message, help=help)
-        for name in lab.models():
+        for name in (*lab.models(), *lab.starts):
             if name not in models:
                 message, help = f"no model `{name}` in models/", did_you_mean(name, models)
                 yield diagnose("lab-model", lab.place(("model",)), message, help=help)
+            elif name in lab.starts and not _is_editable(models[name]):
+                message = (
+                    f"readers cannot begin with `{name}`: it needs other files, or is too long"
+                )
+                yield diagnose("lab-model", lab.place(("model",)), message)
+
+
+def _is_editable(model: str) -> bool:
+    """Whether a model needs no other files, and is not too long for an editor."""
+    names = (name for tag in read_tags(model) for name, *_ in tag.attributes)
+    return len(model) <= LONGEST_MODEL and "file" not in names
 
 
 def check_model_names(

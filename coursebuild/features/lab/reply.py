@@ -263,6 +263,10 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
         files[path] = OutputFile(path, data)
         return path
 
+    def publish_model(name: str, text: str) -> str:
+        path = publish(f"{name}.xml", text.encode())
+        return path.removeprefix(f"{_FOLDER}/")
+
     trials = [(t.line, t.output) for t in results.trials if isinstance(t.output, LabOutput)]
     kinds = {lab.config.get("kind") in (PLOT, ODE) for _, lab in trials}
     if True in kinds:
@@ -271,6 +275,7 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
         lab_script = publish("lab.js", assets.file("js/lab.js"))
         worker = publish("worker.js", assets.file("js/lab-worker.js"))
         wasm = publish("mujoco.wasm", assets.file("mujoco/mujoco.wasm"))
+    sources = {lab.config["model"]: lab.source for _, lab in trials if lab.source}
     labs = {}
     for line, lab in trials:
         name = line.name
@@ -291,8 +296,12 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
             addresses = {key: path.removeprefix(f"{_FOLDER}/") for key, path in parts.items()}
             config = lab.config | addresses
             if lab.source:
-                path = publish(f"{model}.xml", lab.source.encode())
-                config["source"] = path.removeprefix(f"{_FOLDER}/")
+                config["source"] = publish_model(model, lab.source)
+            if starts := [name for name in lab.config.get("starts", ()) if name in sources]:
+                config["starts"] = [
+                    {"name": name.replace("_", " "), "source": publish_model(name, sources[name])}
+                    for name in starts
+                ]
             if lab.script is not None:
                 config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
         picture = publish(f"{name}.{ending}", lab.picture) if lab.record is not None else ""

@@ -4,7 +4,7 @@
  * The simulation runs in a dedicated worker, as that of a model which readers edit; the trials in one more (judging.js).
  */
 
-import { h } from '../lab/page/dom.js'
+import { h, textButton } from '../lab/page/dom.js'
 import { Editor } from '../lab/page/editor.js'
 import { Instrument } from '../lab/page/instrument.js'
 import { formatReadout, withUnit } from '../lab/page/numbers.js'
@@ -33,8 +33,8 @@ export class Exercise extends Instrument {
     this.stateText = ''
     this.editor = new Editor(exercise.start, words, { run: () => this.check(), input: () => this.labelBackButton() })
     this.editor.element.querySelector('label').textContent = words(`exercise.live.${exercise.subject}`, { names: exercise.names.join(', ') })
-    const check = h('button', { type: 'button', class: 'lab-button exercise-check', onclick: () => this.check() }, words('exercise.live.check'))
-    this.backButton = h('button', { type: 'button', class: 'lab-button', onclick: () => this.exchange() })
+    const check = textButton(words('exercise.live.check'), () => this.check(), 'lab-button exercise-check')
+    this.backButton = textButton('', () => this.exchange())
     const keys = h('span', {}, words('exercise.live.keys_check'))
     this.labelBackButton()
     this.rows = exercise.trials.map((trial, i) => this.makeRow(trial, i))
@@ -50,7 +50,8 @@ export class Exercise extends Instrument {
     const verdict = h('span', { class: 'exercise-verdict' }, words('exercise.live.waiting'))
     const seen = h('span', { class: 'exercise-seen' })
     const advice = h('p', { class: 'exercise-hint', hidden: true }, hint)
-    const watch = h('button', { type: 'button', class: 'lab-text', hidden: true, onclick: () => this.watch(i) }, words('exercise.live.watch'))
+    const watch = textButton(words('exercise.live.watch'), () => this.watch(i), 'lab-text')
+    watch.hidden = true
     const element = h('li', {}, h('p', {}, h('b', {}, name), ' ', verdict, ' ', seen, ' ', watch), advice)
     return { element, verdict, seen, advice, watch, hint }
   }

@@ -92,17 +92,18 @@ export class Engine {
    * Load a model.
    *
    * @param {Uint8Array | string} model an MJB file of the same engine version, or MJCF
+   * @param {{main: string, files: Map<string, Uint8Array>} | null} [own] of MJCF, the path of its file and the files that it may name
    * @returns {Handles}
    */
-  load(model) {
-    return new Handles(this.mj, model)
+  load(model, own = null) {
+    return new Handles(this.mj, model, own)
   }
 }
 
 /** A model, its data, and a second data that is only looked at (see `lab.js`). */
 export class Handles {
-  constructor(mj, model) {
-    this.model = typeof model === 'string' ? compileModel(mj, model) : readModel(mj, model)
+  constructor(mj, model, own) {
+    this.model = typeof model === 'string' ? compileModel(mj, model, own) : readModel(mj, model)
     this.objects = [this.model]
     try {
       this.data = this.adopt(new mj.MjData(this.model))
@@ -149,9 +150,9 @@ function readModel(mj, bytes) {
 /** The largest model that a page draws without becoming slow. */
 const MOST = { ngeom: 2000, nsite: 2000, nlight: 100, nmeshface: 200_000, nhfielddata: 500_000, ntexdata: 64 << 20 }
 
-/** Compile MJCF that a reader may have written, and refuse a model that is too large to draw. Files that it names are not found. */
-function compileModel(mj, text) {
-  const model = compileXml(mj, text)
+/** Compile MJCF that a reader may have written, and refuse a model that is too large to draw. Of files it finds its own only. */
+function compileModel(mj, text, own) {
+  const model = compileXml(mj, text, own)
   const field = Object.keys(MOST).find((name) => model[name] > MOST[name])
   if (field === undefined) return model
   const size = model[field]
@@ -159,15 +160,32 @@ function compileModel(mj, text) {
   throw new EngineError(`${field} is ${size}, and a page shows models up to ${MOST[field]}`)
 }
 
-function compileXml(mj, text) {
+const FOLDER = '/own'
+
+/** Write files into the engine's own file system; returns their paths there. */
+function writeFiles({ FS }, files) {
+  return [...files].map(([name, content]) => {
+    const path = `${FOLDER}/${name}`
+    FS.mkdirTree(path.slice(0, path.lastIndexOf('/')))
+    FS.writeFile(path, content)
+    return path
+  })
+}
+
+function compileXml(mj, text, own) {
+  let paths = []
   try {
-    return mj.MjModel.from_xml_string(text)
+    if (own === null) return mj.MjModel.from_xml_string(text)
+    paths = writeFiles(mj, [...own.files, [own.main, text]])
+    return mj.MjModel.from_xml_path(paths.at(-1))
   } catch (error) {
     const message = String(error.message).trim()
     const detail = message.replace(/^MuJoCo Error: (Loading error: )?/, '')
     // An exception of C++ itself, for lack of memory, holds only the name of a type.
     const reason = detail === message ? `the engine has no room for this model (${message})` : detail
     throw new EngineError(reason, error instanceof WebAssembly.RuntimeError)
+  } finally {
+    for (const path of paths) mj.FS.unlink(path)
   }
 }
 

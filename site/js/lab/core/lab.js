@@ -31,8 +31,9 @@ export class Lab {
    * @param {Record<string, any>} config the lab's data (coursebuild/features/lab/compile.py)
    * @param {Record<string, any>} code the lab's functions (ditto)
    * @param {{play?: () => void, pause?: () => void}} [host] called by `sim.play()` and `sim.pause()`
+   * @param {{main: string, files: Map<string, Uint8Array>} | null} [own] files of a model that is MJCF
    */
-  constructor(engine, source, config, code, host = {}) {
+  constructor(engine, source, config, code, host = {}, own = null) {
     this.engine = engine
     this.config = config
     this.code = code
@@ -41,7 +42,7 @@ export class Lab {
     this.tape = null // keeps the run, in a page
     this.began = 0 // s, the time before the last step
     this.panel = null // while the reader looks at the model's actuators and sensors
-    this.handles = engine.load(source)
+    this.handles = engine.load(source, own)
     try {
       this.build()
     } catch (error) {
@@ -300,17 +301,18 @@ export class Lab {
     const { data, tape } = this
     const numbers = this.advance()
     const before = this.began
-    const findings = this.watch.look(before)
+    const time = data.time // once, as each access goes through the bindings
+    const findings = this.watch.look(before, time)
     if (findings !== null) {
       this.warnings.push(...findings.warnings)
       if ((this.diverged = findings.diverged) !== null) return 'diverged'
     }
     const timestep = this.option.timestep
     if (this.sampler.due(this.steps, timestep)) this.sampler.record(this.sync())
-    tape?.after(numbers)
+    tape?.after(numbers, time)
     const { stopAt } = this.config
     const late = stopAt === null ? Infinity : stopAt - timestep / 2
-    if (before < late && data.time >= late) return 'stopAt'
+    if (before < late && time >= late) return 'stopAt'
     return this.interrupted ? 'code' : null
   }
 

@@ -11,8 +11,10 @@
  */
 
 const MOST = 1500 // states
+const LEAST = 4
 const MOST_NUMBERS = 1_000_000 // in all of them, 8 MB
 const LARGEST = 5000 // values that `ctx` may hold
+const SAMPLES = 4 // of the plots, between two states
 const MOST_MARKS = 200
 const APART = 0.3 // s between two marks of one control
 const TOLERANCE = 1e-6 // of a step
@@ -21,7 +23,7 @@ export class Tape {
   /** @param {import('./lab.js').Lab} lab */
   constructor(lab) {
     this.lab = lab
-    this.most = Math.min(MOST, Math.max(20, Math.floor(MOST_NUMBERS / (2 * lab.physics.size))))
+    this.most = MOST
     this.clear()
   }
 
@@ -29,19 +31,21 @@ export class Tape {
   clear() {
     this.states = []
     this.stride = 0 // steps between two states; 0: not known yet
-    this.end = null // the last step: {step, time, log}
+    this.isKept = true // no longer if `ctx` holds what cannot be copied
+    this.end = { step: -1, time: 0, log: null } // the last step; -1: none yet
     this.marks = []
   }
 
   /** The times (s) between which the lab can be put, and those at which a control was used: `[time, control]`. */
   get range() {
+    const { end, marks } = this
     const start = this.states[0]?.time ?? this.lab.time
-    return { start, end: this.end?.time ?? start, marks: this.marks }
+    return { start, end: end.step < 0 ? start : end.time, marks }
   }
 
   /** Whether the lab stands at an earlier step. */
   get isPast() {
-    return this.end !== null && this.lab.steps < this.end.step
+    return this.lab.steps < this.end.step
   }
 
   // --- recording
@@ -49,14 +53,16 @@ export class Tape {
   /** The numbers before the step that begins, if its state is to be kept. */
   before() {
     const { lab } = this
-    if (this.stride === 0) this.stride = Math.max(1, Math.round(lab.sampler.interval / lab.option.timestep))
-    return (lab.steps + 1) % this.stride === 0 ? lab.physics.read() : null
+    if (!this.isKept) return null
+    if (this.stride === 0) this.stride = Math.max(1, SAMPLES * Math.round(lab.sampler.interval / lab.option.timestep))
+    const stride = lab.drag.active ? Math.ceil(this.stride / SAMPLES) : this.stride
+    return (lab.steps + 1) % stride === 0 ? lab.physics.read() : null
   }
 
-  /** A step was made. @param {Float64Array | null} numbers of `before` */
-  after(numbers) {
+  /** A step was made. @param {Float64Array | null} numbers of `before` @param {number} time s */
+  after(numbers, time) {
     if (numbers !== null) this.keep(numbers, this.lab.physics.read())
-    this.markEnd()
+    this.markEnd(time)
   }
 
   /** Something was done to the lab; @param {Float64Array} numbers before `mj_forward` */
@@ -65,7 +71,7 @@ export class Tape {
     const { steps } = this.lab
     while (this.states.length > 0 && this.states[this.states.length - 1].step >= steps) this.states.pop()
     this.keep(null, numbers)
-    this.markEnd()
+    this.markEnd(this.lab.time)
   }
 
   /** A control was used. */
@@ -76,26 +82,34 @@ export class Tape {
     this.marks = [...this.marks, [time, control]].slice(-MOST_MARKS)
   }
 
-  markEnd() {
-    const { steps, time, log } = this.lab
-    this.end = { step: steps, time, log }
+  markEnd(time) {
+    const { end, lab } = this
+    end.step = lab.steps
+    end.time = time
+    end.log = lab.log
   }
 
   keep(before, numbers) {
     const { lab } = this
-    if (sizeOf(lab.ctx) > LARGEST) return void (this.states = [])
+    const { copy: ctx, size } = copyOf(lab.ctx, lab.physics.memory)
+    if (size > LARGEST) {
+      this.states = []
+      this.isKept = false
+      return
+    }
     this.states.push({
       step: lab.steps,
       time: lab.time,
       before,
       numbers,
-      ctx: structuredClone(lab.ctx),
+      ctx,
       values: [...lab.values],
       random: lab.draw.read(),
       seen: lab.sampler.read(),
       isPulled: lab.drag.active,
     })
-    if (this.states.length > this.most) this.thin()
+    const room = Math.max(LEAST, Math.floor(MOST_NUMBERS / (2 * numbers.length + size)))
+    if (this.states.length > Math.min(this.most, room)) this.thin()
   }
 
   /** Drop every second state; those after which steps cannot simply be repeated go last. */
@@ -151,7 +165,7 @@ export class Tape {
     lab.drag.release()
     lab.controls.change(values)
     for (const name of Object.keys(lab.ctx)) delete lab.ctx[name]
-    Object.assign(lab.ctx, structuredClone(ctx))
+    Object.assign(lab.ctx, copyOf(ctx, lab.physics.memory).copy)
     lab.physics.write(before ?? numbers)
     if (before === null) mj.mj_forward(lab.model, lab.data)
     else {
@@ -176,17 +190,36 @@ export class Tape {
   }
 }
 
-/** How many values an object holds; infinite if one cannot be copied, or belongs to the engine. */
-function sizeOf(value) {
-  if (typeof value === 'function' || typeof value === 'symbol') return Infinity
-  if (typeof value !== 'object' || value === null) return 1
-  if (ArrayBuffer.isView(value)) return value.byteLength < value.buffer.byteLength ? Infinity : value.byteLength / 8
-  const prototype = Object.getPrototypeOf(value)
-  if (prototype !== Object.prototype && prototype !== Array.prototype) return Infinity
-  let size = 1
-  for (const item of Object.values(value)) {
-    size += sizeOf(item)
-    if (size > LARGEST) return Infinity
+/**
+ * A copy of what a lab keeps in `ctx`, and how many values it holds: infinitely many, if one cannot be copied. Functions, and what belongs
+ * to the engine, are taken as they are.
+ *
+ * @param {ArrayBuffer} memory of the engine
+ */
+function copyOf(ctx, memory) {
+  let size = 0
+  const copies = new Map() // by the objects, which may be held twice, or hold themselves
+  const copy = (/** @type {any} */ value) => {
+    size += 1
+    if (size > LARGEST || typeof value !== 'object' || value === null) return value
+    if (value.buffer === memory || '$$' in value) return value
+    if (copies.has(value)) return copies.get(value)
+    /** @type {any} */
+    const kind = [Array, Map, Set, Object].find((type) => Object.getPrototypeOf(value) === type.prototype)
+    if (ArrayBuffer.isView(value) && !(value instanceof DataView)) {
+      size += value.byteLength / 8
+      return size > LARGEST ? value : /** @type {any} */ (value).slice()
+    }
+    if (kind === undefined || value.length > LARGEST) {
+      size = Infinity
+      return value
+    }
+    const target = new kind()
+    copies.set(value, target)
+    if (kind === Map) for (const [key, item] of value) target.set(copy(key), copy(item))
+    else if (kind === Set) for (const item of value) target.add(copy(item))
+    else for (const [name, item] of Object.entries(value)) target[name] = copy(item)
+    return target
   }
-  return size
+  return { copy: copy(ctx), size }
 }

@@ -39,13 +39,11 @@ export class Watch {
   }
 
   /**
-   * Check the state after a step that began at time `before`.
+   * Check the state after a step from the time `before` to `time` (s).
    *
    * @returns {{diverged: Finding | null, warnings: Finding[]} | null} null when all is well
    */
-  look(before) {
-    const { data } = this
-    const time = data.time
+  look(before, time) {
     if (this.counters.total() === this.total && time > before && this.isBounded('qpos') && this.isBounded('qvel')) return null
     const warnings = this.takeNew(time)
     const fatal = warnings.find((finding) => finding.fatal)

@@ -1,6 +1,6 @@
 /** The controls of a lab: sliders, lists, buttons, and which overlays are drawn. */
 
-import { freshId, h } from './dom.js'
+import { freshId, h, textButton } from './dom.js'
 import { digitsOfStep, formatNumber, withUnit } from './numbers.js'
 
 const STEPS = 200 // of a slider without a step
@@ -30,7 +30,7 @@ export function buildControls(controls, actions) {
 }
 
 function button({ label }, press) {
-  const field = h('button', { type: 'button', class: 'lab-button', onclick: press }, label)
+  const field = textButton(label, press)
   return { element: field, field }
 }
 

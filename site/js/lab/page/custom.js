@@ -6,8 +6,9 @@ import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
 import { Notices } from './notices.js'
 import { formatLabel, formatReadout, formatTime } from './numbers.js'
-import { Plot } from './plots.js'
+import { PLAIN_PLOT, Plot } from './plots.js'
 import { Hands } from './pointer.js'
+import { insertBody } from './shell.js'
 import { watchSight } from './sight.js'
 import { Simulation } from './simulation.js'
 import { prefersStillness } from './support.js'
@@ -15,17 +16,6 @@ import { buildTransport } from './transport.js'
 import { View } from './view.js'
 
 const HEIGHT = 240 // CSS pixels
-const PLAIN_PLOT = {
-  xlabel: '',
-  ylabel: '',
-  window: null,
-  ymin: null,
-  ymax: null,
-  height: null,
-  refLines: [],
-  traces: [],
-  log: false,
-}
 const PLAIN_LAB = {
   key: null, camera: null, toggles: [], overlays: [], forceScale: null, autoplay: false, stopAt: null, start: null, still: '',
   trail: null, seed: null,
@@ -53,9 +43,7 @@ export async function mountCustom(element, config, base, words) {
   const { mount } = await import(new URL(config.module, base).href)
   if (typeof mount !== 'function') throw new Error(`${config.kind}.js exports no function mount(element, config, api)`)
   const body = h('div', { class: 'lab-live' })
-  const still = element.querySelector('.lab-static')
-  if (still !== null) still.before(body)
-  else element.append(body)
+  insertBody(element, body)
   const kit = new Kit(element, body, config, base, words)
   try {
     const mounted = (await mount(body, config.data, kit.api())) ?? {}

@@ -10,23 +10,17 @@ import { Curves } from '../core/curves.js'
 import { Chart } from './chart.js'
 import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
-import { GoalView } from './goal.js'
-import { Notices } from './notices.js'
 import { formatNumber, formatReadout, withUnit } from './numbers.js'
-import { copyLink, writeLink } from './share.js'
-import { watchSight } from './sight.js'
+import { Shell } from './shell.js'
 import { buildTransport } from './transport.js'
 
 const NATURAL = [2, 60] // s: a run of such a length plays in real time
 const LENGTH = 8 // s, of any other
 const LONGEST_FRAME = 0.1 // s
 
-export class Desk {
+export class Desk extends Shell {
   constructor(element, config, words, progress = null) {
-    this.element = element
-    this.config = config
-    this.words = words
-    this.progress = progress
+    super(element, config, words, progress)
     this.curves = new Curves(config)
     this.initial = config.controls.map(({ value }) => value)
     this.values = this.initial
@@ -43,16 +37,11 @@ export class Desk {
     this.tick = (now) => this.advance(now)
     this.build()
     this.compute()
-    this.unwatch = watchSight(this.body, (isVisible) => {
-      this.visible = isVisible
-      this.schedule()
-    })
   }
 
   build() {
-    const { config, words, element } = this
+    const { config, words } = this
     const { axis } = config
-    this.notices = new Notices(words)
     const captions = config.plots.map(({ ylabel, xlabel }) =>
       words('lab.plot', { ylabel: ylabel || words('lab.value'), xlabel: xlabel || axis.name }),
     )
@@ -71,7 +60,7 @@ export class Desk {
       step: () => this.step(),
       reset: () => this.reset(),
       speed: (factor) => (this.speed = factor),
-      full: document.fullscreenEnabled ? () => this.toggleFull() : null,
+      full: this.full,
     })
     const label = words('lab.live.cursor')
     this.slider = h('input', { type: 'range', class: 'lab-scrub', 'aria-label': label, title: label })
@@ -79,46 +68,26 @@ export class Desk {
     this.slider.addEventListener('input', () => this.seek(Number(this.slider.value)))
     this.controls = buildControls(config.controls, { set: (index, value) => this.set(index, value), press: () => {} })
     this.readouts = buildReadouts(config.readouts, formatReadout)
-    const goal = config.goal && element.querySelector('.lab-goal')
-    this.goal = goal
-      ? new GoalView(goal, config.goal, words, {
-          progress: this.progress,
-          say: (text) => this.notices.say(text),
-          show: () => this.begin(config.goal.values),
-          unit: this.unit,
-          format: (x) => formatNumber(x, this.digits).trim(),
-        })
-      : null
+    this.goal = this.makeGoal({
+      show: () => this.begin(config.goal.values),
+      unit: this.unit,
+      format: (x) => formatNumber(x, this.digits).trim(),
+    })
     const charts = h('div', { class: 'lab-charts', role: 'group', tabIndex: 0 }, ...this.charts.map((chart) => chart.element))
     charts.setAttribute('aria-label', words('lab.live.curve', { caption: captions.join('; ') }))
     charts.addEventListener('keydown', (event) => this.onKey(event))
-    const link = h('button', { type: 'button', class: 'lab-text', onclick: () => this.share() }, words('lab.live.link'))
-    const keys = h('details', { class: 'lab-help' }, h('summary', {}, words('lab.live.help')))
-    keys.append(h('ul', {}, h('li', {}, words('lab.live.keys_curve'))))
-    const foot = h('div', { class: 'lab-foot' }, link, keys)
-    this.body = h(
-      'div',
-      { class: 'lab-live lab-desk' },
-      h(
-        'div',
-        { class: 'lab-stage' },
-        h('div', { class: 'lab-screen' }, charts, this.transport.full),
-        this.slider,
-        this.transport.element,
-        this.notices.message,
-      ),
-      h(
-        'div',
-        { class: 'lab-side' },
-        this.goal?.element ?? null,
-        h('div', { class: 'lab-panel' }, this.controls.element, this.readouts.element, foot),
-      ),
-      this.notices.announcement,
+    const link = () => this.share({ values: this.values, steps: 0, time: this.place, physics: new Float64Array() })
+    const foot = h('div', { class: 'lab-foot' }, this.makeButton('link', link), this.makeHelp(['keys_curve']))
+    const panel = h('div', { class: 'lab-panel' }, this.controls.element, this.readouts.element, foot)
+    this.show(
+      'lab-live lab-desk',
+      [h('div', { class: 'lab-screen' }, charts, this.transport.full), this.slider, this.transport.element, this.notices.message],
+      [this.goal?.element ?? null, panel],
+      (isVisible) => {
+        this.visible = isVisible
+        this.schedule()
+      },
     )
-    const still = element.querySelector('.lab-static')
-    if (still !== null) still.before(this.body)
-    else element.append(this.body)
-    element.classList.add('lab-on')
     this.setState('paused')
   }
 
@@ -138,11 +107,11 @@ export class Desk {
       const reason = words(`lab.live.ended_${kind}`)
       notices.show(words('lab.live.ended', { place: this.textOf(this.result.end), reason }), 'warning')
     } else notices.clear()
-    this.show()
+    this.showPlace()
   }
 
   /** Show the place on the axis, and all that belongs to it. */
-  show() {
+  showPlace() {
     const { config, curves, result: run, samples } = this
     const x = (this.place = Math.min(Math.max(this.place, run.start), run.end))
     const isMotion = config.kind === 'ode'
@@ -183,7 +152,7 @@ export class Desk {
 
   seek(x) {
     this.place = x
-    this.show()
+    this.showPlace()
   }
 
   togglePlay() {
@@ -249,11 +218,6 @@ export class Desk {
     this.begin(this.initial.map((value, i) => set[labels[i]] ?? value))
   }
 
-  toggleFull() {
-    if (document.fullscreenElement === this.element) document.exitFullscreen()
-    else this.element.requestFullscreen().catch(() => {})
-  }
-
   onKey(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return
     const act = {
@@ -270,12 +234,6 @@ export class Desk {
     act()
   }
 
-  async share() {
-    const state = { values: this.values, steps: 0, time: this.place, physics: new Float64Array() }
-    const { link } = await writeLink(this.config.id, state)
-    this.notices.show(this.words(await copyLink(link)), 'note')
-  }
-
   /** Go to the state of a link. */
   restore({ values, time }) {
     if (values.length !== this.initial.length || !values.every(Number.isFinite)) return
@@ -286,11 +244,7 @@ export class Desk {
 
   dispose() {
     this.setState('paused')
-    this.unwatch()
-    this.goal?.dispose()
     this.charts.forEach((chart) => chart.dispose())
-    this.body.remove()
-    this.element.classList.remove('lab-on')
-    delete this.element.dataset.state
+    super.dispose()
   }
 }

@@ -23,6 +23,16 @@ export function h(tag, properties = {}, ...children) {
   return element
 }
 
+/** A button with a text; most look like a button, those of the kind `lab-text` like a text. */
+export function textButton(text, onclick, kind = 'lab-button') {
+  return h('button', { type: 'button', class: kind, onclick }, text)
+}
+
+/** A button with an icon, whose text is its label. */
+export function iconButton(name, text, onclick) {
+  return h('button', { type: 'button', class: 'lab-icon', title: text, 'aria-label': text, onclick }, icon(name))
+}
+
 /** Icons of the buttons: SVG paths in a square of 16. */
 const ICONS = {
   play: 'M4 2.5v11l9-5.5z',

@@ -5,7 +5,7 @@
  *   editor.fail("Schema violation: unrecognized attribute: 'foo'\nElement 'geom', line 3")
  */
 
-import { freshId, h } from './dom.js'
+import { freshId, h, textButton } from './dom.js'
 import { LONGEST_MODEL } from './share.js'
 
 const ROWS = 22 // at most; what is longer scrolls
@@ -20,7 +20,7 @@ export class Editor {
     this.field = h('textarea', {
       id,
       value: text,
-      rows: Math.min(ROWS, text.split('\n').length),
+      rows: rowsOf(text),
       wrap: 'off',
       maxLength: LONGEST_MODEL,
       spellcheck: false,
@@ -61,6 +61,7 @@ export class Editor {
 
   set text(text) {
     this.field.value = text
+    this.field.rows = rowsOf(text)
     this.clear()
   }
 
@@ -73,8 +74,7 @@ export class Editor {
     this.field.setAttribute('aria-invalid', 'true')
     this.numberLines(hasLine ? line : null)
     if (!hasLine) return
-    const go = h('button', { type: 'button', class: 'lab-text', onclick: () => this.goTo(line) })
-    go.textContent = this.words('lab.live.line', { line })
+    const go = textButton(this.words('lab.live.line', { line }), () => this.goTo(line), 'lab-text')
     this.error.prepend(go, ' ')
     this.reveal(line)
   }
@@ -115,6 +115,8 @@ export class Editor {
 function range(first, last) {
   return Array.from({ length: Math.max(0, last - first + 1) }, (_, i) => first + i).join('\n')
 }
+
+const rowsOf = (text) => Math.min(ROWS, text.split('\n').length)
 
 /** The text of MuJoCo's error about a model, and the line that it names, or 0. */
 export function readError(message) {

@@ -1,7 +1,7 @@
 /** A lab's goal in the page: its text, for how long it has held, and whether this reader has reached it. */
 
 import { sign } from '../../progress/signs.js'
-import { h } from './dom.js'
+import { h, textButton } from './dom.js'
 import { formatTime } from './numbers.js'
 
 export class GoalView {
@@ -23,7 +23,7 @@ export class GoalView {
     this.status = { held: 0, reached: null, counts: true }
     this.bar = h('progress', { max: hold, value: 0, 'aria-hidden': 'true', hidden: hold === 0 })
     this.text = h('span', {})
-    const button = h('button', { type: 'button', class: 'lab-text', onclick: show }, words('lab.live.goal_show'))
+    const button = textButton(words('lab.live.goal_show'), show, 'lab-text')
     const state = h('p', { class: 'lab-goal-state' }, this.bar, this.text, button)
     this.element = h('div', { class: 'lab-goal' }, ...still.cloneNode(true).childNodes, state)
     this.leave = progress?.onChange(() => this.draw())

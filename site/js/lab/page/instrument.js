@@ -9,16 +9,14 @@
 
 import { buildControls, buildOverlays, buildReadouts, switchButton } from './controls.js'
 import { curvesText } from './csv.js'
-import { download, h, icon } from './dom.js'
+import { download, h, icon, textButton } from './dom.js'
 import { fillScript } from './export.js'
-import { GoalView } from './goal.js'
-import { Notices } from './notices.js'
 import { formatReadout, formatTime } from './numbers.js'
 import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
-import { copyLink, writeLink, writeLog } from './share.js'
-import { watchSight } from './sight.js'
+import { writeLog } from './share.js'
+import { Shell } from './shell.js'
 import { Simulation } from './simulation.js'
 import { prefersStillness } from './support.js'
 import { buildTape } from './tape.js'
@@ -31,15 +29,12 @@ const SETTLE_TIME = 400 // ms, after which the last picture of a paused lab has 
 const HEIGHT = 300 // CSS pixels, of a view that is 480 wide
 const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
-export class Instrument {
+export class Instrument extends Shell {
   constructor(element, config, base, words, progress = null, openEditor = null) {
-    this.element = element
-    this.config = config
+    super(element, config, words, progress)
     this.base = base
-    this.words = words
     this.openEditor = openEditor
     this.bench = null // in which the reader edits the model, in place of this
-    this.progress = progress
     this.values = this.initial = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
     this.sayTimer = 0 // of the announcement of a pause
@@ -54,13 +49,11 @@ export class Instrument {
       view: this.view,
       on: this.listeners(),
     })
-    this.unwatch = watchSight(this.body, (isVisible) => this.simulation.setVisible(isVisible))
   }
 
   build() {
     const { config, words, element } = this
     const title = config.title || words('lab.untitled')
-    this.notices = new Notices(words)
     this.view = new View({
       height: config.height ?? HEIGHT,
       label: words('lab.live.picture', { title }),
@@ -78,7 +71,7 @@ export class Instrument {
       step: null,
       reset: () => this.reset(),
       speed: (factor) => this.simulation.speed(factor),
-      full: document.fullscreenEnabled ? () => this.toggleFull() : null,
+      full: this.full,
     })
     const seek = (time) => this.simulation.seek(time)
     this.tape = buildTape(words, config.stopAt, { seek, step: (count) => this.step(count) })
@@ -96,38 +89,22 @@ export class Instrument {
       actuate: (index, value) => this.simulation.actuate(index, value, !this.hasStarted),
       startAt: (index) => this.simulation.startAt(index),
       look: (camera) => this.view.look(camera),
+      seek,
     })
     this.plots = config.plots.map((plot) => new Plot(plot, words, seek))
-    const goal = config.goal && element.querySelector('.lab-goal')
-    this.goal = goal
-      ? new GoalView(goal, config.goal, words, {
-          progress: this.progress,
-          say: (text) => this.notices.say(text),
-          show: () => this.simulation.replay({ values: this.initial, events: config.goal.log }),
-        })
-      : null
+    this.goal = this.makeGoal({ show: () => this.simulation.replay({ values: this.initial, events: config.goal.log }) })
     this.motion = h('p', { class: 'lab-motion', hidden: true })
-    this.body = h(
-      'div',
-      { class: 'lab-live' },
-      h('div', { class: 'lab-stage' }, h('div', { class: 'lab-screen' }, this.view.element, this.transport.full), this.transport.element, this.tape.element, this.makeReason()),
-      h(
-        'div',
-        { class: 'lab-side' },
-        this.motion,
-        this.notices.message,
-        this.goal?.element ?? null,
-        ...this.plots.map((plot) => plot.element),
-        h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.makeFoot()),
-      ),
-      this.notices.announcement,
-    )
     this.controls.show(this.values)
     this.transport.setTime(0)
-    const still = element.querySelector('.lab-static')
-    if (still !== null) still.before(this.body)
-    else element.append(this.body)
-    element.classList.add('lab-on')
+    const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full)
+    const panel = h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.makeFoot())
+    const plots = this.plots.map((plot) => plot.element)
+    this.show(
+      'lab-live',
+      [screen, this.transport.element, this.tape.element, this.makeReason()],
+      [this.motion, this.notices.message, this.goal?.element ?? null, ...plots, panel],
+      (isVisible) => this.simulation.setVisible(isVisible),
+    )
   }
 
   /** Why nothing moves when a reader presses Play. */
@@ -137,10 +114,8 @@ export class Instrument {
 
   /** Link, export and help under the instrument. */
   makeFoot() {
-    const { words, config } = this
-    const act = (key, run) => h('button', { type: 'button', class: 'lab-text', onclick: run }, words(`lab.live.${key}`))
-    const help = h('details', { class: 'lab-help' }, h('summary', {}, words('lab.live.help')))
-    help.append(h('ul', {}, ...HELP.map((key) => h('li', {}, words(`lab.live.${key}`)))))
+    const { config } = this
+    const act = (key, run) => this.makeButton(key, run)
     return h(
       'div',
       { class: 'lab-foot' },
@@ -150,15 +125,14 @@ export class Instrument {
       document.querySelector('script[data-state]') && !config.kind ? this.makeLogButton() : null,
       config.source && this.openEditor ? act('edit', () => this.edit()) : null,
       this.panel.element,
-      help,
+      this.makeHelp(HELP),
     )
   }
 
   /** A button that keeps the curves of the run behind those of the next ones, and then one that drops them. */
   makeKeepButton() {
     let isKept = false
-    const button = h('button', { type: 'button', class: 'lab-text' }, this.words('lab.live.keep'))
-    button.addEventListener('click', () => {
+    const button = this.makeButton('keep', () => {
       isKept = !isKept
       button.textContent = this.words(isKept ? 'lab.live.drop' : 'lab.live.keep')
       this.plots.forEach((plot) => {
@@ -225,6 +199,7 @@ export class Instrument {
   }
 
   collect({ times, values, from }, fresh) {
+    if (fresh || from < Infinity) this.panel.cut(fresh ? -Infinity : from)
     for (const plot of this.plots) {
       if (fresh) plot.clear()
       else if (from < Infinity) plot.cut(from)
@@ -254,6 +229,7 @@ export class Instrument {
       this.plotAt = now
       const marks = tape.marks.map(([at, i]) => ({ time: at, label: this.config.controls[i].label }))
       this.plots.forEach((plot) => plot.draw({ time, resting, marks }))
+      this.panel.draw(panel, { time, resting, marks })
     }
   }
 
@@ -301,17 +277,12 @@ export class Instrument {
     this.notices.say(this.words('lab.live.said_reset'))
   }
 
-  toggleFull() {
-    if (document.fullscreenElement === this.element) document.exitFullscreen()
-    else this.element.requestFullscreen().catch(() => {})
-  }
-
   /** Go to the state of a link, now or when the lab is ready, and offer a button that replays the motion that led to it. */
   restore(state) {
     const { log } = state
     if (state.text !== undefined && this.config.source && this.openEditor) return void this.edit(state)
     const replay = () => this.simulation.replay(log)
-    const button = h('button', { type: 'button', class: 'lab-button', onclick: replay }, this.words('lab.live.motion'))
+    const button = textButton(this.words('lab.live.motion'), replay)
     this.motion.replaceChildren(button)
     this.motion.hidden = !log
     this.whenReady(() => this.simulation.restore(state))
@@ -334,9 +305,7 @@ export class Instrument {
   /** Let the reader edit the model, in place of this lab. @param {Record<string, any> | null} [state] of a link to an edited model */
   async edit(state = null) {
     try {
-      const response = await fetch(new URL(this.config.source, this.base))
-      if (!response.ok) throw new Error(this.words('lab.live.not_found', { status: response.status }))
-      const text = await response.text()
+      const text = await this.fetchText(this.config.source)
       if (this.state === 'playing') this.simulation.pause()
       this.body.hidden = true
       this.bench = this.openEditor(this, text.trimEnd(), () => this.leaveEditor())
@@ -344,6 +313,13 @@ export class Instrument {
     } catch (error) {
       this.notices.show(error.message, 'warning')
     }
+  }
+
+  /** The text at an address of the lab's JSON. */
+  async fetchText(address) {
+    const response = await fetch(new URL(address, this.base))
+    if (!response.ok) throw new Error(this.words('lab.live.not_found', { status: response.status }))
+    return response.text()
   }
 
   leaveEditor() {
@@ -385,14 +361,7 @@ export class Instrument {
         (error) => this.notices.show(text || error.message, 'warning'),
       )
     }
-    return h('button', { type: 'button', class: 'lab-text', onclick: () => this.save(copy) }, this.words('lab.live.copy_log'))
-  }
-
-  async share(state) {
-    const { link, only } = await writeLink(this.config.id, state)
-    const key = await copyLink(link)
-    if (only === null) this.notices.show(this.words(key), 'note')
-    else this.notices.show(`${this.words(key)} ${this.words(`lab.live.link_${only}`)}`, 'warning')
+    return this.makeButton('copy_log', () => this.save(copy))
   }
 
   export() {
@@ -411,14 +380,11 @@ export class Instrument {
 
   dispose() {
     this.leaveEditor()
-    this.unwatch()
     clearTimeout(this.sayTimer)
     this.hands.dispose()
-    this.goal?.dispose()
     this.plots.forEach((plot) => plot.dispose())
+    this.panel.closeCurves()
     this.simulation.dispose()
-    this.body.remove()
-    this.element.classList.remove('lab-on')
-    delete this.element.dataset.state
+    super.dispose()
   }
 }

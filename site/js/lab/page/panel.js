@@ -3,19 +3,23 @@
 import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
 import { formatNumber, formatReadout } from './numbers.js'
+import { PLAIN_PLOT, Plot } from './plots.js'
 
 const DIGITS = 3 // of sensors
 const MOST_VALUES = 6 // of a sensor that are shown
+const WINDOW = 10 // s, of its curve
 
 export class ModelPanel {
   /**
    * @param {(key: string, values?: Record<string, any>) => string} words
    * @param {{inspect: (on: boolean) => void, actuate: (index: number, value: number) => void, startAt: (index: number) => void,
-   *   look: (camera: number) => void}} actions `look`: through a camera of the model, or the free one (-1)
+   *   look: (camera: number) => void, seek: (time: number) => void}} actions `look`: through a camera of the model, or the free one
+   *   (-1); `seek`: the reader points at a time (s) of a curve
    */
   constructor(words, actions) {
     this.words = words
     this.actions = actions
+    this.curves = new Map() // the plots of sensors, by their numbers
     this.body = h('div', { class: 'lab-model' })
     this.element = h('details', { class: 'lab-help' }, h('summary', {}, words('lab.live.panel')), this.body)
     this.element.addEventListener('toggle', () => actions.inspect(this.element.open))
@@ -26,7 +30,9 @@ export class ModelPanel {
     if (model === null) return
     const { words, actions } = this
     const { actuators, sensors, cameras, keys } = model
-    this.sensors = sensors
+    this.closeCurves()
+    let start = 0
+    this.sensors = sensors.map(({ name, size }) => ({ name, start, end: (start += size) }))
     this.sliders = buildControls(
       actuators.map(({ name, min, max }) => ({ type: 'slider', label: name, unit: '', min, max, step: null, digits: DIGITS })),
       { set: (i, value) => actions.actuate(i, Number(value)), press: () => {} },
@@ -47,12 +53,56 @@ export class ModelPanel {
     this.driven = h('p', { class: 'lab-driven', hidden: true }, words('lab.live.driven'))
     this.body.replaceChildren(
       ...this.section('actuators', actuators, this.sliders.element, this.driven),
-      ...this.section('sensors', sensors, this.readouts.element),
+      ...this.section('sensors', sensors, this.readouts.element, ...this.makeCurves(sensors)),
       ...this.section('keyframes', keys, buttons.element),
       ...(cameras.length > 0 ? [menu.element] : []),
     )
     if (!this.body.hasChildNodes()) this.body.append(h('p', {}, words('lab.live.panel_empty')))
     actions.look(-1)
+  }
+
+  /** Boxes that draw the curves of sensors, and the place of these. */
+  makeCurves(sensors) {
+    const place = h('div')
+    const boxes = sensors.map(({ name, size }, i) => {
+      const box = h('input', { type: 'checkbox' })
+      box.addEventListener('change', () => {
+        if (!box.checked) return this.closeCurve(i)
+        const count = Math.min(size, MOST_VALUES)
+        const traces = Array.from({ length: count }, (_, j) => ({ label: size > 1 ? `[${j}]` : name }))
+        const plot = new Plot({ ...PLAIN_PLOT, ylabel: name, xlabel: this.words('lab.time'), window: WINDOW, traces }, this.words, this.actions.seek)
+        this.curves.set(i, plot)
+        place.append(plot.element)
+      })
+      return h('label', { class: 'lab-check' }, box, ` ${this.words('lab.live.sensor_curve', { name })}`)
+    })
+    return [h('div', { class: 'lab-overlays' }, ...boxes), place]
+  }
+
+  closeCurve(i) {
+    const plot = this.curves.get(i)
+    plot.dispose()
+    plot.element.remove()
+    this.curves.delete(i)
+  }
+
+  closeCurves() {
+    for (const i of [...this.curves.keys()]) this.closeCurve(i)
+  }
+
+  /** Forget what came after a time (s) of the run. */
+  cut(time) {
+    for (const plot of this.curves.values()) plot.cut(time)
+  }
+
+  /** Draw the curves, with the values of a frame that is later than those before. @param {any} panel of the frame @param {any} now of Plot */
+  draw(panel, now) {
+    for (const [i, plot] of this.curves) {
+      const { start, end } = this.sensors[i]
+      const { length, last } = plot.whole
+      if (panel !== null && (length === 0 || now.time > last)) plot.push([now.time], panel.sensors, end - start, start)
+      plot.draw(now)
+    }
   }
 
   section(key, items, ...content) {
@@ -65,9 +115,7 @@ export class ModelPanel {
   show(panel) {
     if (panel === null || this.sensors === undefined) return
     const { ctrl, sensors, driven } = panel
-    let start = 0
-    const values = this.sensors.map(({ size }) => textOf(sensors.subarray(start, (start += size))))
-    this.readouts.show(values)
+    this.readouts.show(this.sensors.map(({ start, end }) => textOf(sensors.subarray(start, end))))
     this.sliders.show(Array.from(ctrl))
     this.driven.hidden = !driven.includes(1)
     this.sliders.element?.querySelectorAll('input').forEach((field, i) => (field.disabled = driven[i] === 1))

@@ -24,6 +24,18 @@ const FIGURES = 4 // of a value under the pointer
 const SLOP = 4 // pixels that a pointer moves before it sets the time
 const TICK = 5 // pixels, of the mark of a change
 const NO_SPAN = [Infinity, -Infinity]
+/** A plot of the lab's JSON with nothing in it. */
+export const PLAIN_PLOT = {
+  xlabel: '',
+  ylabel: '',
+  window: null,
+  ymin: null,
+  ymax: null,
+  height: null,
+  refLines: [],
+  traces: [],
+  log: false,
+}
 const PLAYING = { time: 0, resting: false, marks: [] }
 
 export class Plot {

@@ -37,6 +37,7 @@ export class Simulation {
     this.element = null
     this.address = (path) => (path ? new URL(path, base).href : '')
     this.visible = false
+    this.own = null
     this.settings = new Map() // messages to repeat after a restart: speed, overlays, inspection
     this.tick = (now) => this.refresh(now)
     this.request = 0
@@ -56,7 +57,7 @@ export class Simulation {
     this.setState('loading')
     this.line = connection(address(config.worker)).open(config.id, (message) => MESSAGES[message.type]?.(this, message))
     const addresses = { module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
-    this.send({ type: 'load', config, ...addresses })
+    this.send({ type: 'load', config, own: this.own, ...addresses })
     this.send({ type: 'visible', on: this.visible })
   }
 
@@ -171,9 +172,10 @@ export class Simulation {
     this.view?.setMoving(this.state === 'playing' && on)
   }
 
-  /** Start again with another model, MJCF. */
-  load(xml) {
+  /** Start again with another model, MJCF, and the files that it may name (page/files.js). */
+  load(xml, own = null) {
     this.config = { ...this.config, xml }
+    this.own = own
     this.restart()
   }
 

@@ -1,6 +1,6 @@
 /** The row under Play: a step back, the run as a bar on which to go to another time, a step on. */
 
-import { h, icon } from './dom.js'
+import { h, iconButton } from './dom.js'
 import { formatTime } from './numbers.js'
 
 const USUAL = 10 // s, for which there is room at first
@@ -12,12 +12,10 @@ const MANY = 20 // steps by an arrow key with Shift
  * @param {{seek: (time: number) => void, step: (count: number) => void}} actions
  */
 export function buildTape(words, stopAt, { seek, step }) {
-  const act = (name, text, run) =>
-    h('button', { type: 'button', class: 'lab-icon', title: text, 'aria-label': text, onclick: run }, icon(name))
   const field = h('input', { type: 'range', class: 'lab-scrub', min: '0', max: String(stopAt ?? USUAL), step: 'any', value: '0' })
   field.setAttribute('aria-label', words('lab.live.tape'))
-  const back = act('back', words('lab.live.back'), () => step(-1))
-  const on = act('step', words('lab.live.step'), () => step(1))
+  const back = iconButton('back', words('lab.live.back'), () => step(-1))
+  const on = iconButton('step', words('lab.live.step'), () => step(1))
   let queued = false
   field.addEventListener('input', () => {
     if (queued) return

@@ -1,6 +1,6 @@
 /** The row under the picture: play and pause, a step, reset, speed, time, full screen. */
 
-import { h, icon } from './dom.js'
+import { h, icon, iconButton } from './dom.js'
 import { formatRatio, formatTime } from './numbers.js'
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5]
@@ -11,17 +11,15 @@ const ON_TIME = 0.95
  * @param {{play: () => void, step: (() => void) | null, reset: () => void, speed: (factor: number) => void, full: (() => void) | null}} actions
  */
 export function buildTransport(words, actions) {
-  const act = (name, text, run) =>
-    h('button', { type: 'button', class: 'lab-icon', title: text, 'aria-label': text, onclick: run }, icon(name))
   const label = h('span', {}, words('lab.live.play'))
   const sign = h('span', { class: 'lab-sign' }, icon('play'))
   const play = h('button', { type: 'button', class: 'lab-play', onclick: actions.play }, sign, label)
-  const step = actions.step === null ? null : act('step', words('lab.live.step'), actions.step)
-  const reset = act('reset', words('lab.live.reset'), actions.reset)
+  const step = actions.step === null ? null : iconButton('step', words('lab.live.step'), actions.step)
+  const reset = iconButton('reset', words('lab.live.reset'), actions.reset)
   const speed = h('select', { class: 'lab-speed', 'aria-label': words('lab.live.speed'), title: words('lab.live.speed') })
   speed.append(...SPEEDS.map((factor) => h('option', { value: String(factor), selected: factor === 1 }, `${factor} ×`)))
   speed.addEventListener('change', () => actions.speed(Number(speed.value)))
-  const full = actions.full === null ? null : act('full', words('lab.live.full'), actions.full)
+  const full = actions.full === null ? null : iconButton('full', words('lab.live.full'), actions.full)
   const time = h('output', { class: 'lab-time' })
   const late = h('span', { class: 'lab-late' })
   const clock = h('span', { class: 'lab-clock' }, time, late)

@@ -5,10 +5,12 @@
  * stopped.
  */
 
-import { h } from './dom.js'
+import { buildControls } from './controls.js'
+import { h, textButton } from './dom.js'
 import { Editor } from './editor.js'
+import { FilesError, MOST_BYTES, readModel } from './files.js'
 import { Instrument } from './instrument.js'
-import { copyLink, writeLink } from './share.js'
+import { LONGEST_MODEL, copyLink, writeLink } from './share.js'
 
 /**
  * Let the reader edit the model of an instrument, in its place.
@@ -19,7 +21,7 @@ export function openEditor({ element, config, base, words }, xml, leave) {
   const bare = { goal: null, exportPython: null, source: null, key: null, start: null, still: '', stopAt: null, trail: null, autoplay: false }
   const own = { kind: 'mjcf', xml, mjb: '', module: '', worker: `${config.worker}#${config.id}` }
   const bench = new Workbench(element, { ...config, ...bare, ...own, controls: [], readouts: [], plots: [] }, base, words)
-  bench.backButton.after(h('button', { type: 'button', class: 'lab-button', onclick: leave }, words('lab.live.leave')))
+  bench.backButton.after(textButton(words('lab.live.leave'), leave))
   bench.editor.field.focus()
   return bench
 }
@@ -28,14 +30,39 @@ export class Workbench extends Instrument {
   build() {
     super.build()
     const { words, config } = this
+    this.own = null // the files beside the reader's model
     this.otherText = config.xml // the reader's text, while the lesson's is in the editor
     this.editor = new Editor(config.xml, words, { run: () => this.run(), input: () => this.labelBackButton() })
-    this.backButton = h('button', { type: 'button', class: 'lab-button', onclick: () => this.exchange() })
-    const run = h('button', { type: 'button', class: 'lab-button', onclick: () => this.run() }, words('lab.live.compile'))
+    this.backButton = textButton('', () => this.exchange())
+    const run = textButton(words('lab.live.compile'), () => this.run())
     const keys = h('span', {}, words('lab.live.keys_compile'))
-    this.editor.element.append(h('div', { class: 'lab-buttons' }, run, this.backButton, keys))
+    this.editor.element.append(h('div', { class: 'lab-buttons' }, run, this.backButton, keys), this.makeSources())
     this.labelBackButton()
     this.body.prepend(this.editor.element)
+  }
+
+  /** Where a model comes from beside the keyboard: those that the author offers, and files of the reader's device. */
+  makeSources() {
+    const { words, config, body } = this
+    const options = [[config.title, ''], ...(config.starts ?? []).map(({ name, source }) => [name, source])]
+    const start = (_, source) => this.startFrom(source)
+    const menu = buildControls([{ type: 'select', label: words('lab.live.start_from'), unit: '', options }], { set: start, press: () => {} })
+    const picker = h('input', { type: 'file', multiple: true, hidden: true })
+    picker.addEventListener('change', async () => {
+      await this.openFiles(picker.files)
+      picker.value = '' // the same file may be taken again
+    })
+    body.addEventListener('dragover', (event) => {
+      if (event.dataTransfer.types.includes('Files')) event.preventDefault()
+    })
+    body.addEventListener('drop', (event) => {
+      if (event.dataTransfer.files.length === 0) return
+      event.preventDefault()
+      this.openFiles(event.dataTransfer.files)
+    })
+    const button = textButton(words('lab.live.open_file'), () => picker.click())
+    const files = h('div', { class: 'lab-buttons' }, button, picker, h('span', {}, words('lab.live.open_note')))
+    return h('div', { class: 'lab-sources' }, options.length > 1 ? menu.element : null, files)
   }
 
   listeners() {
@@ -59,7 +86,39 @@ export class Workbench extends Instrument {
     this.notices.clear()
     this.editor.clear()
     this.playRequested = play
-    this.simulation.load(this.editor.text)
+    const { text } = this.editor
+    this.simulation.load(text, text === this.config.xml ? null : this.own)
+  }
+
+  /** Put another model into the editor, with the files beside it, and run it. */
+  openModel(text, own = null) {
+    this.own = own
+    this.editor.text = text
+    this.labelBackButton()
+    this.run()
+  }
+
+  /** Begin with a model that the author offers. @param {string} source its address; empty for the lesson's own */
+  async startFrom(source) {
+    if (source === '') return this.openModel(this.config.xml)
+    try {
+      this.openModel(await this.fetchText(source))
+    } catch (error) {
+      this.editor.fail(error.message)
+    }
+  }
+
+  /** Open files of the reader's device. @param {Iterable<File>} files */
+  async openFiles(files) {
+    const { words, editor, notices } = this
+    try {
+      const { main, text, files: others } = await readModel(files)
+      this.openModel(text, { main, files: others })
+      notices.show(words('lab.live.opened', { name: main, n: others.size }), 'note')
+    } catch (error) {
+      const limits = { most: MOST_BYTES >> 20, letters: LONGEST_MODEL }
+      editor.fail(error instanceof FilesError ? words(`lab.live.${error.key}`, limits) : error.message)
+    }
   }
 
   /** Exchange the reader's text for the lesson's model, or back. */
@@ -83,16 +142,19 @@ export class Workbench extends Instrument {
   }
 
   async shareModel() {
-    const { words, notices, config, editor } = this
+    const { words, notices, config, editor, own } = this
     const state = { values: [], steps: 0, time: 0, physics: new Float64Array(), text: editor.text }
     const { link, only } = await writeLink(config.id, state)
-    if (only === null) notices.show(words(await copyLink(link)), 'note')
-    else notices.show(words('lab.live.link_long'), 'warning')
+    if (only !== null) return notices.show(words('lab.live.link_long'), 'warning')
+    const said = words(await copyLink(link))
+    if (own === null || own.files.size === 0) notices.show(said, 'note')
+    else notices.show(`${said} ${words('lab.live.link_files')}`, 'warning')
   }
 
   /** Show the model of a link. */
   restore({ text }) {
     if (text === undefined) return
+    this.own = null
     this.editor.text = text
     this.labelBackButton()
     this.run(false)

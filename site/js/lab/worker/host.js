@@ -70,7 +70,7 @@ export class Host {
     return this.engine
   }
 
-  async load({ lab: id, config, module, mjb, wasm }) {
+  async load({ lab: id, config, module, mjb, wasm, own }) {
     const { post, now, fetchBytes, importModule } = this.services
     this.sessions.get(id)?.close()
     const queue = []
@@ -82,7 +82,7 @@ export class Host {
       const session = new Session(id, post, now)
       this.sessions.set(id, session)
       if (config.attempt !== undefined) confine() // its worker is dedicated
-      session.open(engine, source, config, config.attempt === undefined ? code : watchableCode(config, code))
+      session.open(engine, source, config, config.attempt === undefined ? code : watchableCode(config, code), own)
       this.queues.delete(id)
       queue.forEach((message) => session.receive(message))
       session.show()

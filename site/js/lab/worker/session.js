@@ -8,9 +8,9 @@
  * handled afterwards. To the worker:
  *
  *   warm {wasm}                       start to fetch and compile the engine (an address)
- *   load {config, module, mjb, wasm}  fetch what is missing and start the lab; the last three are absolute addresses. A model in
- *                                     `config.xml` replaces `mjb`; without a `module` the lab has no code but a start from the
- *                                     first keyframe
+ *   load {config, module, mjb, wasm, own}  fetch what is missing and start the lab; `module`, `mjb` and `wasm` are absolute addresses. A
+ *                                     model in `config.xml` replaces `mjb`, and may name the files of `own`, `{main, files}`, where it lies
+ *                                     at the path `main`; without a `module` the lab has no code but a start from the first keyframe
  *   ping                              answered by `pong`, unless something takes all the worker's time
  *   play, pause, reset
  *   step {n}                          pause and make `n` steps, or go back by as many if it is negative
@@ -82,10 +82,10 @@ export class Session {
   }
 
   /** Start the lab from the fetched model, data and code. */
-  open(engine, source, config, code) {
+  open(engine, source, config, code, own = null) {
     this.guard(() => {
       const host = { play: () => this.play(), pause: () => this.stop('code') }
-      this.lab = new Lab(engine, source, config, code, host)
+      this.lab = new Lab(engine, source, config, code, host, own)
       this.lab.tape = new Tape(this.lab)
       this.lab.start()
     })

@@ -1,0 +1,142 @@
+/**
+ * A model of the reader's own, from files of this device: MJCF or URDF, alone, with the files that it names, or all of it in a zip.
+ *
+ *   const { main, text, files } = await readModel(fileList)
+ *
+ * Nothing is sent anywhere. What is read is bounded, whatever a zip claims of itself.
+ */
+
+import { LONGEST_MODEL } from './share.js'
+
+export const MOST_BYTES = 64 << 20 // of all files, unpacked
+const MOST_FILES = 2000
+const MODEL = /<(?:mujoco|robot)\b/
+const SCENE = /(?:^|\/)scene\.xml$/i // as collections of robots name the model that is complete
+const INCLUDED = /<include\b[^>]*\bfile\s*=\s*["']([^"']+)["']/g
+
+/** Files that hold no model that can be opened. `key`: of the text that says why. */
+export class FilesError extends Error {
+  constructor(key) {
+    super(key)
+    this.key = key
+  }
+}
+
+/**
+ * @param {Iterable<File>} list
+ * @returns {Promise<{main: string, text: string, files: Map<string, Uint8Array>}>} the path and the text of the model, and all other files
+ *   by their paths
+ */
+export async function readModel(list) {
+  const given = [...list]
+  if (given.length > MOST_FILES || given.reduce((sum, { size }) => sum + size, 0) > MOST_BYTES) throw new FilesError('file_large')
+  const files = new Map()
+  let room = MOST_BYTES
+  const add = (name, bytes) => {
+    const path = pathOf(name)
+    room -= bytes.length
+    if (room < 0 || files.size >= MOST_FILES) throw new FilesError('file_large')
+    if (path !== null) files.set(path, bytes)
+  }
+  for (const file of given) {
+    const bytes = new Uint8Array(await file.arrayBuffer())
+    if (isZip(bytes)) for await (const [name, part] of unzip(bytes, () => room)) add(name, part)
+    else add(file.name, bytes)
+  }
+  const { main, text } = mainModel(files)
+  files.delete(main)
+  return { main, text, files }
+}
+
+/** The path of a file inside the folder of the model; null if it has none. */
+function pathOf(name) {
+  const parts = name.split(/[/\\]/).filter((part) => part !== '' && part !== '.')
+  return parts.length === 0 || parts.includes('..') || /[\0:]/.test(name) ? null : parts.join('/')
+}
+
+/** The model that no other includes; of several that of a scene, then the one that lies highest. */
+function mainModel(files) {
+  const texts = new Map()
+  for (const [path, bytes] of files) {
+    if (!/\.(?:xml|mjcf|urdf)$/i.test(path)) continue
+    const text = new TextDecoder().decode(bytes)
+    if (MODEL.test(text)) texts.set(path, text)
+  }
+  const included = new Set([...texts.values()].flatMap((text) => [...text.matchAll(INCLUDED)].map(([, file]) => file.split('/').at(-1))))
+  const depth = (path) => path.split('/').length
+  const rank = (path) => [included.has(path.split('/').at(-1)) ? 1 : 0, SCENE.test(path) ? 0 : 1, depth(path)]
+  const order = [...texts.keys()].sort((a, b) => {
+    const [left, right] = [rank(a), rank(b)]
+    const i = left.findIndex((value, k) => value !== right[k])
+    return i < 0 ? a.localeCompare(b, 'en') : left[i] - right[i]
+  })
+  if (order.length === 0) throw new FilesError('file_none')
+  const [main] = order
+  if (texts.get(main).length > LONGEST_MODEL) throw new FilesError('file_large')
+  return { main, text: texts.get(main) }
+}
+
+// --- zip: the directory at its end, then each file, stored or deflated
+
+const END = 0x06054b50
+const ENTRY = 0x02014b50
+const END_SIZE = 22
+const LONGEST_COMMENT = 0xffff
+const STORED = 0
+const DEFLATED = 8
+const ENCRYPTED = 1
+
+const isZip = (bytes) => bytes[0] === 0x50 && bytes[1] === 0x4b && (bytes[2] === 3 || bytes[2] === 5)
+
+/**
+ * The files of a zip, one after the other.
+ *
+ * @param {Uint8Array} bytes @param {() => number} room how many bytes may still be unpacked
+ * @returns {AsyncGenerator<[string, Uint8Array]>}
+ */
+async function* unzip(bytes, room) {
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength)
+  try {
+    const end = findEnd(view)
+    const count = view.getUint16(end + 10, true)
+    let at = view.getUint32(end + 16, true)
+    for (let i = 0; i < count; i++) {
+      if (view.getUint32(at, true) !== ENTRY) throw new RangeError('no entry')
+      const [nameSize, extraSize, commentSize] = [28, 30, 32].map((offset) => view.getUint16(at + offset, true))
+      const name = new TextDecoder().decode(bytes.subarray(at + 46, at + 46 + nameSize))
+      if (!name.endsWith('/')) yield [name, await unpack(bytes, view, at, room())]
+      at += 46 + nameSize + extraSize + commentSize
+    }
+  } catch (error) {
+    throw error instanceof FilesError ? error : new FilesError('file_zip')
+  }
+}
+
+function findEnd(view) {
+  const last = view.byteLength - END_SIZE
+  for (let at = last; at >= Math.max(0, last - LONGEST_COMMENT); at--) if (view.getUint32(at, true) === END) return at
+  throw new RangeError('no directory')
+}
+
+/** The bytes of the file whose entry of the directory is at a place. */
+async function unpack(bytes, view, entry, room) {
+  const [flags, method] = [8, 10].map((offset) => view.getUint16(entry + offset, true))
+  const [size, start] = [20, 42].map((offset) => view.getUint32(entry + offset, true))
+  if (flags & ENCRYPTED || (method !== STORED && method !== DEFLATED)) throw new RangeError('not a plain file')
+  const data = start + 30 + view.getUint16(start + 26, true) + view.getUint16(start + 28, true)
+  if (data + size > bytes.length) throw new RangeError('cut off')
+  const packed = bytes.subarray(data, data + size)
+  if (method === STORED) return packed.slice()
+  const chunks = []
+  let length = 0
+  const reader = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate-raw')).getReader()
+  for (let part = await reader.read(); !part.done; part = await reader.read()) {
+    chunks.push(part.value)
+    length += part.value.length
+    if (length > room) {
+      await reader.cancel()
+      throw new FilesError('file_large')
+    }
+  }
+  return new Uint8Array(await new Blob(chunks).arrayBuffer())
+}
