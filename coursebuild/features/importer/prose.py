@@ -37,7 +37,9 @@ _LINE = re.compile(
     r"\((?P<address>(?:[^()\s]|\([^()\s]*\))+)(?P<title>[ \t]+\"[^\"\n]*\")?\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
-    r"|(?P<paren>\\\((?P<inner>(?>(?:(?!\\[()])[^\n])+))\\\))"
+    r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
+    r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
+    r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]\[(?P<path>[A-Za-z_]\w*(?:\.\w+)+)?\])"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
     r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
     r"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@\w[\w:./-]*(?:[;,\s][^\[\]\n]*)?\])"
@@ -59,12 +61,13 @@ _DISPLAY = re.compile(
     re.DOTALL,
 )
 _ENVIRONMENT = re.compile(
-    r"(?P<before>(?:\A|\n[ \t]*\n))[ \t]*"
+    r"\$\$(?>[^$]+)\$\$|^[ \t]*"
     r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
     r"(?>(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*)"
-    r"\\end\{(?P=env)(?P=star)\})(?P<after>[ \t]*(?=\n|\Z))",
-    re.DOTALL,
+    r"\\end\{(?P=env)(?P=star)\})[ \t]*$",
+    re.DOTALL | re.MULTILINE,
 )
+"""A formula between dollar signs, or one that its environment alone makes one."""
 _BRACKETS = re.compile(
     r"^[ \t]*\\\[(?P<tex>(?>(?:(?!\\[\[\]]).)+))\\\][ \t]*$", re.DOTALL | re.MULTILINE
 )
@@ -124,6 +127,8 @@ _KINDS = {
     "digits": ("formula", "the digits behind it are in it"),
     "math": ("formula", "without blanks at its ends"),
     "paren": ("formula", "between dollar signs"),
+    "anchor": ("link", "dropped: it has no text and no address"),
+    "object": ("link", "its words: what it leads to is made from code by another tool"),
     "note": ("footnote", "stands at the end of the lesson"),
     "cross": ("cross-reference", "a link"),
     "cite": ("citation", "in the words of BibTeX's keys"),
@@ -216,7 +221,7 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
 def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
     text = _BRACKETS.sub(lambda m: f"$${m['tex']}$$", text)
-    text = _ENVIRONMENT.sub(lambda m: f"{m['before']}$${m['tex']}$${m['after']}", text)
+    text = _ENVIRONMENT.sub(lambda m: f"$${m['tex']}$$" if m["tex"] else m[0], text)
     return _DISPLAY.sub(_label_formula, text)
 
 
@@ -298,6 +303,12 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if not text and not re.match("#|lesson:|page:", address):  # its tool knows a title
                 text = title_of_file(re.split("[:#]", match["address"])[-1])
             return write_link(_rewrite_line(text, context), address, match["title"] or "")
+        case "anchor":
+            return ""
+        case "object":
+            called = match["called"]
+            is_path = match["path"] is not None or re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called)
+            return _rewrite_line(called, context) if is_path else whole
         case "paren":
             return f"${match['inner'].strip()}$"
         case "note":
@@ -402,7 +413,7 @@ def _convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
 
 
 _CITED_KEY = re.compile(r"(?<![\w@])@([\w][\w:./-]*\w|\w)")
-_TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*)\$(?!\$)")
+_TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
 """A formula with blanks at its ends, which some tools allow."""
 _WORD = re.compile(r"(?<![\\A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
 """What no formula holds outside of its commands, but a sentence between two prices does."""

@@ -63,6 +63,10 @@ def complete_texts(
 
 _PASSES = 3
 """How often HTML is dropped: an end whose beginning was dropped is seen the next time."""
+_MEDIA = re.compile(
+    r"<(?:img\b[^<>]*>|(?P<name>video|audio)\b[^<>]*(?:/>|>(?:.*?</(?P=name)\s*>)?))",
+    re.DOTALL | re.IGNORECASE,
+)
 _WITH_CONTENT = re.compile(r"<(script|style)\b.*?(?:</\1\s*>|\Z)", re.DOTALL | re.IGNORECASE)
 
 
@@ -109,11 +113,12 @@ def _read(
 def _link_to_picture(
     source: Source, address: Span, link: str, leave_tag: Callable[[str, str], None]
 ) -> dict[int, Edit]:
-    """Return the edit that makes a picture from another host in HTML a link; none in other tags."""
-    start, end = source.text.rfind("<", 0, address.start), source.text.find(">", address.end) + 1
-    tag = source.text[start:end]
-    if not tag.lower().startswith("<img"):
+    """Return the edit that makes a picture or film from another host in HTML a link."""
+    start = source.text.rfind("<", 0, address.start)
+    element = _MEDIA.match(source.text, start)
+    if element is None:
         return {}
+    end, tag = element.end(), element[0]
     leave_tag(link, tag)
     alt = re.search(r"\salt=[\"']([^\"']+)", tag)
     words = alt[1] if alt else address.text.rpartition("/")[2]

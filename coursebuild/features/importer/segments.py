@@ -12,7 +12,6 @@ from typing import Any
 
 from markdown_it import MarkdownIt
 from markdown_it.rules_block import StateBlock
-from mdit_py_plugins.admon import admon_plugin
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -20,7 +19,9 @@ from coursebuild.api import UsageError
 from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
-_TAB = re.compile(r" {0,3}===[!+]?[ \t]+([\"'])(.*)\1[ \t]*\n?")
+_TITLED = re.compile(
+    r" {0,3}(?:===[!+]?[ \t]+([\"'])(?P<tab>.*)\1|(?P<mark>!!!|\?{3}\+?)[ \t]+(?P<head>\w[^\n]*?))[ \t]*\n?"
+)
 _CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")
 _FRONT_MATTER = re.compile(
     r"---[ \t]*\n(?P<yaml>.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
@@ -159,7 +160,7 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
             yield Segment(kind="prose", place=place or f"line {first_line + at}", text=prose)
         at = end
         if mark:
-            if mark[0] in "!?=":  # the parser gives an admonition's title as its content
+            if mark[0] in "!?=":
                 content = textwrap.dedent("\n".join(lines[start + 1 : end])).strip("\n")
             indent = lines[start][: len(lines[start]) - len(lines[start].lstrip())]
             is_cell = _CELL.fullmatch(head) and mark[0] != ":" and not indent
@@ -249,9 +250,9 @@ def _parse_slashes(state: StateBlock, start: int, end: int, silent: bool) -> boo
     return True
 
 
-def _parse_tab(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-    """Parse a tab of MkDocs: a title, and indented lines."""
-    title = _TAB.fullmatch(state.getLines(start, start + 1, state.blkIndent, False))
+def _parse_titled(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """Parse a tab or an admonition of MkDocs: a title, and indented lines."""
+    title = _TITLED.fullmatch(state.getLines(start, start + 1, state.blkIndent, False))
     if title is None:
         return False
     if not silent:
@@ -262,17 +263,18 @@ def _parse_tab(state: StateBlock, start: int, end: int, silent: bool) -> bool:
             if state.sCount[number] < indent:
                 break
             last = number
-        token = state.push("tab", "", 0)
-        token.markup, token.info = "===", title[2]
+        token = state.push("titled", "", 0)
+        is_tab = title["mark"] is None
+        token.markup, token.info = ("===", title["tab"]) if is_tab else (title["mark"], title["head"])
         state.line = last + 1
         token.map = [start, state.line]
     return True
 
 
 _QUOTE = re.compile(r"^ {0,3}> ?")
-_BLOCKS = ("fence", "div", "slashes", "tab", "admonition_open")
-_PARSER = MarkdownIt("commonmark").use(admon_plugin)
-for _name, _parse in (("div", _parse_div), ("slashes", _parse_slashes), ("tab", _parse_tab)):
+_BLOCKS = ("fence", "div", "slashes", "titled")
+_PARSER = MarkdownIt("commonmark")
+for _name, _parse in (("div", _parse_div), ("slashes", _parse_slashes), ("titled", _parse_titled)):
     _PARSER.block.ruler.before("fence", _name, _parse, {"alt": ["paragraph", "list", "blockquote"]})
 
 
