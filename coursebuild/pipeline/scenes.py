@@ -161,8 +161,8 @@ def _hash_file(file: Path) -> bytes:
         return b"unreadable"
 
 
-_LATER = ("room", "stable_for", "search", "limits", "expected", "precision", "horizon_error")
-_LATER += ("act", "push", "poses")
+_LATER: tuple[str, ...] = ("room", "stable_for", "search", "limits", "expected", "precision")
+_LATER += ("horizon_error", "act", "push", "poses")
 _PLAIN = asdict(ScenarioTable("plain"))
 
 

@@ -307,7 +307,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return ""
         case "object":
             called = match["called"]
-            is_path = match["path"] is not None or re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called)
+            is_path = match["path"] is not None or re.fullmatch(
+                r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called
+            )
             return _rewrite_line(called, context) if is_path else whole
         case "paren":
             return f"${match['inner'].strip()}$"

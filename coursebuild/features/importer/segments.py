@@ -20,7 +20,8 @@ from coursebuild.features.importer.source_files import Segment, read_toml, read_
 
 _COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
 _TITLED = re.compile(
-    r" {0,3}(?:===[!+]?[ \t]+([\"'])(?P<tab>.*)\1|(?P<mark>!!!|\?{3}\+?)[ \t]+(?P<head>\w[^\n]*?))[ \t]*\n?"
+    r" {0,3}(?:===[!+]?[ \t]+([\"'])(?P<tab>.*)\1"
+    r"|(?P<mark>!!!|\?{3}\+?)[ \t]+(?P<head>\w[^\n]*?))[ \t]*\n?"
 )
 _CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")
 _FRONT_MATTER = re.compile(
@@ -265,7 +266,9 @@ def _parse_titled(state: StateBlock, start: int, end: int, silent: bool) -> bool
             last = number
         token = state.push("titled", "", 0)
         is_tab = title["mark"] is None
-        token.markup, token.info = ("===", title["tab"]) if is_tab else (title["mark"], title["head"])
+        token.markup, token.info = (
+            ("===", title["tab"]) if is_tab else (title["mark"], title["head"])
+        )
         state.line = last + 1
         token.map = [start, state.line]
     return True
