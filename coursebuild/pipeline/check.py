@@ -207,17 +207,17 @@ def read_and_verify(
 # --- from diagnostics to a report
 
 
-def _list_unproven(checked: CheckedCourse) -> Iterator[Diagnostic]:
+def _list_unproven(checked_course: CheckedCourse) -> Iterator[Diagnostic]:
     """What nothing gives in the checked documents, and in what the map says of their lessons."""
-    course, results = checked.course, checked.verification.results
-    shown = [
+    course, results = checked_course.course, checked_course.verification.results
+    places = [
         (owner.span, document.source.path)
         for owner, document in course.owned_documents
-        if checked.documents is None or document.source.path in checked.documents
+        if checked_course.documents is None or document.source.path in checked_course.documents
     ]
-    entries, paths = {span for span, _ in shown}, {path for _, path in shown}
-    found = (*unproven(course), *unproven_units(course, results.runs, results.verdicts))
-    return (d for d in found if d.span in entries or d.span.path in paths)
+    entries, paths = {span for span, _ in places}, {path for _, path in places}
+    diagnostics = (*unproven(course), *unproven_units(course, results.runs, results.verdicts))
+    return (d for d in diagnostics if d.span in entries or d.span.path in paths)
 
 
 def _used_files(course: Course, documents: Collection[str], results: Results) -> set[str]:

@@ -151,12 +151,12 @@ def _reword_addresses(session: Session, edits: Iterable[Edit]) -> set[str]:
     if library is None:
         return set()
     results = library.results
-    edited = {(edit.span.path, edit.span.start) for edit in edits}
+    places = {(edit.span.path, edit.span.start) for edit in edits}
     recorded = [
         verdict
         for verdict in results.verdicts
         for span in [verdict.recording.span]
-        if any(path == span.path and span.start <= at < span.end for path, at in edited)
+        if any(path == span.path and span.start <= at < span.end for path, at in places)
     ]
     outputs = PrintedOutputs(results.verdicts, results.runs, library.scripts)
     reworded = reworded_addresses(addresses, recorded, outputs)

@@ -258,8 +258,8 @@ def test_results_that_nothing_gives_are_listed_of_the_lessons_that_are_named(mak
     first, second = FIRST + "\nIt weighs 17.5 kg.\n", SECOND + "\nIt takes 3.25 s.\n"
     folder = make(first, second)
     folder.replace("content/course.toml", 'title = "Lesson two"', 'title = "Lesson two, in 6.5 s"')
-    stated = {(): ["17.5", "3.25", "6.5"], ("1.1",): ["17.5"], ("1.2",): ["3.25", "6.5"]}
-    for names, numbers in stated.items():
+    numbers_by_names = {(): ["17.5", "3.25", "6.5"], ("1.1",): ["17.5"], ("1.2",): ["3.25", "6.5"]}
+    for names, numbers in numbers_by_names.items():
         out = folder.main("check", "--truth", *names).out
         assert sorted(re.findall(r"`([\d.]+)` is stated", out)) == numbers
 

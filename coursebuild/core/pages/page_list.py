@@ -222,9 +222,9 @@ def _card_groups(
     rest = dict(cards)
     for path in paths:
         steps = [cards[name] for name in path.lessons if name in cards]
-        chosen = cards.get(path.picture or "")
-        shown = steps if chosen is None else [chosen]
-        pictures = [card.picture for card in shown if card.picture is not None]
+        own_card = cards.get(path.picture or "")
+        candidates = steps if own_card is None else [own_card]
+        pictures = [card.picture for card in candidates if card.picture is not None]
         if steps:
             picture = pictures[-1] if pictures else None
             yield CardGroup(path.title, path.summary, picture, tuple(steps))

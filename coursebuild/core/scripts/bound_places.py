@@ -95,8 +95,8 @@ def reworded_addresses(
         if before.numbers == now.numbers:
             texts.setdefault(script, []).append((before, now))
     reworded = {
-        value: tuple(_reword(address, texts[value.script]) for address in known)
-        for value, known in addresses.items()
+        value: tuple(_reword(address, texts[value.script]) for address in places)
+        for value, places in addresses.items()
         if value.script in texts
     }
     return {value: now for value, now in reworded.items() if now != addresses[value]}

@@ -113,8 +113,8 @@ class PrintedPlace(Struct, frozen=True):
         parts = [part for text in bracketed for part in (text, *text.split(","))]
         last = self.before.split()[-1:]
         units = [read_unit(part.strip(" :,()[]")) for part in (*parts, *heading.split(), *last)]
-        behind = unit_behind(_REST_OF_ROW.sub("", self.after, count=1))
-        return any(is_same_unit(unit, other) for other in (*units, behind))
+        unit_of_row = unit_behind(_REST_OF_ROW.sub("", self.after, count=1))
+        return any(is_same_unit(unit, candidate) for candidate in (*units, unit_of_row))
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -198,8 +198,8 @@ class PrintedText:
 
     def headings(self, at: int) -> str:
         """The heading of a line behind its own: what stands above a table, and its titles."""
-        own = self._headings[at]
-        return f"{self.heading(own)} {self.heading(at)}" if own >= 0 else ""
+        line = self._headings[at]
+        return f"{self.heading(line)} {self.heading(at)}" if line >= 0 else ""
 
     def title(self, at: int, number: Number) -> str:
         """The title of the column that a number stands in; empty where there is none."""
