@@ -151,7 +151,9 @@ def prepare(folder: Folder, words: list[str]) -> None:
     for start, commands in BEFORE.items():
         for command in commands if line.startswith(start) else ():
             folder.main(*shlex.split(command))
-    if words[0] == "init":
+    if words[0] == "-C":
+        folder.main("init", words[1])
+    elif words[0] == "init":
         shutil.rmtree(folder.root)
         folder.root.mkdir()
     elif words[0] == "undo":
