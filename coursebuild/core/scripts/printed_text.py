@@ -43,7 +43,7 @@ _Words: TypeAlias = tuple[tuple[str, bool], ...]
 
 
 _IN_BRACKETS = re.compile(r"[(\[]([^()\[\]]+)[)\]]")
-_REST_OF_ROW = re.compile(r"\A(?:[-+]?\d[\d.e+-]*(?=[\s)\]])|[\s)\]])*")
+_REST_OF_ROW = re.compile(r"\A(?:[-+]?\d[\d.e+-]*(?=[\s)\],])|(?:and|to)\s|[\s)\],])*")
 _FORBIDDEN = re.compile(r'["{}]')
 """What the words of `{out="words"}` cannot hold."""
 
