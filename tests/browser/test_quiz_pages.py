@@ -165,7 +165,7 @@ def test_on_paper_questions_and_answers_are_there_and_no_buttons(page: Page) -> 
     expect(hints.first).to_have_attribute("open", "")
     expect(quiz.locator("button:visible")).to_have_count(0)
     for text in ("twice as long, 2T", "So much.", "0.08 kg m2", "Something else happens."):
-        expect(quiz.get_by_text(text).locator("visible=true").first).to_be_visible()
+        expect(page.get_by_text(text).locator("visible=true").first).to_be_visible()
     expect(verdict(page, NUMBER)).to_be_hidden()  # that it could not be read
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     page.emulate_media(media="screen")

@@ -275,7 +275,7 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
         lab_script = publish("lab.js", assets.file("js/lab.js"))
         worker = publish("worker.js", assets.file("js/lab-worker.js"))
         wasm = publish("mujoco.wasm", assets.file("mujoco/mujoco.wasm"))
-    sources = {lab.config["model"]: lab.source for _, lab in trials if lab.source}
+    sources = {lab.config.get("model"): lab.source for _, lab in trials if lab.source}
     labs = {}
     for line, lab in trials:
         name = line.name
