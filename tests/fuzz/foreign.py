@@ -148,7 +148,7 @@ def source_lists() -> Iterator[bytes]:
 _FILE = re.compile(rb"^-- (?P<path>\S[^\n]*?)(?: -> (?P<link>\S[^\n]*?))? --\n", re.MULTILINE)
 """The line before the text of a file; or a link, and where it leads."""
 _SECRET = "a secret of this machine"
-_NEW_FOLDERS = ("content", "models", "src", ".gitignore")
+_NEW_FOLDERS = ("content", "models", "src", ".gitignore", "IMPORT.md")
 
 
 def folder(data: bytes) -> None:
