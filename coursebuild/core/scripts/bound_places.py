@@ -83,7 +83,8 @@ def reworded_addresses(
 ) -> Addresses:
     """The addresses in recorded outputs of which this run prints other words, and no other number.
 
-    Each number then stands in its line as before, so that what it is called now is its address.
+    Each number then stands in its line as before, so that what it is called now is its address. Not
+    so where words moved to another line: then nobody knows whether lines changed places.
     """
     texts: dict[str, list[tuple[PrintedText, PrintedText]]] = {}
     for verdict in verdicts:
@@ -92,7 +93,7 @@ def reworded_addresses(
             continue
         before = outputs.text(verdict)
         now = outputs.text_of_run(script, verdict.comparison.own_filters, part)
-        if before.numbers == now.numbers:
+        if before.numbers == now.numbers and _has_new_words(before, now):
             texts.setdefault(script, []).append((before, now))
     reworded = {
         value: tuple(_reword(address, texts[value.script]) for address in places)
@@ -100,6 +101,13 @@ def reworded_addresses(
         if value.script in texts
     }
     return {value: now for value, now in reworded.items() if now != addresses[value]}
+
+
+def _has_new_words(before: PrintedText, now: PrintedText) -> bool:
+    """Whether no line has the words that another line had before."""
+    pairs = [(before.words(at), now.words(at)) for at in range(len(before.lines))]
+    old, new = {words for words, _ in pairs}, {words for _, words in pairs}
+    return all(a == b or (a not in new and b not in old) for a, b in pairs)
 
 
 def _reword(address: Address, texts: Iterable[tuple[PrintedText, PrintedText]]) -> Address:
