@@ -43,6 +43,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """How many blocks are around the place."""
     copies: dict[str, bytes] = field(default_factory=dict)
     """The files and pictures that the lesson uses, by their new paths."""
+    references: frozenset[str] = frozenset()
+    """The labels of links by reference that the lesson defines, in lower case."""
     title: str = ""
     script_path: str = ""
     """Of the script that the lesson's cells become."""

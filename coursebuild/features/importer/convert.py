@@ -26,7 +26,7 @@ from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext, script_path_of, to_anchor
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.jsx import is_mdx
-from coursebuild.features.importer.prose import find_anchors
+from coursebuild.features.importer.prose import find_anchors, find_references
 from coursebuild.features.importer.references import complete_texts
 from coursebuild.features.importer.source_files import (
     TEXTS,
@@ -257,6 +257,9 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     context = replace(context, is_mdx=text.file.endswith(".mdx") or any(map(is_mdx, prose)))
     context = replace(
         context,
+        references=frozenset(
+            label for segment in text.segments for label in find_references(segment.text)
+        ),
         script_path=script_path_of(text.path),
         title=text.title,
         parts=[],

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import posixpath
 import re
+from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 from coursebuild.features.importer.context import (
@@ -255,6 +256,12 @@ _FIGURE_NAME = re.compile(
 )
 
 
+def find_references(text: str) -> Iterator[str]:
+    """Yield the labels of links by reference that a text defines, in lower case."""
+    for label in re.findall(r"^[ >]*\[(?!\^)([^\[\]\n]+)\]:", text, re.MULTILINE):
+        yield label.casefold()
+
+
 def find_anchors(text: str) -> set[str]:
     """Return the anchors that a text of any dialect sets, `eq:name` of formulas among them."""
     labelled = [*_FIGURE_NAME.finditer(text)]
@@ -307,6 +314,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return ""
         case "object":
             called = match["called"]
+            if (match["path"] or called).casefold() in context.references:
+                return whole
             is_path = match["path"] is not None or re.fullmatch(
                 r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called
             )
