@@ -169,10 +169,11 @@ class _Updater:
             for verdict in outputs.of_document(document)
             if verdict.recording.script in good_paths and verdict.recording.readable
         ]
+        edits = update_outputs(verdicts, documents, outputs, self.addresses)
         reworded = reworded_addresses(self.addresses, verdicts, outputs)
         self.addresses |= reworded
         self.reworded |= {value.path for value in reworded}
-        return update_outputs(verdicts, documents, outputs, self.addresses)
+        return edits
 
     def _outputs(self, course: Course, runs: Sequence[ScriptRun]) -> PrintedOutputs:
         paths = (e.path for e in self.extracted_scripts.extractions)

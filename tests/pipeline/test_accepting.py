@@ -224,6 +224,18 @@ def test_other_words_around_the_same_numbers_keep_every_address(make: Make) -> N
         folder.write(folder.lesson(), text)
 
 
+def test_words_that_come_to_stand_for_another_number_write_nothing(make: Make) -> None:
+    """The title of a column stands by chance above a number of another line."""
+    printed = ("nudge  form  difference", "0.1  2.5  +3e-10", "slope is -0.5 s")
+    code = "\n".join(map("print({!r})".format, printed))
+    text = block("x.py", code, "\n".join(printed)) + '`+3e-10`{out="difference"}\n'
+    folder = make("## Swing\n\n" + text)
+    assert folder.main("check").status == 0
+    folder.replace(folder.lesson(), "difference')", "difference  (s)')")
+    assert folder.main("update").status == 1
+    assert '\n`+3e-10`{out="difference"}\n' in folder.text(folder.lesson())
+
+
 def test_a_number_that_is_printed_twice_offers_its_words(make: Make) -> None:
     code = "print('measured', 2.5, 'formula', 2.5)"
     folder = make("## Swing\n\n" + block("x.py", code, "measured 2.5 formula 2.5") + "`2.5`{out}\n")

@@ -32,6 +32,7 @@ from coursebuild.core.scripts.bound_places import (
     bound_values,
     document_bindings,
     place_note,
+    reworded_addresses,
 )
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.lines import plain_text
@@ -246,6 +247,7 @@ def update_outputs(
     edits: list[Edit] = []
     refusals: list[Diagnostic] = []
     is_written: dict[tuple[str, int], bool] = {}
+    documents, verdicts = [*documents], [*verdicts]
     for verdict in verdicts:
         recording = verdict.recording
         printed = outputs.runs[recording.script or ""].output_of(recording.part)
@@ -257,8 +259,10 @@ def update_outputs(
             edits.append(change)
     for document in documents:
         check_bindings(document, outputs, addresses)
+    addresses_now = addresses | reworded_addresses(addresses, verdicts, outputs)
+    for document in documents:
         for binding, value in bound_values(document, outputs):
-            bound = BoundNumber(binding, outputs, addresses.get(value, ()))
+            bound = BoundNumber(binding, outputs, addresses_now.get(value, ()))
             states = [is_written.get(recording_key(v.recording)) for v in bound.steady]
             is_open = False in states or (bound.verdicts and not bound.steady)
             is_known = bool(bound.addresses or binding.words)
@@ -268,7 +272,10 @@ def update_outputs(
                 outputs.updated_text(verdict) if is_new else outputs.text(verdict)
                 for verdict, is_new in zip(bound.steady, states, strict=True)
             ]
-            places = bound.look_up([*texts, *bound.printed])
+            texts += bound.printed
+            places = bound.look_up(texts)
+            if bound.contradicts_words(places, texts):
+                continue
             rewritten = {bound.text.rewrite(place) for place in places}
             is_shown = all(map(bound.text.shows, places))
             if not is_shown and len(rewritten) == 1 and (new := rewritten.pop()):

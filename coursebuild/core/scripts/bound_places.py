@@ -243,6 +243,15 @@ class BoundNumber(Struct, frozen=True, dict=True):
         chosen_places = [place for place in places if place in behind_words]
         return chosen_places or list(filter(self.text.shows, behind_words)) or behind_words
 
+    def contradicts_words(
+        self, places: Sequence[PrintedPlace], outputs: Sequence[PrintedText]
+    ) -> bool:
+        """Whether it is printed where it was, and its words choose other numbers now."""
+        count = len(self.text.numbers)
+        known_places = [_find(address, outputs, count) for address in self.addresses]
+        is_known = bool(self.binding.words) and any(known_places)
+        return is_known and not any(place in places for place in known_places)
+
     def search(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers that it may mean: a proposal, until one that it shows is remembered."""
         return self.text.candidates(outputs, self.following)
