@@ -145,7 +145,7 @@ _WORD = re.compile(r"(?<!\w)[-+\u2212]?\d+(?:[.,]\d+)*|[\u207a\u207b]?\w+")
 
 
 def keeps_words(edits: Iterable[Edit]) -> bool:
-    """Whether edits leave each word and number of their lines as it is: they change form only.
+    """Whether edits leave each word and number beside them as it is: they change form only.
 
     That is: marks and white space between them, and characters that nobody sees.
     """
@@ -154,9 +154,10 @@ def keeps_words(edits: Iterable[Edit]) -> bool:
         by_source.setdefault(edit.span.source, []).append(edit)
     for source, changes in by_source.items():
         changes.sort(key=lambda edit: edit.span.start)
-        start = source.text.rfind("\n", 0, changes[0].span.start) + 1
-        end = source.text.find("\n", max(edit.span.end for edit in changes))
-        old = source.text[start : None if end < 0 else end]
+        first, last = changes[0].span.start, max(edit.span.end for edit in changes)
+        start = 1 + max(source.text.rfind(space, 0, first) for space in " \n")
+        ends = (source.text.find(space, last) for space in " \n")
+        old = source.text[start : min((end for end in ends if end >= 0), default=None)]
         new, at = "", start
         for edit in changes:
             new += source.text[at : edit.span.start] + edit.text
