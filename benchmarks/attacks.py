@@ -1,7 +1,7 @@
 """Attack coursebuild in every way that its page about security names, and count what it survives.
 
 Run: python benchmarks/attacks.py [--kills 500] [--entries 500] [--journals 240] [--stores 40]
-         [--mutants 2000] [--drawings 60] [--only KIND …] [--seed 36]
+         [--mutants 2000] [--drawings 60] [--saves 200] [--only KIND …] [--seed 36]
 
 Courses, and what lies beside them, are in a folder of their own, as are the home and the state
 folder of their user. An attack is survived if its command ends with a message and without a
@@ -25,6 +25,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 from benchmarks.attack.foreign import Foreigners  # noqa: E402
 from benchmarks.attack.grounds import Grounds, Killings, Table, Try, Victim  # noqa: E402
 from benchmarks.attack.inputs import Mutants, drawing_tries, probe_tries  # noqa: E402
+from benchmarks.attack.saves import Saves  # noqa: E402
 from benchmarks.attack.traps import trap_tries  # noqa: E402
 from coursebuild.core.run import gate  # noqa: E402
 from support.mortal_commands import Mortals, mortal_commands  # noqa: E402
@@ -95,11 +96,15 @@ def main() -> int:
         "stores": 40,
         "mutants": 2000,
         "drawings": 60,
+        "saves": 200,
     }.items():
         parser.add_argument(f"--{name}", type=int, default=count, metavar="N")
     kinds = ("machines", "kills", "entries", "stores", "journals", "checks", "imports")
     parser.add_argument(
-        "--only", nargs="+", choices=(*kinds, "drawings", "probes", "traps"), metavar="KIND"
+        "--only",
+        nargs="+",
+        choices=(*kinds, "drawings", "probes", "saves", "traps"),
+        metavar="KIND",
     )
     parser.add_argument("--seed", type=int, default=36)
     arguments = parser.parse_args()
@@ -113,6 +118,7 @@ def main() -> int:
             killings = Killings(grounds, mortals, victim, SOURCE)
             foreigners = Foreigners(grounds, mortals, victim, arguments.seed)
             inputs = Mutants(grounds, mortals, arguments.seed)
+            saves = Saves(victim, mortals, arguments.seed)
             half = arguments.mutants // 2
             rows: dict[str, tuple[str, Iterable[Try], Callable[[], str]]] = {
                 "machines": ("Odd machines", machine_tries(victim, mortals), str),
@@ -136,6 +142,11 @@ def main() -> int:
                     str,
                 ),
                 "probes": ("Probes of the sandbox", probe_tries(grounds), str),
+                "saves": (
+                    "Commands that write, beside an editor that saves",
+                    saves.tries(arguments.saves),
+                    saves.note,
+                ),
                 "traps": ("Commands in a folder of traps", trap_tries(grounds), str),
             }
             for kind, (title, tries, note) in rows.items():

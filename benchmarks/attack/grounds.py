@@ -106,7 +106,7 @@ class Grounds:
             mode = path.lstat().st_mode
             data = os.fsencode(path.readlink()) if stat.S_ISLNK(mode) else b""
             entries[str(path)] = (mode, path.read_bytes() if stat.S_ISREG(mode) else data)
-        own_names = ("coursebuild", "key", "journals", "stores")
+        own_names = ("coursebuild", "environments", "key", "journals", "stores")
         for path in [*self.state.parent.glob("*"), *self.state.glob("*")]:
             if path.name not in own_names:
                 entries[str(path)] = (0, b"")
