@@ -23,7 +23,7 @@ pytestmark = pytest.mark.site
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def measured_course(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A course in which one case was measured; what that gave is kept in its store."""
     course = tmp_path_factory.mktemp("measured")
     (course / "content").mkdir()
@@ -33,8 +33,8 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def course(measured: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(measured, tmp_path / "course"))
+def course(measured_course: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(measured_course, tmp_path / "course"))
 
 
 def run(course: Path, *arguments: str) -> int:
