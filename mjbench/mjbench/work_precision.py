@@ -80,6 +80,9 @@ def measure_scenario(
     )
     basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
     parts = Parts(tell)
+    # A mistake in what is expected is told before all the rest is measured.
+    figures = measure_expected(model, scene, baseline)
+    expected = parts.collect(f"{scene.name}: what theory knows", figures)
     choices = settings(model, pilot, quick=quick)
     rows = parts.collect(f"{scene.name}: settings", _measure_settings(basis, choices, tell))
     rows.sort(key=lambda row: choices.index(row.setting))
@@ -95,8 +98,6 @@ def measure_scenario(
     if scene.scenario.loop is not None:
         delays = partial(loop_note, model, pilot, states)
         notes.append(parts.run(f"{scene.name}: delays", delays, ""))
-    figures = partial(measure_expected, model, scene, baseline)
-    expected = parts.collect(f"{scene.name}: what theory knows", figures())
     report = scene_report.ScenarioReport(
         name=scene.name,
         title=scene.title,

@@ -42,9 +42,13 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+FEW_RUNS = "timesteps = [0.0005]\nsearch = [0.008, 0.02]\n"
+"""A motion is checked in steps as short as ever; few settings and timesteps are tried after it."""
+
+
 def report(folder: Path, exact: str, toml: str = TOML) -> ScenarioReport:
     write(folder / "ball.exact.py", exact)
-    write(folder / "ball.toml", toml)
+    write(folder / "ball.toml", toml if "timesteps" in toml else toml + FEW_RUNS)
     host = LocalHost(folder, lambda text: None)
     compiled_model = compile_subject(read_subject(folder / "ball.xml"), host, quick=True)
     return run_scenario(compiled_model, 0, host, quick=True, timed=False)
@@ -114,7 +118,7 @@ def test_quantities_of_theory_are_measured_by_their_formula(folder: Path) -> Non
     """A pendulum let go at 90°: it is down after a quarter of its period, K(1/2)/√g."""
     write(folder / "ball.xml", PENDULUM.replace('"0 0 0"/>', '"1e-9 1e-9 1e-9"/>'))
     start = "qpos = [1.5707963267948966]\nduration = 1\nsample = 0.02\nmeasure = 'sensor:angle'\n"
-    toml = f"[[scenario]]\nname = 'swing'\n{start}"
+    toml = f"[[scenario]]\nname = 'swing'\n{start}timesteps = [0.002]\nsearch = [0.01, 0.02]\n"
     scenario = report(folder, QUARTER, toml + "energy_bound = 9.9\n")
     figures = {(line.integrator, line.name): line for line in scenario.figures}
     crossing = figures["RK4", "crossing"]
@@ -198,6 +202,7 @@ def test_rigid_theory_of_a_soft_equality_is_what_stiffer_ones_tend_to(folder: Pa
     """Two weights over a pulley, 1 and 5 kg: they go with two thirds of gravity."""
     write(folder / "ball.xml", PULLEY)
     toml = '[[scenario]]\nname = "fall"\nduration = 0.2\nsample = 0.02\ntimesteps = [0.001]\n'
+    toml += "search = [0.005, 0.01]\n"
     scenario = report(folder, ATWOOD.format(share="2 / 3"), toml)
     assert scenario.reference == "closed"
     error = mistake(folder, ATWOOD.format(share="0.66"), toml)

@@ -116,7 +116,9 @@ period = 0.01
 def control(model, data):
     return [-{STIFFNESS} * data.qpos[0] - {DAMPING} * data.qvel[0]]
 """
-    cart = compiled_loop(model, policy, "keyframe = 'home'\nduration = 40\nsample = 0.4")
+    scenario = "keyframe = 'home'\nduration = 40\nsample = 0.4\n"
+    scenario += "timesteps = [0.01]\nsearch = [0.02, 0.64]"
+    cart = compiled_loop(model, policy, scenario)
     [scene] = cart.scenarios
     assert scene.declaration.measure == "site:s"
     pilot = run_pilot(cart.model, scene)

@@ -18,8 +18,8 @@ from mjbench.reports.scene_report import ScenarioReport
 from mjbench.scene import ExactMotion, ExactStates, SceneError, scenes
 from mjbench.simulation import simulate
 from mjbench.work_precision import measure_scenario
-from samples.runs import BOX, FAMILY, FLIP, measure, orders, row
-from samples.surveys import NO_DECLARATIONS, parse_declared
+from samples.runs import BOX, FAMILY, FLIP, measure, orders, row, with_search
+from samples.surveys import parse_declared
 
 pytestmark = pytest.mark.long
 
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.long
 def of_box() -> ScenarioReport:
     """The first flip of the tumbling box."""
     (scene,) = scenes(model := mujoco.MjModel.from_xml_string(BOX), parse_declared(FLIP))
-    return measure_scenario(model, scene, clock=None)
+    return measure_scenario(model, with_search(scene), clock=None)
 
 
 def test_a_report_on_the_tumbling_box() -> None:
@@ -87,7 +87,8 @@ def stiff(step: float, start: float, stiffness: float = 1e5) -> Any:
 
 def test_a_scene_that_blows_up_under_its_own_setting() -> None:
     """Without `autoreset="disable"` such a run ends where it began, with error 0."""
-    (report,) = measure(stiff(0.008, 0.01), FROM_KEYFRAME, quick=True)
+    few_runs = "duration = 0.8\ntimesteps = [0.002]\nsearch = [0.002, 0.032]\n"
+    (report,) = measure(stiff(0.008, 0.01), FROM_KEYFRAME + few_runs, quick=True)
     (own_row,) = (line for line in report.rows if line.own)
     assert own_row.status == "diverged"
     assert any("MuJoCo warned of bad " in reason for reason in own_row.reasons)
@@ -112,8 +113,9 @@ def test_times_are_of_the_clock() -> None:
     """A clock that ticks evenly: whatever is timed takes the same, and nothing is uncertain."""
     ticks = iter(range(0, 10**15, 2_000_000))
     model = stiff(0.01, 0.1, 10)
-    (line,) = scenes(model, NO_DECLARATIONS, quick=True)
-    report = measure_scenario(model, line, quick=True, clock=lambda: next(ticks))
+    text = '[[scenario]]\nname = "a"\nduration = 0.8\n'
+    (line,) = scenes(model, parse_declared(text), quick=True)
+    report = measure_scenario(model, with_search(line), quick=True, clock=lambda: next(ticks))
     for line in report.rows:
         assert line.cost is not None and line.seconds is not None and line.realtime is not None
         assert line.cost.low == line.cost.value == line.cost.high > 0
@@ -248,6 +250,7 @@ def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
     model = mujoco.MjModel.from_xml_string(BLOCK)
     before = (model.opt.timestep, model.opt.integrator, model.opt.cone, model.opt.disableflags)
     short = '[[scenario]]\nname = "a"\nduration = 0.48\nsample = 0.016\n'
+    short += "timesteps = [0.0005]\nsearch = [0.01, 0.02]\n"
     (report,), repeated = (measure(model, short, quick=True) for _ in range(2))
     opt = model.opt
     assert (opt.timestep, opt.integrator, opt.cone, opt.disableflags) == before
@@ -286,7 +289,8 @@ def test_the_error_of_a_pyramid_is_among_what_is_seen() -> None:
       </worldbody>
     </mujoco>
     """
-    (report,) = measure(mujoco.MjModel.from_xml_string(mjcf), quick=True)
+    text = '[[scenario]]\nname = "a"\ntimesteps = [0.001]\n'
+    (report,) = measure(mujoco.MjModel.from_xml_string(mjcf), text, quick=True)
     own_row = next(line for line in report.rows if line.own)
     slope, time = 3 * 2**0.5, 2.0
     exact = (slope - 0.3 * 9 / 2**0.5 - (slope - 0.3 * 9)) * time**2 / 2  # half is enough

@@ -241,9 +241,9 @@ def test_hostile_drawings_act_where_nobody_judges_them(drawings: Drawings) -> No
 
 @pytest.mark.long
 def test_a_published_drawing_runs_nothing_and_asks_nobody(drawings: Drawings) -> None:
-    files = {name: published_files(data) for name, data in (*HOSTILE, *mutants(1_000, seed=36))}
+    files = {name: published_files(data) for name, data in (*HOSTILE, *mutants(400, seed=36))}
     assert sum(not files[name] for name, _ in HOSTILE) > 250, "these are refused"
     files |= {name: published_files(data)[:1] for name, data in HARMLESS}
     traces = {name: [drawings.open(data) for data in versions] for name, versions in files.items()}
-    assert sum(map(len, traces.values())) > 40, "these are opened"
+    assert sum(map(len, traces.values())) > 25, "these are opened"
     assert {name: traces[name] for name in files if any(traces[name])} == {}

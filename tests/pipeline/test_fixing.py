@@ -109,10 +109,10 @@ FORM_SLIPS = (
 )
 
 
-def test_fix_changes_none_of_2000_right_names_and_numbers(make: Make) -> None:
+def test_fix_changes_none_of_500_right_names_and_numbers(make: Make) -> None:
     chance = random.Random(57)
     texts = []
-    for lesson in range(8):
+    for lesson in range(2):
         parts = ["## Words\n", "[1]: https://example.org/\n"]
         for part in range(25):
             parts.append(", ".join(right_words(chance) for _ in range(10)) + ".\n")
@@ -120,8 +120,8 @@ def test_fix_changes_none_of_2000_right_names_and_numbers(make: Make) -> None:
         texts.append("\n".join(parts))
     folder = make(*texts)
     result = folder.main("check", "--fix")
-    assert int(re.findall(r"fixed (\d+) mistakes", result.out)[0]) >= 100, "there was much to mend"
-    mended = [folder.text(folder.lesson(n)) for n in range(1, 9)]
+    assert int(re.findall(r"fixed (\d+) mistakes", result.out)[0]) >= 25, "there was much to mend"
+    mended = [folder.text(folder.lesson(n)) for n in (1, 2)]
     for before, after in zip(texts, mended, strict=True):
         words = [
             re.findall(r"(?<!\w)[-−+]?\d[\d.,]*\d|\w+", text.replace("\x07", ""))
@@ -130,7 +130,7 @@ def test_fix_changes_none_of_2000_right_names_and_numbers(make: Make) -> None:
         assert words[0] == words[1]
     again = folder.main("check", "--fix")
     assert "nothing fixed; " in again.out
-    assert [folder.text(folder.lesson(n)) for n in range(1, 9)] == mended
+    assert [folder.text(folder.lesson(n)) for n in (1, 2)] == mended
 
 
 def test_undo_leaves_what_was_edited_since(make: Make) -> None:

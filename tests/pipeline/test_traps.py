@@ -56,13 +56,10 @@ def test_no_trap_runs(traps: TrapFolder, command: tuple[str, ...]) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("options", [(), ("--sandbox",)], ids=["plain", "sandbox"])
-def test_no_trap_runs_on_a_cluster(
-    traps: TrapFolder, tmp_path: Path, options: tuple[str, ...]
-) -> None:
+def test_no_trap_runs_on_a_cluster(traps: TrapFolder, tmp_path: Path) -> None:
     (tmp_path / "packages").mkdir()
     path = install_plugin(tmp_path / "packages")
-    command = ("check", "--cluster", "local", *options)
+    command = ("check", "--cluster", "local")
     result = run(traps, *command, PYTHONPATH=path, PYTHONWARNINGS="ignore")
     assert (traps.marks(), result.stdout.endswith("everything holds\n")) == ([], True), (
         result.stderr

@@ -41,7 +41,7 @@ def whole(files: str | Mapping[str, str | bytes], *, lesson: str = "") -> tuple[
     first: Survey | None = None
     now = dict(before)
     for _ in range(6):
-        survey = run_survey(now, lesson=lesson, quick=False)
+        survey = run_survey(now, lesson=lesson)
         first = first or survey
         if not survey.edits:
             break

@@ -10,7 +10,6 @@ import pytest
 from mjbench.pruning.comparison import ALIKE, compare, index_map, pruning_scenes, watch
 from mjbench.reports.diet_report import MEASURED_LABEL
 from samples.surveys import (
-    NO_DECLARATIONS,
     PATH,
     findings_by_kind,
     names,
@@ -162,7 +161,7 @@ BENT = """<mujoco><worldbody>
 
 
 def test_limb_is_welded_where_it_is_at_the_beginning() -> None:
-    finding = findings_by_kind(run_survey(BENT, quick=False))["resting-joint"]
+    finding = findings_by_kind(run_survey(BENT))["resting-joint"]
     assert names(finding) == ["b, c"] and finding.difference < ALIKE
     edits = {edit.old: edit.new for edit in finding.edits}
     assert edits[' euler="20 0 0"'] == "" and any(' quat="0.' in new for new in edits.values())
@@ -184,7 +183,7 @@ def test_couplings_shapes_and_hidden_geoms() -> None:
         rest="""<equality><joint name="carries" joint1="cord"/>
     <joint name="idle" joint1="turn"/></equality>""",
     )
-    survey = run_survey(text, quick=False, declarations=NO_DECLARATIONS, lesson='"crate"')
+    survey = run_survey(text, lesson='"crate"')
     findings = findings_by_kind(survey)
     assert names(findings["coupling-idle"]) == ["idle"]
     assert names(findings["geom-inside"]) == ["core"]

@@ -7,7 +7,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from mjbench.reports.scene_report import ScenarioReport, WorkPrecisionRow
-from mjbench.scene import scenes
+from mjbench.scene import Scene, scenes
 from mjbench.work_precision import measure_scenario
 from samples.surveys import parse_declared
 
@@ -36,10 +36,17 @@ FAMILY = ("Euler", "implicit", "implicitfast", "discrete")
 
 
 def measure(model: Any, text: str = "", *, quick: bool = False) -> tuple[ScenarioReport, ...]:
+    """Reports without times; limits of stability are sought where `text` declares a `search`."""
     return tuple(
-        measure_scenario(model, scene, quick=quick, clock=None)
+        measure_scenario(model, with_search(scene), quick=quick, clock=None)
         for scene in scenes(model, parse_declared(text), quick=quick)
     )
+
+
+def with_search(scene: Scene) -> Scene:
+    """The scene; unless it says where, stability is looked for in runs of few steps."""
+    search = scene.declaration.search or (20 * scene.timestep, 40 * scene.timestep)
+    return replace(scene, declaration=replace(scene.declaration, search=search))
 
 
 def row(report: ScenarioReport, integrator: str, timestep: float) -> WorkPrecisionRow:

@@ -79,8 +79,9 @@ def run_survey(
     quick: bool = True,
     clock: Clock | None = None,
     rerun: Rerun | None = None,
+    only: Collection[str] = (),
 ) -> Survey:
-    """Survey a model; `lesson` is a script that uses it."""
+    """Survey a model, for `only` these kinds of findings; `lesson` is a script that uses it."""
     model = open_files(text if isinstance(text, Mapping) else {PATH: text})
     return Surveyor(
         model="a",
@@ -98,6 +99,7 @@ def run_survey(
         quick=quick,
         tell=lambda _: None,
         rerun=rerun,
+        only=only,
     ).survey()
 
 

@@ -70,11 +70,10 @@ def test_what_programs_draw_is_shown() -> None:
     assert faults == {}
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_what_is_written_again_is_as_safe(seed: int) -> None:
+def test_what_is_written_again_is_as_safe() -> None:
     """A drawing that passes also passes as the elements that were read of it."""
     count = 0
-    for name, data in (*HARMLESS, *mutants(1_000, seed)):
+    for name, data in (*HARMLESS, *mutants(1_000, seed=0)):
         drawing = read_svg(data)
         if not isinstance(drawing, str):
             again = read_svg(ET.tostring(drawing, encoding="utf-8"))

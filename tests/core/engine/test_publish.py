@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import shutil
 import stat
@@ -83,35 +82,6 @@ def test_folder_keeps_its_permissions_and_a_link_its_place(root: Path, tmp_path:
         assert stat.S_IMODE((root / "www").stat().st_mode) == 0o2775
         assert texts(root / "www") == site_texts(text)
     assert entries(tmp_path) == ["course"]
-
-
-def test_file_managers_may_look(root: Path) -> None:
-    publish(root, root / "public", site("one"))
-    (root / "public/.DS_Store").touch()
-    (root / "public/empty").mkdir()
-    publish(root, root / "public", site("two"))
-    assert texts(root / "public") == site_texts("two")
-
-
-@pytest.mark.parametrize("call", ["fchmod", "mkdir"])
-def test_full_disk(root: Path, monkeypatch: pytest.MonkeyPatch, call: str) -> None:
-    publish(root, root / "public", site("one"))
-    really = getattr(os, call)
-    calls = 0
-
-    def fail(*arguments: object) -> object:
-        nonlocal calls
-        calls += 1
-        if calls > 2:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        return really(*arguments)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, call, fail)
-        with pytest.raises(EffectError, match="no space left on device"):
-            publish(root, root / "public", site("two"))
-    assert texts(root / "public") == site_texts("one")
-    assert entries(root) == ["content", "public"]
 
 
 def test_paths_that_no_site_has_or_that_are_in_each_others_way(root: Path) -> None:
@@ -282,13 +252,6 @@ def test_a_project_that_moves_keeps_its_site_and_a_copy_makes_it_again(
     assert pages.made_paths == ["a.html"]
     shutil.copytree(new_root, copy)
     assert publish(copy, copy / "public", pages(a="1")) == ("a.html",)
-
-
-def test_two_places_have_a_record_each(root: Path, tmp_path: Path, pages: Pages) -> None:
-    for out in (root / "public", root / "other", tmp_path / "outside"):
-        assert publish(root, out, pages(a="1")) == ("a.html",)
-    for out in (root / "public", root / "other", tmp_path / "outside"):
-        assert publish(root, out, pages(a="1")) == ()
 
 
 def test_a_file_changed_while_it_is_linked_is_made_again(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
 import stat
 from collections.abc import Callable
 from pathlib import Path
@@ -33,15 +31,6 @@ def summary(report: ExamplesReport) -> Summary:
 
 def write(root: Path, *scripts: tuple[str, bytes]) -> Summary:
     return summary(write_examples(root, dict(scripts)))
-
-
-def test_files_are_written_once_and_without_scripts_nothing_is_there(tmp_path: Path) -> None:
-    assert write(tmp_path) == ((), (), (), ())
-    assert list(tmp_path.iterdir()) == []
-    assert write(tmp_path, A, B) == ((A[0], B[0]), (), (), ())
-    before = {p: p.stat().st_mtime_ns for p in (tmp_path / "examples").rglob("*")}
-    assert write(tmp_path, A, B) == ((), (A[0], B[0]), (), ())
-    assert {p: p.stat().st_mtime_ns for p in (tmp_path / "examples").rglob("*")} == before
 
 
 def test_edited_by_hand(tmp_path: Path) -> None:
@@ -211,20 +200,6 @@ def test_two_runs_at_once_write_the_same(tmp_path: Path) -> None:
     report = summary(write_examples(tmp_path, scripts))
     assert [report, *reports] == [((A[0], B[0]), (), (), ())] * 2
     assert write(tmp_path, A, B) == ((), (A[0], B[0]), (), ())
-
-
-def test_full_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    write(tmp_path, A)
-
-    def fail(*_: object) -> int:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    with monkeypatch.context() as patch:
-        patch.setattr(os, "write", fail)
-        with pytest.raises(EffectError, match="no space left on device"):
-            write(tmp_path, NEXT)
-    assert (tmp_path / A[0]).read_bytes() == A[1]
-    assert write(tmp_path, NEXT) == ((A[0],), (), (), ())
 
 
 def test_unified_diff() -> None:

@@ -47,6 +47,8 @@ SCENARIO = """\
 [[scenario]]
 name = "swings"
 duration = 0.1
+timesteps = [0.002]
+search = [0.002, 0.004]
 
 [[sweep]]
 name = "damping"
@@ -186,7 +188,7 @@ def test_measurements_are_the_same_as_on_one_machine(
 ) -> None:
     first_course, second_course = twins(make, GOOD)
     for folder in (first_course, second_course):
-        folder.write("models/arm.toml", SCENARIO.format([0.01 * (n + 1) for n in range(20)]))
+        folder.write("models/arm.toml", SCENARIO.format([0.01 * (n + 1) for n in range(6)]))
     assert run(first_course, "bench", "--record").status == 0
     folder = "content/reports"
     for name, data in first_course.tree(folder).items():
@@ -198,7 +200,7 @@ def test_measurements_are_the_same_as_on_one_machine(
     )
     assert second.out == first.out
     assert "measured here" not in second.err
-    assert len(json.loads(first.out)["scenes"][0]["sweeps"][0]["rows"]) == 20
+    assert len(json.loads(first.out)["scenes"][0]["sweeps"][0]["rows"]) == 6
 
     first, second = (
         run(first_course, "diet", "--fix"),
