@@ -49,6 +49,8 @@ class Lab(FeatureBlock, frozen=True):
     places: tuple[tuple[Entry, Span], ...] = ()
     """The place of each value in the JSON."""
     code: tuple[tuple[Entry, Excerpt], ...] = ()
+    of_exercise: bool = False
+    """Whether it is the solution of an exercise, of whose page the exercise's own trial tells."""
 
     @property
     def is_of_text(self) -> bool:

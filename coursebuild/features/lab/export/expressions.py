@@ -49,6 +49,7 @@ _FUNCTIONS = {
     "lib.sitePos": "data.site(...).xpos.copy()",
 }
 """Functions in Python, with `...` for the arguments."""
+_EXTREMES = (("Math", "max"), ("Math", "min"))
 _CONSTANTS = {
     "PI": "math.pi",
     "E": "math.e",
@@ -236,6 +237,8 @@ class Expressions:
         """Translate a call that is used for its value."""
         function, values = js.field(node, "function"), js.arguments(node)
         path = js.dotted_name(function)
+        if path in _EXTREMES and [value.type for value in values] == ["spread_element"]:
+            return f"{path[1]}({self.all(js.children(values[0]))})"  # it may have a single item
         if ".".join(path) in _FUNCTIONS:
             return _FUNCTIONS[".".join(path)].replace("...", self.all(values))
         if path[:1] == ("mj",) and len(path) == 2 and path[1] in self.engine.functions:

@@ -15,7 +15,7 @@ import math
 import platform
 import re
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -76,15 +76,22 @@ class Export(Struct, frozen=True):
 
 
 class Test(Struct, frozen=True):
-    """What a script tries of what a reader writes in it."""
+    """A trial of an exercise, as its fence has it."""
 
     name: str
     expr: str
-    seconds: float
-    button: int | None
-    """The number of the button that is pressed before."""
-    bounds: tuple[tuple[str, float | str], ...]
-    """The other arguments of the script's `check`."""
+    t: float
+    min: float | None
+    max: float | None
+    unit: str
+    hint: str
+
+    def arguments(self) -> Iterator[str]:
+        """The arguments of the script's `check` besides the value."""
+        values = {"least": self.min, "most": self.max, "unit": self.unit, "hint": self.hint}
+        for name, value in values.items():
+            if value not in (None, ""):
+                yield f"{name}={json.dumps(value, ensure_ascii=False)}"
 
 
 class Writing(Struct, frozen=True):
@@ -93,8 +100,8 @@ class Writing(Struct, frozen=True):
     subject: str
     """`XML`, `control` or `answer`: what it is called in the script."""
     tests: tuple[Test, ...]
-    formula: tuple[str, ...] = ()
-    """The names of its variables, and its expression; empty where it is no formula."""
+    formula: tuple[str, ...] = ("",)
+    """The names of its variables, and its expression, which is empty where it is no formula."""
 
 
 def file_name(lab: str) -> str:
@@ -161,7 +168,7 @@ def _export(
     buttons = {i: c for i, c in enumerate(code.controls) if isinstance(c, Button)}
     pieces = [code.setup, code.controller, *(setter for _, setter in setters.values())]
     fields = context_fields([*pieces, *(button.run for button in buttons.values())])
-    if writing is not None and writing.formula:
+    if writing is not None and writing.formula[-1]:
         fields["answer"] = "answer"
 
     constants: list[str] = []
@@ -184,29 +191,21 @@ def _export(
         for readout in code.readouts
     )
     translate_value = functools.partial(translate_expression, engine)
-    formula: list[str] = []
-    tests: list[dict[str, str]] = []
-    if writing is not None:
-        if writing.formula:
-            *variables, expression = writing.formula
-            expression = translate_value(expression, (), variables)
-            formula = [*map(python_name, variables), expression]
-        for test, name in zip(writing.tests, _test_names(writing.tests), strict=True):
-            press = [] if test.button is None else [names[test.button]]
-            bounds = (
-                f"{key}={json.dumps(value, ensure_ascii=False)}" for key, value in test.bounds
-            )
-            tests.append(
-                {
-                    "name": name,
-                    "doc": _one_line(test.name),
-                    "run": ", ".join([_literal(test.seconds), *press]),
-                    "check": ", ".join([translate_value(test.expr, fields), *bounds]),
-                }
-            )
+    *variables, formula = writing.formula if writing is not None else ("",)
+    presses = {button.label: names[i] for i, button in buttons.items()}
+    tests = [
+        {
+            "name": name,
+            "doc": _one_line(test.name),
+            "run": ", ".join(filter(None, [_literal(test.t), presses.get(test.name)])),
+            "check": ", ".join([translate_value(test.expr, fields), *test.arguments()]),
+        }
+        for name, test in ({} if writing is None else _test_names(writing.tests)).items()
+    ]
     text = _TEMPLATE.render(
         introduction=_introduction(lab, metadata, writing),
-        formula=formula,
+        formula=formula and translate_value(formula, (), variables),
+        variables=", ".join(map(python_name, variables)),
         tests=tests,
         seconds=_literal(metadata.seconds),
         constants=constants,
@@ -229,11 +228,11 @@ def _export(
     return Export(metadata.name, text, tuple(names[i] for i in buttons))
 
 
-def _test_names(tests: Iterable[Test]) -> list[str]:
-    names: list[str] = []
+def _test_names(tests: Iterable[Test]) -> dict[str, Test]:
+    names: dict[str, Test] = {}
     for test in tests:
         name = "_".join(["test", *re.findall(r"[a-z0-9]+", test.name.lower())])[:60].strip("_")
-        names.append(unique_name(name, names, "_"))
+        names[unique_name(name, names, "_")] = test
     return names
 
 
