@@ -45,7 +45,7 @@ def publish(results: Results, assets: Assets) -> PublishedTrials:
     for trial in results.trials:
         if isinstance(trial.output, ExerciseOutput):
             name, text = trial.output.script or ("", "")
-            path = hashed_name(f"assets/exercises/{name}", text.encode()) if name else ""
+            path = hashed_name(f"assets/labs/{name}", text.encode()) if name else ""
             values[trial.line.name] = PublishedExercise(name, path)
             files += [OutputFile(path, text.encode())] if name else []
     return PublishedTrials(values, tuple(files))

@@ -27,11 +27,10 @@ from coursebuild.features.lab.export.script import (
     Export,
     ExportMetadata,
     LabExport,
-    Test,
-    Writing,
     export_metadata,
     export_script,
 )
+from coursebuild.features.lab.model import Test, Writing
 
 _SUBJECTS = {MODEL: "XML", CONTROLLER: "control", FORMULA: "answer"}
 """What a reader writes, as it is called in the file."""
@@ -95,11 +94,11 @@ def _try(
         jobs.append(job)
     store = context.run_store.store
     runner = Runner(context.root, store, native.interpreter, context.sandbox, 1)
-    for run, passed in zip(runner.run(jobs), ([True] * count, list(start)), strict=True):
+    for run, verdicts in zip(runner.run(jobs), ([True] * count, list(start)), strict=True):
         lines = re.findall(r"^(passed|failed): (.*)", run.stdout, re.MULTILINE)
         if len(lines) != count:
             return LabExport(None, f"its file fails in an empty folder: {run.failure}")
-        for (verdict, line), expected in zip(lines, passed, strict=True):
+        for (verdict, line), expected in zip(lines, verdicts, strict=True):
             if (verdict == "passed") is not expected:
                 reason = f"its file judges otherwise than the page: {verdict}: {line}"
                 return LabExport(None, reason)

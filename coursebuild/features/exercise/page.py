@@ -32,15 +32,15 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
         html = page.highlight(language, text.rstrip())
         return page.template("blocks/code.html", language=language, html=html)
 
-    published = page.inputs.trials.get(block.span.start)
+    download = page.inputs.trials.get(block.span.start)
     file = href = ""
-    if isinstance(published, PublishedExercise) and published.path:
-        file, href = published.name, page.place.href(published.path)
+    if isinstance(download, PublishedExercise) and download.path:
+        file, href = download.name, page.place.href(download.path)
     return page.template(
         "exercise/exercise.html",
         file=file,
         href=href,
-        is_tried=published is not None,
+        is_tried=download is not None,
         id=block.id,
         lab=name,
         config=config,

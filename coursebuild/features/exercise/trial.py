@@ -121,9 +121,9 @@ class ExerciseTrials:
         files = {model.path: b""} if exercise.subject == MODEL else files_of(context.root, model)
         export, start = LabExport(None), judgements.of_attempts[1]
         if not diagnostics:
-            passed = [v.passed for v in start.verdicts] or [False] * len(exercise.trials)
+            verdicts = [v.passed for v in start.verdicts] or [False] * len(exercise.trials)
             native = self._engines.native
-            export = export_exercise(context, native, trial, exercise, files, passed)
+            export = export_exercise(context, native, trial, exercise, files, verdicts)
         line = TrialLine(
             name=trial.name,
             title=exercise.title,

@@ -314,7 +314,7 @@ class _LabTrial(Struct, frozen=True):
         comparison: tuple[str, dict[str, str]] = ("", {}) if parity is None else parity.describe()
         if parity is not None and parity.unrepeated and export.script is not None:
             comparison = "lab.parity.exported", {}
-        moved = None if lab.of_exercise or reply.main is None else reply.main["moved"]
+        share = None if lab.of_exercise or reply.main is None else reply.main["moved"]
         line = TrialLine(
             name=module.name,
             title=lab.fields.title,
@@ -325,7 +325,7 @@ class _LabTrial(Struct, frozen=True):
             tried=len(reply.attempts),
             parity=_in_english(*comparison),
             fill=None if reply.main is None else reply.main["fill"],
-            play=verdict.play_text(moved, lab.fields.still),
+            play=verdict.play_text(share, lab.fields.still),
             fallen=tuple(
                 f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
                 for body in ([] if reply.main is None else reply.main.get("fallen", []))

@@ -140,8 +140,8 @@ class Expressions:
         if operator == "%":
             return f"np.fmod({self.all(sides)})"
         if operator == "??" and sides[0].type in _REPEATABLE:
-            value, other = map(self.expression, sides)
-            return f"({other} if missing({value}) else {value})"
+            value, default = map(self.expression, sides)
+            return f"({default} if missing({value}) else {value})"
         if operator in _EQUALITY and sides[1].type in ("null", "undefined"):
             return f"({_EQUALITY[operator]}missing({self.expression(sides[0])}))"
         if operator not in _BINARY:

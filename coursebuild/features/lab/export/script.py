@@ -15,7 +15,7 @@ import math
 import platform
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +41,7 @@ from coursebuild.features.lab.export.translate import (
     translate_statements,
 )
 from coursebuild.features.lab.javascript import UntranslatableError
-from coursebuild.features.lab.model import SIMLAB, Lab
+from coursebuild.features.lab.model import SIMLAB, Lab, Test, Writing
 from coursebuild.features.lab.reply import PARITY_RTOL, MainRun, unpack_arrays
 from coursebuild.features.lab.schema import Button, Control, Select, Slider
 
@@ -73,35 +73,6 @@ class Export(Struct, frozen=True):
     text: str
     """With `{{control:N}}` for the value of control N."""
     buttons: tuple[str, ...]
-
-
-class Test(Struct, frozen=True):
-    """A trial of an exercise, as its fence has it."""
-
-    name: str
-    expr: str
-    t: float
-    min: float | None
-    max: float | None
-    unit: str
-    hint: str
-
-    def arguments(self) -> Iterator[str]:
-        """The arguments of the script's `check` besides the value."""
-        values = {"least": self.min, "most": self.max, "unit": self.unit, "hint": self.hint}
-        for name, value in values.items():
-            if value not in (None, ""):
-                yield f"{name}={json.dumps(value, ensure_ascii=False)}"
-
-
-class Writing(Struct, frozen=True):
-    """What a reader writes in a script, and what judges it."""
-
-    subject: str
-    """`XML`, `control` or `answer`: what it is called in the script."""
-    tests: tuple[Test, ...]
-    formula: tuple[str, ...] = ("",)
-    """The names of its variables, and its expression, which is empty where it is no formula."""
 
 
 def file_name(lab: str) -> str:

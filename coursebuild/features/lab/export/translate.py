@@ -251,13 +251,13 @@ class _Statements(expressions.Expressions):
                 array, value = self.part(function, "object"), self.expression(values[0])
                 yield f"{array}[{self.bounds(values[1:]) or ':'}] = {value}"
             case "forEach" if len(values) == 1 and values[0].type == "arrow_function":
-                yield from self.each(self.part(function, "object"), values[0])
+                yield from self.item_loop(self.part(function, "object"), values[0])
             case "set" if len(values) in (1, 2):
                 yield self.set(self.part(function, "object"), *values)
             case _:
                 raise js.refusal(function, "a call of ")
 
-    def each(self, items: str, node: Node) -> Iterator[str]:
+    def item_loop(self, items: str, node: Node) -> Iterator[str]:
         """Translate what is done with each item of an array."""
         body = js.field(node, "body")
         if any(inner.type == "return_statement" for inner in js.walk(body)):
