@@ -60,7 +60,7 @@ from coursebuild.features.lab.equations.equation_trial import (
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
 from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size, editable_source
-from coursebuild.features.lab.reply import LabOutput, MainRun, TrialReply, read_reply, reply_bytes
+from coursebuild.features.lab.reply import LabOutput, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 
 _PARITY_SECONDS = 1.0
@@ -300,7 +300,9 @@ class _LabTrial(Struct, frozen=True):
         export = LabExport(None)
         is_exported = self.lab.kind != MJCF and not lab.of_exercise
         if not failures and reply.main is not None and is_exported:
-            export = self._export(reply.main)
+            sources = files_of(self.context.root, self.model)
+            native = self.engines.native
+            export = export_lab(self.context, native, self.trial, lab, sources, reply.main)
         files = model_files(self.context.root, self.model.path, self.model.text)
         self.context.run_store.note_trial(
             inputs,
@@ -337,10 +339,6 @@ class _LabTrial(Struct, frozen=True):
         parts = {"mjb": mjb, "script": export.script, "parity": comparison, "source": source}
         output = replace(evaluation.output, **parts)
         return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]
-
-    def _export(self, main: MainRun) -> LabExport:
-        files = files_of(self.context.root, self.model)
-        return export_lab(self.context, self.engines.native, self.trial, self.lab, files, main)
 
     def _fail(
         self, module: LabModule, diagnostics: list[Diagnostic]
