@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
@@ -65,6 +68,47 @@ def test_attempts_are_judged_watched_and_kept(page: Page) -> None:
     page.reload()
     bar, text = exercise(page, "A bar that balances")
     expect(bar.get_by_text("You have solved this exercise before.")).to_be_visible()
+
+
+def pytest_of(path: Path) -> tuple[int, str]:
+    """The exit status and the output of `pytest` on a file, as a reader runs it."""
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", path.name]
+    process = subprocess.run(command, cwd=path.parent, capture_output=True, text=True)
+    return process.returncode, process.stdout
+
+
+@pytest.mark.parametrize(
+    "title, name, start, solution, failures",
+    [
+        ("A bar that", "test_1_1_bar.py", "-0.3 0 0", "-0.15 0 0", 1),
+        (
+            "Hold it",
+            "test_1_1_hold.py",
+            "data.qfrc_applied[0] = 0",
+            "data.qfrc_applied[0] = 50 * (0.5 - data.qpos[0]) - 10 * data.qvel[0]",
+            2,
+        ),
+        ("A push", "test_1_1_speed.py", "return 2 * g * h", "return math.sqrt(2 * g * h)", 1),
+    ],
+)
+def test_trials_run_by_pytest_on_a_file_of_the_page(
+    page: Page, tmp_path: Path, title: str, name: str, start: str, solution: str, failures: int
+) -> None:
+    element, _ = exercise(page, title)
+    with page.expect_download() as download:
+        element.get_by_role("link", name="Download").click()
+    assert download.value.suggested_filename == name
+    path = tmp_path / name
+    download.value.save_as(path)
+    status, output = pytest_of(path)
+    assert (status, f"{failures} failed" in output) == (1, True), output
+    text = path.read_text()
+    assert text.startswith("# /// script\n") and text.count(start) == 1
+    path.write_text(text.replace(start, solution))
+    assert pytest_of(path)[0] == 0
+    command = [sys.executable, "-I", name]  # as `uv run` does
+    process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (process.returncode, "failed:" in process.stdout) == (0, False), process.stdout
 
 
 def test_a_model_that_does_not_compile_is_told_at_its_line(page: Page) -> None:

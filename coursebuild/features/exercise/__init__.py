@@ -10,6 +10,7 @@ from coursebuild.api import (
     Assets,
     Feature,
     FenceKind,
+    OutputFile,
     PagePart,
     PublishedTrials,
     Results,
@@ -17,7 +18,14 @@ from coursebuild.api import (
     TrialRun,
     Trials,
 )
-from coursebuild.features.exercise.model import Exercise, exercise_inputs, exercise_trials
+from coursebuild.core.pages.assets import hashed_name
+from coursebuild.features.exercise.model import (
+    Exercise,
+    ExerciseOutput,
+    PublishedExercise,
+    exercise_inputs,
+    exercise_trials,
+)
 from coursebuild.features.exercise.page import draw_exercise, exercise_markdown, index_exercise
 from coursebuild.features.exercise.parse import parse_fence
 from coursebuild.features.exercise.schema import ExerciseFile
@@ -31,8 +39,16 @@ def start(context: TrialContext) -> TrialRun:
 
 
 def publish(results: Results, assets: Assets) -> PublishedTrials:
-    """Publish nothing: an exercise runs on the files of its lab."""
-    return PublishedTrials()
+    """Publish the files in Python; in the page an exercise runs on the files of its lab."""
+    values: dict[str, PublishedExercise] = {}
+    files: list[OutputFile] = []
+    for trial in results.trials:
+        if isinstance(trial.output, ExerciseOutput):
+            name, text = trial.output.script or ("", "")
+            path = hashed_name(f"assets/labs/{name}", text.encode()) if name else ""
+            values[trial.line.name] = PublishedExercise(name, path)
+            files += [OutputFile(path, text.encode())] if name else []
+    return PublishedTrials(values, tuple(files))
 
 
 FEATURE = Feature(

@@ -23,10 +23,11 @@ FORMULA: Subject = "formula"
 SUBJECTS = (MODEL, CONTROLLER, FORMULA)
 LANGUAGES = {MODEL: "xml", CONTROLLER: "javascript", FORMULA: "javascript"}
 
-_MATHS = (
+MATHS = (
     "abs acos acosh asin asinh atan atan2 atanh cbrt ceil cos cosh exp floor hypot log log10 log2 "
     "max min sign sin sinh sqrt tan tanh"
 )
+"""Functions that a formula may call."""
 _PLACE = "\0"
 
 
@@ -54,6 +55,8 @@ class Exercise(FeatureBlock, frozen=True):
     trials: tuple[HiddenTrial, ...]
     trial_places: tuple[Span, ...]
     """Of their names."""
+    setup: str
+    """What runs before each trial."""
     lab: Lab
     """The solution in motion: a readout for each trial, and a button for each that has a `setup`.
     """
@@ -117,7 +120,7 @@ def attempt_function(subject: Subject, names: tuple[str, ...], text: str) -> str
         return ""
     if subject == CONTROLLER:
         return LabCode(("controller",), "statements", text).function
-    maths = ", ".join(_MATHS.split())
+    maths = ", ".join(MATHS.split())
     text = text.replace("^", "**")
     return (
         f"({', '.join(names)}) => {{ const {{{maths}}} = Math, pi = Math.PI; return ({text}\n) }}"
@@ -125,9 +128,18 @@ def attempt_function(subject: Subject, names: tuple[str, ...], text: str) -> str
 
 
 class ExerciseOutput(Struct, frozen=True):
-    """Stands for an exercise that was tried."""
+    """What a page shows of an exercise that was tried."""
+
+    script: tuple[str, str] | None
+    """Name and text of a file in Python that judges what a reader writes in it."""
+
+
+class PublishedExercise(Struct, frozen=True):
+    """The file of an exercise in a site."""
 
     name: str
+    path: str
+    """Its site path; empty if there is none."""
 
 
 def exercise_trials(course: Course) -> Iterator[Trial]:

@@ -14,7 +14,7 @@ from coursebuild.core.pages.marks import escape_line, escape_marks, fence, link,
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.pages.typography import number
 from coursebuild.core.text.quantities import with_unit
-from coursebuild.features.exercise.model import FORMULA, LANGUAGES, Exercise
+from coursebuild.features.exercise.model import FORMULA, LANGUAGES, Exercise, PublishedExercise
 from coursebuild.features.exercise.schema import HiddenTrial
 from coursebuild.features.lab.reply import PublishedLab
 
@@ -32,8 +32,15 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
         html = page.highlight(language, text.rstrip())
         return page.template("blocks/code.html", language=language, html=html)
 
+    download = page.inputs.trials.get(block.span.start)
+    file = href = ""
+    if isinstance(download, PublishedExercise) and download.path:
+        file, href = download.name, page.place.href(download.path)
     return page.template(
         "exercise/exercise.html",
+        file=file,
+        href=href,
+        is_tried=download is not None,
         id=block.id,
         lab=name,
         config=config,

@@ -115,6 +115,7 @@ def _exercise(
         wrong=tuple(Wrong(_text(n, "text"), w.fails, n.place("fails")) for n, w in mistakes),
         trials=fields.trials,
         trial_places=tuple(trial.place("name") for trial in node.objects("trials")),
+        setup=fields.setup,
         lab=_lab(subject, node, fields),
         task=prose.blocks(node.get("text")),
         explain=prose.blocks(node.get("explain")),
@@ -167,6 +168,8 @@ def _lab(subject: Subject, node: ObjectNode, fields: ExerciseFile) -> Lab:
             model=fields.model,
             key=fields.key,
             camera=fields.camera,
+            start=_played_trial(fields),
+            still=fields.still,
             setup=setup,
             controller=controller,
             controls=tuple(buttons),
@@ -176,7 +179,14 @@ def _lab(subject: Subject, node: ObjectNode, fields: ExerciseFile) -> Lab:
         xml=solution if subject == MODEL else None,
         places=tuple(places),
         code=tuple(code),
+        of_exercise=True,
     )
+
+
+def _played_trial(fields: ExerciseFile) -> str | None:
+    """The trial whose `setup` Play runs: the first one in which time passes, if it has one."""
+    trials = [trial for trial in fields.trials if trial.t] or [t for t in fields.trials if t.setup]
+    return trials[0].name if trials and trials[0].setup else None
 
 
 def _text(node: ObjectNode, name: str) -> Excerpt:

@@ -82,5 +82,6 @@ class ExerciseFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     ] = None
     setup: Annotated[str, Meta(description="statements run before each trial")] = ""
     camera: Camera | None = None
+    still: Annotated[str, Meta(description="why nothing moves when a reader presses Play")] = ""
     height: Annotated[Height, Meta(description="of a picture 480 px wide, in px")] = 260
     plots: tuple[Plot, ...] = ()

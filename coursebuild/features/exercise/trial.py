@@ -26,10 +26,13 @@ from coursebuild.core.model.results import TrialLine
 from coursebuild.core.run.mjcf import readable_error
 from coursebuild.core.run.v8 import LimitError, ScriptError
 from coursebuild.core.values import fingerprint
+from coursebuild.features.exercise.export import export_exercise
 from coursebuild.features.exercise.model import MODEL, Exercise, ExerciseOutput, exercise_inputs
 from coursebuild.features.lab.compile import LabModule, compile_lab, trial_data
 from coursebuild.features.lab.engines.native import NativeError
-from coursebuild.features.lab.trial import Engines, find_model, save_model
+from coursebuild.features.lab.export.script import LabExport
+from coursebuild.features.lab.trial import Engines, files_of, find_model, save_model
+from coursebuild.features.lab.verdict import play_text
 
 
 class TrialVerdict(Struct, frozen=True):
@@ -48,6 +51,8 @@ class Judgement(Struct, frozen=True):
     refused: str = ""
     """Why it cannot be tried; then there are no verdicts."""
     verdicts: tuple[TrialVerdict, ...] = ()
+    moved: float | None = None
+    """The part of the picture in which something moves by Play, of the start."""
 
 
 class Judgements(Struct, frozen=True):
@@ -113,6 +118,12 @@ class ExerciseTrials:
             seconds=judgements.seconds,
             timestamp=judgements.timestamp,
         )
+        files = {model.path: b""} if exercise.subject == MODEL else files_of(context.root, model)
+        export, start = LabExport(None), judgements.of_attempts[1]
+        if not diagnostics:
+            verdicts = [v.passed for v in start.verdicts] or [False] * len(exercise.trials)
+            native = self._engines.native
+            export = export_exercise(context, native, trial, exercise, files, verdicts)
         line = TrialLine(
             name=trial.name,
             title=exercise.title,
@@ -120,20 +131,27 @@ class ExerciseTrials:
             status="failed" if diagnostics else "ok",
             seconds=judgements.seconds,
             tried=len(judgements.of_attempts),
+            play=play_text(start.moved, exercise.lab.fields.still),
             cached=kept_judgements is not None,
+            unexported=export.reason,
         )
-        return TrialResult(exercise.span, line, ExerciseOutput(trial.name)), diagnostics
+        output = ExerciseOutput(export.script)
+        return TrialResult(exercise.span, line, output), diagnostics
 
     def _judge_all(self, trial: Trial, exercise: Exercise, mjb: bytes) -> Judgements:
         start, module = time.time(), compile_lab(exercise.lab, trial.name)
         mistakes = (attempt.text.text for attempt in exercise.wrong)
         texts = (exercise.solution.text, exercise.start.text, *mistakes)
-        judgements = tuple(self._judge(module, exercise, text, mjb) for text in texts)
+        judgements = tuple(
+            self._judge(module, exercise, text, mjb, plays=i == 1) for i, text in enumerate(texts)
+        )
         return Judgements(judgements, round(time.time() - start, 4), int(start))
 
-    def _judge(self, module: LabModule, exercise: Exercise, text: str, mjb: bytes) -> Judgement:
+    def _judge(
+        self, module: LabModule, exercise: Exercise, text: str, mjb: bytes, *, plays: bool
+    ) -> Judgement:
         config = {**trial_data(module), "exercise": exercise.data(), "attempt": text}
-        request = {"config": config, "code": module.literal}
+        request = {"config": config, "code": module.literal, "plays": plays}
         try:
             reply = self._engines.browser.judge(request, mjb, self._context.course.limits.lab)
         except LimitError:

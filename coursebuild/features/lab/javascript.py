@@ -103,6 +103,39 @@ def array_items(array: Node) -> list[Node]:
     return [_without_parentheses(child) for child in children(array)]
 
 
+def parameters(function: Node) -> list[str]:
+    """Return the names of the parameters of an arrow function, which are nothing else."""
+    if function.type != "arrow_function":
+        raise refusal(function)
+    single = function.child_by_field_name("parameter")
+    nodes = children(field(function, "parameters")) if single is None else [single]
+    if any(node.type != "identifier" for node in nodes):
+        raise refusal(function)
+    return [text_of(node) for node in nodes]
+
+
+def length_of(node: Node) -> Node | None:
+    """Return `n` of `{length: n}`, of which `Array.from` makes an array."""
+    pairs = children(node) if node.type == "object" else []
+    if len(pairs) == 1 and pairs[0].type == "pair" and text_of(field(pairs[0], "key")) == "length":
+        return field(pairs[0], "value")
+    return None
+
+
+def pattern_items(pattern: Node) -> list[str]:
+    """Return the names in `[a, , b]` on the left of a declaration; `_` for what is left out."""
+    names, name = [], "_"
+    for child in (child for child in pattern.children if child.type != "comment"):
+        if child.type == "identifier":
+            name = text_of(child)
+        elif child.type == "," or (child.type == "]" and name != "_"):
+            names.append(name)
+            name = "_"
+        elif child.type not in "[]":
+            raise refusal(pattern)
+    return names
+
+
 def text_of(node: Node) -> str:
     """Return the source text of a node."""
     assert node.text is not None

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from typing import TypeAlias
 
+from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import Block, Excerpt, FeatureBlock, Inline, Span
@@ -49,6 +51,8 @@ class Lab(FeatureBlock, frozen=True):
     places: tuple[tuple[Entry, Span], ...] = ()
     """The place of each value in the JSON."""
     code: tuple[tuple[Entry, Excerpt], ...] = ()
+    of_exercise: bool = False
+    """Whether it is the solution of an exercise, of whose page the exercise's own trial tells."""
 
     @property
     def is_of_text(self) -> bool:
@@ -101,6 +105,35 @@ class Lab(FeatureBlock, frozen=True):
     def mjcf(self) -> Excerpt | None:
         """The model that it holds, if it holds one."""
         return self.xml
+
+
+class Test(Struct, frozen=True):
+    """A trial of an exercise, as its fence has it."""
+
+    name: str
+    expr: str
+    t: float
+    min: float | None
+    max: float | None
+    unit: str
+    hint: str
+
+    def arguments(self) -> Iterator[str]:
+        """The arguments of the script's `check` besides the value."""
+        values = {"least": self.min, "most": self.max, "unit": self.unit, "hint": self.hint}
+        for name, value in values.items():
+            if value not in (None, ""):
+                yield f"{name}={json.dumps(value, ensure_ascii=False)}"
+
+
+class Writing(Struct, frozen=True):
+    """What a reader writes in a script, and what judges it."""
+
+    subject: str
+    """`XML`, `control` or `answer`: what it is called in the script."""
+    tests: tuple[Test, ...]
+    formula: tuple[str, ...] = ("",)
+    """The names of its variables, and its expression, which is empty where it is no formula."""
 
 
 def values_in(node: Node, path: Entry) -> Iterator[tuple[Entry, Node]]:

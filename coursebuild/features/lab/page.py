@@ -270,9 +270,14 @@ def _labs_by_model(document: Document) -> dict[str, Lab]:
     return labs
 
 
+_DRIFT = "else if (model.nu === 0 && Math.hypot(...model.opt.gravity) === 0) data.qvel.fill(0.5);"
+"""Lets a model move that nothing would move."""
+
+
 def _gallery_lab(model: MjcfModel) -> Lab:
     place = model.source.span(0, 0)
-    fields = SimLab(model=model.name, title=model.name, toggles=_TOGGLES, setup=START)
+    setup = f"{START} {_DRIFT}"
+    fields = SimLab(model=model.name, title=model.name, toggles=_TOGGLES, setup=setup)
     return Lab(place, SIMLAB, place, "", fields)
 
 

@@ -60,7 +60,7 @@ from coursebuild.features.lab.equations.equation_trial import (
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
 from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size, editable_source
-from coursebuild.features.lab.reply import LabOutput, MainRun, TrialReply, read_reply, reply_bytes
+from coursebuild.features.lab.reply import LabOutput, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 
 _PARITY_SECONDS = 1.0
@@ -251,6 +251,13 @@ def save_model(context: TrialContext, native: NativeEngine, model: Source) -> by
     return mjb
 
 
+def files_of(root: Path, model: Source) -> dict[str, bytes]:
+    """A model and the files that it includes, by path."""
+    paths = model_files(root, model.path, model.text)
+    included = {path: read_bytes(root, path) for path in paths if (root / path).is_file()}
+    return {model.path: model.text.encode(), **included}
+
+
 class _Evaluation(Struct, frozen=True):
     reply: TrialReply
     failures: tuple[Diagnostic, ...]
@@ -291,8 +298,11 @@ class _LabTrial(Struct, frozen=True):
             return self._fail(module, refusals or [diagnostic])
         reply, failures = evaluation.reply, evaluation.failures
         export = LabExport(None)
-        if not failures and reply.main is not None and self.lab.kind != MJCF:
-            export = self._export(reply.main)
+        is_exported = self.lab.kind != MJCF and not lab.of_exercise
+        if not failures and reply.main is not None and is_exported:
+            sources = files_of(self.context.root, self.model)
+            native = self.engines.native
+            export = export_lab(self.context, native, self.trial, lab, sources, reply.main)
         files = model_files(self.context.root, self.model.path, self.model.text)
         self.context.run_store.note_trial(
             inputs,
@@ -306,6 +316,7 @@ class _LabTrial(Struct, frozen=True):
         comparison: tuple[str, dict[str, str]] = ("", {}) if parity is None else parity.describe()
         if parity is not None and parity.unrepeated and export.script is not None:
             comparison = "lab.parity.exported", {}
+        share = None if lab.of_exercise or reply.main is None else reply.main["moved"]
         line = TrialLine(
             name=module.name,
             title=lab.fields.title,
@@ -316,7 +327,7 @@ class _LabTrial(Struct, frozen=True):
             tried=len(reply.attempts),
             parity=_in_english(*comparison),
             fill=None if reply.main is None else reply.main["fill"],
-            play=verdict.play_text(lab, reply.main),
+            play=verdict.play_text(share, lab.fields.still),
             fallen=tuple(
                 f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
                 for body in ([] if reply.main is None else reply.main.get("fallen", []))
@@ -328,17 +339,6 @@ class _LabTrial(Struct, frozen=True):
         parts = {"mjb": mjb, "script": export.script, "parity": comparison, "source": source}
         output = replace(evaluation.output, **parts)
         return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]
-
-    def _export(self, main: MainRun) -> LabExport:
-        root, model = self.context.root, self.model
-        paths = [
-            path for path in model_files(root, model.path, model.text) if (root / path).is_file()
-        ]
-        files = {
-            model.path: model.text.encode(),
-            **{path: read_bytes(root, path) for path in paths},
-        }
-        return export_lab(self.context, self.engines.native, self.trial, self.lab, files, main)
 
     def _fail(
         self, module: LabModule, diagnostics: list[Diagnostic]

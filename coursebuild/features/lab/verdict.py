@@ -15,7 +15,7 @@ from coursebuild.core.run.mjcf import error_line, readable_error
 from coursebuild.features.lab.compile import LabCode, pieces
 from coursebuild.features.lab.javascript import dotted_names, parse, text_of, walk
 from coursebuild.features.lab.model import MJCF, Entry, Lab
-from coursebuild.features.lab.reply import MainRun, TrialFailure, TrialReply
+from coursebuild.features.lab.reply import TrialFailure, TrialReply
 from coursebuild.features.lab.schema import Button
 
 _EXPLANATIONS = {
@@ -165,14 +165,16 @@ _LEAST_MOTION = 0.01
 """Of the picture: less than that is not seen."""
 
 
-def play_text(lab: Lab, main: MainRun | None) -> str:
-    """What a reader sees who presses Play and nothing else, in words; empty where nobody knows."""
-    share = None if main is None else main["moved"]
+def play_text(share: float | None, still: str) -> str:
+    """What a reader sees who presses Play and nothing else, in words; empty where nobody knows.
+
+    `share` is the part of the picture in which something moves, `still` why nothing does.
+    """
     if share is None:
         return ""
     if share >= _LEAST_MOTION:
         return f"Play moves {100 * share:.1f} %"
-    if lab.fields.still:
+    if still:
         return "Play alone moves nothing, as `still` says"
     return "Play alone moves nothing, and neither `start` nor `still` says more"
 

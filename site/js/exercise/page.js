@@ -154,6 +154,10 @@ export class Exercise extends Instrument {
     simulation.restart()
   }
 
+  showPlay(isPlaying) {
+    this.transport.setPlaying(isPlaying) // without the name of the trial that Play begins with
+  }
+
   togglePlay() {
     if (this.state !== 'playing' && this.state !== 'loading') this.load(this.editor.text)
     super.togglePlay()

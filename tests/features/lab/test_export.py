@@ -5,6 +5,7 @@ The cases are `translated.md`; `pytest --rewrite-fixtures` writes what is expect
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import subprocess
@@ -367,6 +368,39 @@ def test_values_are_those_of_v8(v8: Isolate, engine: EngineDescription, code: st
         return
     theirs = float(v8.call("run", code, 10.0).replace("Infinity", "inf"))
     assert math.isclose(ctx.n, theirs, rel_tol=1e-9, abs_tol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "ctx.n ??= 3; ctx.n ??= 4",
+        "ctx.n = (ctx.k ?? 0.5) + [2, 3].map((a, i) => a * i).reduce((a, b) => a + b, 0)",
+        "const f = (a, b) => a - b; ctx.n = f(data.qpos[0], f(1, 2))",
+        "ctx.n = 0; const add = (a) => { if (a < 0) return 9; ctx.n += a; return 1 }"
+        "; ctx.v = add(4) + add(-1); ctx.n += ctx.v",
+        "let n = 1; const twice = () => { n *= 2 }; twice(); twice(); ctx.n = n",
+        "const [, b, c] = [5, 6, 7, 8]; ctx.n = 10 * b + c",
+        "ctx.n = 0; [4, 5].forEach((x, i) => { ctx.n += x * (i + 1) })",
+        "ctx.n = Math.max(...Array.from({length: 3}, (_, i) => data.qpos[i % 2] * i))",
+        "const m = [[1, 2], [3, 4]]; ctx.n = m.map((row) => row[1]).reduce((a, b) => a * b, 1)",
+        "ctx.n = Math.hypot(...Array.from(data.qpos).map(Math.abs))",
+        "ctx.k = null; ctx.n = ctx.k === null ? 1 : 2",
+        "ctx.k = 0; ctx.n = ctx.k === null ? 1 : 2",
+        "ctx.n = Math.fround(0.1)",
+    ],
+)
+def test_functions_and_arrays_do_what_they_do_in_v8(
+    v8: Isolate, engine: EngineDescription, code: str
+) -> None:
+    theirs = float(v8.call("run", f"{{ const ctx = {{}}; {code}; globalThis.n = ctx.n }} n", 10.0))
+    ctx = SimpleNamespace(n=math.nan, v=math.nan, k=math.nan)
+    data = SimpleNamespace(qpos=np.array([2.5, -1]))
+    lines = translate_statements(engine, code, FIELDS)
+    body = indent("\n".join(lines), "    ")
+    values = {"np": np, "math": math, "functools": functools, "data": data, "ctx": ctx}
+    values["missing"] = lambda value: isinstance(value, float) and math.isnan(value)
+    exec(f"def run():\n{body}\nrun()", values)
+    assert float(ctx.n) == pytest.approx(theirs, rel=1e-12)
 
 
 @pytest.mark.parametrize(

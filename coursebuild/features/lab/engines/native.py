@@ -142,8 +142,8 @@ class NativeEngine(JsonChild):
         request = {"task": "script", **request}
         if self._sandbox is None:
             return msgspec.convert(self._request(request), ScriptReply)
-        python = None if self._interpreter is None else self._interpreter.python
-        enclose = self._sandbox.enclosure(self._root, self._interpreter, self.memory)
+        python = None if self.interpreter is None else self.interpreter.python
+        enclose = self._sandbox.enclosure(self._root, self.interpreter, self.memory)
         with JsonChild(str(_WORKER), self._seconds, python, self.memory, enclose) as child:
             self._script_child = child
             if self._interrupted:
@@ -163,7 +163,7 @@ class NativeEngine(JsonChild):
             child.interrupt()
 
     @functools.cached_property
-    def _interpreter(self) -> Interpreter | None:
+    def interpreter(self) -> Interpreter | None:
         """The environment with the labs' MuJoCo; none where that is installed here."""
         if engine_version() == LAB_ENGINE:
             return None
@@ -179,8 +179,8 @@ class NativeEngine(JsonChild):
         return environment.interpreter
 
     def _request(self, request: dict[str, Any], seconds: float | None = None) -> dict[str, Any]:
-        if self._process is None and self._interpreter is not None:
-            self._python = self._interpreter.python
+        if self._process is None and self.interpreter is not None:
+            self._python = self.interpreter.python
         limit = self._seconds if seconds is None else min(seconds, self._seconds)
         reply: dict[str, Any] | None = self.ask({**request, "limit": limit}, limit)
         if reply is None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import keyword
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 
 from tree_sitter import Node
 
@@ -17,6 +18,7 @@ RESERVED = ROOTS.union(
         abs copy ctx float format int len max math min mujoco np range str SimpleNamespace
         energy linear_momentum angular_momentum normal_force qpos SECONDS DIVERGED XML
         load start reset step simulate readouts report main set_up control model_path
+        functools missing answer run check
     """.split()
 )
 """Names that every script may use, and that nothing else in it may have."""
@@ -26,6 +28,7 @@ _FUNCTIONS = {
     **{f"Math.{name}": f"np.{name}(...)" for name in _NUMPY.split()},
     **{f"Math.a{name}": f"np.arc{name}(...)" for name in _ARC.split()},
     "Math.abs": "abs(...)",
+    "Math.fround": "float(np.float32(...))",
     "Math.atan2": "np.arctan2(...)",
     "Math.hypot": "math.hypot(...)",
     "Math.max": "max(...)",
@@ -46,6 +49,7 @@ _FUNCTIONS = {
     "lib.sitePos": "data.site(...).xpos.copy()",
 }
 """Functions in Python, with `...` for the arguments."""
+_EXTREMES = (("Math", "max"), ("Math", "min"))
 _CONSTANTS = {
     "PI": "math.pi",
     "E": "math.e",
@@ -60,6 +64,9 @@ _BINARY = {
     **{"===": "==", "!==": "!=", "&&": "and", "||": "or"},
 }
 _UNBOUNDED = {"NaN": "math.nan", "Infinity": "math.inf"}
+_EQUALITY = {"==": "", "===": "", "!=": "not ", "!==": "not "}
+_REPEATABLE = ("identifier", "member_expression", "subscript_expression")
+"""What may be evaluated twice."""
 _FLAT = ".reshape(-1)"
 
 
@@ -98,6 +105,8 @@ class Expressions:
                 return f"({' + '.join(texts) or repr('')})"
             case "true" | "false":
                 return node.type.capitalize()
+            case "null" | "undefined":
+                return "math.nan"  # as a value that is not there, which is no number either
             case "identifier":
                 return self.name(js.text_of(node))
             case "member_expression":
@@ -116,12 +125,11 @@ class Expressions:
                 return f"({_UNARY[operator_of(node)]}{self.part(node, 'argument')})"
             case "binary_expression":
                 return self.binary(node)
+            case "arrow_function" if js.field(node, "body").type != "statement_block":
+                with self.function(node) as names:
+                    return f"(lambda {', '.join(names)}: {self.part(node, 'body')})"
             case "ternary_expression":
-                # `null`, where a readout has nothing to show, is no number.
-                first, second = (
-                    "math.nan" if branch.type == "null" else self.expression(branch)
-                    for branch in _branches(node)
-                )
+                first, second = map(self.expression, _branches(node))
                 return f"({first} if {self.part(node, 'condition')} else {second})"
             case _:
                 raise js.refusal(node)
@@ -131,6 +139,11 @@ class Expressions:
         operator, sides = operator_of(node), (js.field(node, "left"), js.field(node, "right"))
         if operator == "%":
             return f"np.fmod({self.all(sides)})"
+        if operator == "??" and sides[0].type in _REPEATABLE:
+            value, default = map(self.expression, sides)
+            return f"({default} if missing({value}) else {value})"
+        if operator in _EQUALITY and sides[1].type in ("null", "undefined"):
+            return f"({_EQUALITY[operator]}missing({self.expression(sides[0])}))"
         if operator not in _BINARY:
             raise js.UntranslatableError(f"`{operator}`")
         translate = self.text if _is_text(node) else self.expression
@@ -224,11 +237,22 @@ class Expressions:
         """Translate a call that is used for its value."""
         function, values = js.field(node, "function"), js.arguments(node)
         path = js.dotted_name(function)
+        if path in _EXTREMES and [value.type for value in values] == ["spread_element"]:
+            return f"{path[1]}({self.all(js.children(values[0]))})"  # it may have a single item
         if ".".join(path) in _FUNCTIONS:
             return _FUNCTIONS[".".join(path)].replace("...", self.all(values))
         if path[:1] == ("mj",) and len(path) == 2 and path[1] in self.engine.functions:
             return f"mujoco.{path[1]}({self.all(values)})"
+        if self.is_function(path):
+            return f"{self.expression(function)}({self.all(values)})"
+        if path == ("Array", "from") and values:
+            return self.mapped(values[0], values[1] if len(values) > 1 else None)
         match js.text_of(js.field(function, "property")) if "member" in function.type else "":
+            case "map" if len(values) == 1:
+                return self.mapped(js.field(function, "object"), values[0])
+            case "reduce" if len(values) == 2 and len(js.parameters(values[0])) == 2:
+                step, begin = map(self.expression, values)
+                return f"functools.reduce({step}, {self.part(function, 'object')}, {begin})"
             case "slice" | "subarray" as method if len(values) < 3:
                 part = f"{self.part(function, 'object')}[{self.bounds(values) or ':'}]"
                 return part + ".copy()" * (method == "slice")
@@ -237,6 +261,49 @@ class Expressions:
                 return f"format({self.part(function, 'object')}, '.{digits}f')"
             case _:
                 raise js.refusal(function, "a call of ")
+
+    def is_function(self, path: tuple[str, ...]) -> bool:
+        """Whether a path may be that of a function of the lab's code."""
+        return self.is_field(path) or (len(path) == 1 and self.is_variable(path[0]))
+
+    def is_field(self, path: tuple[str, ...]) -> bool:
+        """Whether a path is that of what the lab's code keeps."""
+        return len(path) == 2 and path[0] == "ctx" and path[1] in self.fields
+
+    def mapped(self, array: Node, function: Node | None) -> str:
+        """Translate an array that is made of another, or of `{length: n}`, item by item."""
+        length = js.length_of(array)
+        items = self.expression(array) if length is None else f"range({self.index(length)})"
+        if function is None:
+            return f"np.array({items}, dtype=float)"
+        if function.type != "arrow_function":
+            name = _FUNCTIONS.get(".".join(js.dotted_name(function)))
+            call = f"{self.expression(function)}(...)" if name is None else name
+            return f"np.array([{call.replace('...', 'x')} for x in {items}], dtype=float)"
+        with self.function(function) as names:
+            self.counters |= set(names[1:])
+            loop = self.loop_over(names, items, is_range=length is not None)
+            return f"np.array([{self.part(function, 'body')} {loop}], dtype=float)"
+
+    def loop_over(self, names: list[str], items: str, *, is_range: bool = False) -> str:
+        """The head of a loop with an item, and its index if there is a second name."""
+        if is_range:  # its items are nothing, and the loop goes over the indices
+            return f"for {names[1] if len(names) > 1 else '_'} in {items}"
+        if len(names) < 2:
+            return f"for {names[0] if names else '_'} in {items}"
+        return f"for {names[1]}, {names[0]} in enumerate({items})"
+
+    @contextlib.contextmanager
+    def function(self, node: Node) -> Iterator[list[str]]:
+        """The parameters of an arrow function, in scope."""
+        parameters = js.parameters(node)
+        if len(set(parameters)) < len(parameters) or ROOTS.intersection(parameters):
+            raise js.refusal(node)
+        names = [python_name(name) for name in parameters]
+        self.counters -= set(names)
+        self.scopes.append(set(names))
+        yield names
+        self.scopes.pop()
 
 
 def python_name(name: str) -> str:

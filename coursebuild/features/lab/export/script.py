@@ -15,7 +15,7 @@ import math
 import platform
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,14 +34,14 @@ from coursebuild.features.lab.engines.native import (
     ScriptReply,
     lab_digest,
 )
-from coursebuild.features.lab.export.expressions import RESERVED
+from coursebuild.features.lab.export.expressions import RESERVED, python_name
 from coursebuild.features.lab.export.translate import (
     context_fields,
     translate_expression,
     translate_statements,
 )
 from coursebuild.features.lab.javascript import UntranslatableError
-from coursebuild.features.lab.model import SIMLAB, Lab
+from coursebuild.features.lab.model import SIMLAB, Lab, Test, Writing
 from coursebuild.features.lab.reply import PARITY_RTOL, MainRun, unpack_arrays
 from coursebuild.features.lab.schema import Button, Control, Select, Slider
 
@@ -98,9 +98,13 @@ def initial_values(lab: Lab) -> dict[int, float | str]:
 
 
 def export_script(
-    lab: Lab, metadata: ExportMetadata, engine: EngineDescription, model: Mapping[str, bytes]
+    lab: Lab,
+    metadata: ExportMetadata,
+    engine: EngineDescription,
+    model: Mapping[str, bytes],
+    writing: Writing | None = None,
 ) -> Export | str:
-    """Write the script of a lab, or say why there is none.
+    """Write the script of a lab, or say why there is none; with `writing`, one that judges.
 
     `model` holds the files of its model by path, that of the model itself first.
     """
@@ -111,7 +115,7 @@ def export_script(
     except UnicodeDecodeError:
         return "its model has files that are no text"
     try:
-        return _export(lab, metadata, engine, texts)
+        return _export(lab, metadata, engine, texts, writing)
     except UntranslatableError as error:
         return f"{error} has no counterpart in Python"
     except (RecursionError, MemoryError, SyntaxError):  # Python, too, has a limit
@@ -119,7 +123,11 @@ def export_script(
 
 
 def _export(
-    lab: Lab, metadata: ExportMetadata, engine: EngineDescription, model: Mapping[str, str]
+    lab: Lab,
+    metadata: ExportMetadata,
+    engine: EngineDescription,
+    model: Mapping[str, str],
+    writing: Writing | None,
 ) -> Export:
     code, names = lab.fields, _names(lab.fields.controls)
     translate = functools.partial(translate_statements, engine)
@@ -131,6 +139,8 @@ def _export(
     buttons = {i: c for i, c in enumerate(code.controls) if isinstance(c, Button)}
     pieces = [code.setup, code.controller, *(setter for _, setter in setters.values())]
     fields = context_fields([*pieces, *(button.run for button in buttons.values())])
+    if writing is not None and writing.formula[-1]:
+        fields["answer"] = "answer"
 
     constants: list[str] = []
     # Setters by the time at which the lab runs them.
@@ -151,8 +161,23 @@ def _export(
         (json.dumps(readout.label, ensure_ascii=False), readout.expr, readout.digits)
         for readout in code.readouts
     )
+    translate_value = functools.partial(translate_expression, engine)
+    *variables, formula = writing.formula if writing is not None else ("",)
+    presses = {button.label: names[i] for i, button in buttons.items()}
+    tests = [
+        {
+            "name": name,
+            "doc": _one_line(test.name),
+            "run": ", ".join(filter(None, [_literal(test.t), presses.get(test.name)])),
+            "check": ", ".join([translate_value(test.expr, fields), *test.arguments()]),
+        }
+        for name, test in ({} if writing is None else _test_names(writing.tests)).items()
+    ]
     text = _TEMPLATE.render(
-        introduction=_introduction(lab, metadata),
+        introduction=_introduction(lab, metadata, writing),
+        formula=formula and translate_value(formula, (), variables),
+        variables=", ".join(map(python_name, variables)),
+        tests=tests,
         seconds=_literal(metadata.seconds),
         constants=constants,
         python=".".join(platform.python_version_tuple()[:2]),
@@ -167,13 +192,19 @@ def _export(
         settings=settings,
         buttons=button_functions,
         resets="sim.reset" in "".join(button.run for button in buttons.values()),
-        readouts=[
-            (label, translate_expression(engine, e, fields), digits) for label, e, digits in values
-        ],
+        readouts=[(label, translate_value(e, fields), digits) for label, e, digits in values],
     )
     if len(_PLACE.findall(text)) != len(setters) or _HALF_CHARACTER.search(text):
         raise UntranslatableError("a text that no script can hold")
     return Export(metadata.name, text, tuple(names[i] for i in buttons))
+
+
+def _test_names(tests: Iterable[Test]) -> dict[str, Test]:
+    names: dict[str, Test] = {}
+    for test in tests:
+        name = "_".join(["test", *re.findall(r"[a-z0-9]+", test.name.lower())])[:60].strip("_")
+        names[unique_name(name, names, "_")] = test
+    return names
 
 
 def _names(controls: Sequence[Control]) -> list[str]:
@@ -202,16 +233,21 @@ def _keyframe(key: int | str | None) -> str:
     return f"mujoco.mj_resetDataKeyframe(model, data, {number})"
 
 
-def _introduction(lab: Lab, metadata: ExportMetadata) -> str:
+def _introduction(lab: Lab, metadata: ExportMetadata, writing: Writing | None) -> str:
     title = f"{_one_line(lab.fields.title)}: " if lab.fields.title else ""
-    origin = (
-        f"From the course “{_one_line(metadata.course)}”, for MuJoCo {metadata.engine}. It starts "
-        "and steps as the lab in the page does, with the controls as they were there, and prints "
-        "the lab's readouts and the state at the end."
-    )
+    commands = [f"uv run {metadata.name}"]
+    if writing is None:
+        use = (
+            "It starts and steps as the lab in the page does, with the controls as they were "
+            "there, and prints the lab's readouts and the state at the end."
+        )
+    else:
+        use = f"Change `{writing.subject}` below until all trials of the page pass."
+        commands.append(f"pytest {metadata.name}")
+    origin = f"From the course “{_one_line(metadata.course)}”, for MuJoCo {metadata.engine}. {use}"
     first = f"{title}{_one_line(metadata.origin)}, as a script."
     texts = (textwrap.fill(text, _WIDTH) for text in (first, origin, "Run it with:"))
-    return "\n\n".join([*texts, f"    uv run {metadata.name}"])
+    return "\n\n".join([*texts, "\n".join(f"    {command}" for command in commands)])
 
 
 def _comment(control: Slider | Select) -> list[str]:
@@ -253,6 +289,17 @@ class LabExport(Struct, frozen=True):
     reason: str = ""
 
 
+def export_metadata(
+    context: TrialContext, trial: Trial, kind: str, name: str, seconds: float
+) -> ExportMetadata:
+    """Say where a script comes from, of a `kind` such as `a lab`."""
+    owner = next((o for o in context.course.owners if o.id == trial.owner), None)
+    origin = f"{kind} of the page “{trial.owner if owner is None else owner.title}”"
+    if isinstance(owner, Lesson):
+        origin = f"{kind} of lesson {owner.id}, “{owner.title}”"
+    return ExportMetadata(name, origin, context.course.title, LAB_ENGINE, seconds)
+
+
 def export_lab(
     context: TrialContext,
     native: NativeEngine,
@@ -266,16 +313,8 @@ def export_lab(
     `model` is as in `export_script`, `main` the main run of the lab's trial.
     """
     start, end = (main["pictures"][i]["time"] for i in (0, -1))
-    owner = next((o for o in context.course.owners if o.id == trial.owner), None)
-    origin = f"a lab of the page “{trial.owner if owner is None else owner.title}”"
-    if isinstance(owner, Lesson):
-        origin = f"a lab of lesson {owner.id}, “{owner.title}”"
-    metadata = ExportMetadata(
-        file_name(trial.name),
-        origin,
-        context.course.title,
-        LAB_ENGINE,
-        round(end - start, 9),
+    metadata = export_metadata(
+        context, trial, "a lab", file_name(trial.name), round(end - start, 9)
     )
     readouts = [picture["readouts"] for picture in main["pictures"]]
     code = lab_digest(".", "export/script.jinja")

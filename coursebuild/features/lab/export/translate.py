@@ -37,10 +37,13 @@ def translate_statements(
     return ast.unparse(ast.parse("\n".join(lines))).splitlines()
 
 
-def translate_expression(engine: EngineDescription, code: str, fields: Collection[str]) -> str:
-    """Translate an expression."""
-    text = _Statements(engine, fields, None, button=False).expression(js.parse_expression(code))
-    return ast.unparse(ast.parse(text))
+def translate_expression(
+    engine: EngineDescription, code: str, fields: Collection[str], variables: Iterable[str] = ()
+) -> str:
+    """Translate an expression, in which there may be `variables`."""
+    translator = _Statements(engine, fields, None, button=False)
+    translator.scopes.append(set(map(expressions.python_name, variables)))
+    return ast.unparse(ast.parse(translator.expression(js.parse_expression(code))))
 
 
 def context_fields(pieces: Iterable[str]) -> dict[str, str]:
@@ -48,7 +51,7 @@ def context_fields(pieces: Iterable[str]) -> dict[str, str]:
     fields: dict[str, str] = {}
     statements = (statement for code in pieces for statement in js.parse_statements(code))
     for node in (node for statement in statements for node in js.walk(statement)):
-        if node.type == "assignment_expression":
+        if node.type == "assignment_expression" or _is_default(node):
             match js.dotted_name(js.field(node, "left")):
                 case ("ctx", name):
                     is_truth = js.field(node, "right").type in ("true", "false")
@@ -61,7 +64,18 @@ def context_fields(pieces: Iterable[str]) -> dict[str, str]:
     return dict(sorted(fields.items()))
 
 
+def _is_default(node: Node) -> bool:
+    """Whether a node is `name ??= value`."""
+    is_augmented = node.type == "augmented_assignment_expression"
+    return is_augmented and expressions.operator_of(node) == "??="
+
+
 class _Statements(expressions.Expressions):
+    depths: tuple[int, ...] = ()
+    """How many scopes lie around each function that is being translated."""
+    outer: frozenset[str] = frozenset()
+    """The variables of other functions to which the innermost one assigns."""
+
     def block(self, body: Iterable[Node]) -> Iterator[str]:
         self.scopes.append(set())
         for statement in body:
@@ -81,7 +95,7 @@ class _Statements(expressions.Expressions):
                     yield from self.effect(expression)
             case "lexical_declaration":
                 for declarator in js.children(node):
-                    yield self.declaration(declarator)
+                    yield from self.declaration(declarator)
             case "statement_block":
                 yield from self.block(js.children(node))
             case "if_statement":
@@ -97,22 +111,49 @@ class _Statements(expressions.Expressions):
                 yield from self.loop(node)
             case "break_statement" | "continue_statement" if not js.children(node):
                 yield node.type.removesuffix("_statement")
+            case "return_statement" if self.depths and js.children(node):
+                yield f"return {self.expression(js.children(node)[0])}"
             case "return_statement" if not (js.children(node) or self.value):
                 yield "return"
             case _:
                 raise js.refusal(node)
 
-    def declaration(self, node: Node) -> str:
+    def declaration(self, node: Node) -> Iterator[str]:
         name, value = js.field(node, "name"), node.child_by_field_name("value")
-        if name.type != "identifier" or value is None:
+        if value is None or name.type not in ("identifier", "array_pattern"):
             raise js.UntranslatableError(f"`{js.text_of(node)}` without a value")
+        if name.type == "identifier" and value.type == "arrow_function":
+            yield from self.definition(self.declare(js.text_of(name)), value)
+            return
         text = self.part(node, "value")  # before its name is in scope
-        return f"{self.declare(js.text_of(name))} = {text}"
+        if name.type == "identifier":
+            yield f"{self.declare(js.text_of(name))} = {text}"
+            return
+        names = js.pattern_items(name)
+        targets = [name if name == "_" else self.declare(name) for name in names]
+        yield f"{', '.join(targets)}, = {text}[:{len(names)}]"
+
+    def definition(self, name: str, node: Node) -> Iterator[str]:
+        """Translate an arrow function that gets a name."""
+        depths, outer, body = self.depths, self.outer, js.field(node, "body")
+        self.depths, self.outer = (*depths, len(self.scopes)), frozenset()
+        with self.function(node) as parameters:
+            if body.type == "statement_block":
+                lines = self.indented(body)
+            else:
+                lines = f"    return {self.expression(body)}"
+        yield f"def {name}({', '.join(parameters)}):"
+        if self.outer:
+            yield f"    nonlocal {', '.join(sorted(self.outer))}"
+        yield lines
+        self.depths, self.outer = depths, outer
 
     def declare(self, name: str) -> str:
         """Declare a variable, and return its name in Python, where blocks are no scopes."""
         variable = expressions.python_name(name)
-        is_in_use = name in expressions.ROOTS or any(variable in scope for scope in self.scopes)
+        is_in_use = name in expressions.ROOTS or any(
+            variable in scope for scope in self.scopes[sum(self.depths[-1:]) :]
+        )
         if not variable.isidentifier() or is_in_use:
             raise js.UntranslatableError(f"a variable `{name}`")
         self.scopes[-1].add(variable)
@@ -138,6 +179,14 @@ class _Statements(expressions.Expressions):
 
     def effect(self, node: Node) -> Iterator[str]:
         match node.type:
+            case "assignment_expression" if js.field(node, "right").type == "arrow_function":
+                path = js.dotted_name(js.field(node, "left"))
+                if not self.is_field(path):
+                    raise js.refusal(node)
+                is_taken = self.is_variable(path[1])
+                function = self.declare(f"{path[1]}_" if is_taken else path[1])
+                yield from self.definition(function, js.field(node, "right"))
+                yield f"ctx.{path[1]} = {function}"
             case "assignment_expression":
                 targets = []
                 while node.type == "assignment_expression":
@@ -147,7 +196,9 @@ class _Statements(expressions.Expressions):
             case "augmented_assignment_expression":
                 target, value = self.target(js.field(node, "left")), self.part(node, "right")
                 operator = expressions.operator_of(node)
-                if operator == "%=":
+                if operator == "??=":
+                    yield f"if missing({target}):\n    {target} = {value}"
+                elif operator == "%=":
                     yield f"{target} = np.fmod({target}, {value})"
                 elif operator in _AUGMENTED:
                     yield f"{target} {operator} {value}"
@@ -165,7 +216,10 @@ class _Statements(expressions.Expressions):
     def target(self, node: Node) -> str:
         match node.type:
             case "identifier" if self.is_variable(js.text_of(node)):
-                return expressions.python_name(js.text_of(node))
+                name = expressions.python_name(js.text_of(node))
+                if self.depths and not any(name in s for s in self.scopes[self.depths[-1] :]):
+                    self.outer |= {name}
+                return name
             case "subscript_expression":
                 return self.element(node)
             case "member_expression":
@@ -187,16 +241,37 @@ class _Statements(expressions.Expressions):
             case ("mj", _):
                 yield self.call(node)
                 return
+            case path if self.is_function(path):
+                yield self.call(node)
+                return
             case _:
                 pass
         match js.text_of(js.field(function, "property")) if "member" in function.type else "":
             case "fill" if len(values) in (1, 3):
                 array, value = self.part(function, "object"), self.expression(values[0])
                 yield f"{array}[{self.bounds(values[1:]) or ':'}] = {value}"
+            case "forEach" if len(values) == 1 and values[0].type == "arrow_function":
+                yield from self.item_loop(self.part(function, "object"), values[0])
             case "set" if len(values) in (1, 2):
                 yield self.set(self.part(function, "object"), *values)
             case _:
                 raise js.refusal(function, "a call of ")
+
+    def item_loop(self, items: str, node: Node) -> Iterator[str]:
+        """Translate what is done with each item of an array."""
+        body = js.field(node, "body")
+        if any(inner.type == "return_statement" for inner in js.walk(body)):
+            raise js.refusal(node)
+        parameters = js.parameters(node)
+        self.scopes.append(set())
+        names = [self.declare(name) for name in parameters]
+        self.counters |= set(names[1:])
+        yield f"{self.loop_over(names, items)}:"
+        if body.type == "statement_block":
+            yield self.indented(body)
+        else:
+            yield textwrap.indent("\n".join(self.effect(body)), "    ")
+        self.scopes.pop()
 
     def set(self, array: str, values: Node, offset: Node | None = None) -> str:
         if values.type == "array":

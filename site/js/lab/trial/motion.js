@@ -8,9 +8,10 @@
  * less than a hundredth of the picture's height counts as standing. The rectangles around the others are added up, on a grid.
  */
 
-import { cameraAxes, dot, isShown } from '../core/framing.js'
+import { cameraAxes, dot, Framing, isShown } from '../core/framing.js'
 
 const SECONDS = 3
+const MOMENTS = 60 // at which a run is looked at
 const LEAST = 0.01 // of the picture's height
 const [WIDE, HIGH] = [160, 100] // cells
 const SIGNS = Array.from({ length: 8 }, (_, i) => [i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1])
@@ -63,6 +64,38 @@ export class Motion {
       if (moves(k)) moments.forEach((things) => cover(cells, things[k], this.radii[k] ?? 0))
     }
     return cells.reduce((sum, cell) => sum + cell, 0) / cells.length
+  }
+}
+
+/**
+ * The same for a reader who plays what an exercise begins with, in a camera that shows all of it; null if the lab cannot run.
+ *
+ * @param {() => import('../core/lab.js').Lab} open
+ */
+export function playedShare(open) {
+  let lab = null
+  try {
+    lab = open()
+    lab.start()
+    const { camera } = lab.scene()
+    const framing = new Framing(lab, camera)
+    const motion = new Motion(lab)
+    const { start, controls, camera: placed } = lab.config
+    framing.begin()
+    const button = controls.findIndex(({ label }) => label === start)
+    if (button >= 0) lab.press(button)
+    const slice = Math.max(1, Math.round(SECONDS / MOMENTS / lab.option.timestep)) // steps
+    do {
+      framing.observe(lab)
+      motion.observe(lab)
+    } while (lab.time < motion.end && lab.step(slice).steps > 0 && lab.diverged === null)
+    const fitting = camera.orthographic ? null : framing.fit()
+    if (fitting === null) return 0
+    return motion.share(placed?.distance == null && placed?.target == null ? { ...camera, ...fitting } : camera)
+  } catch {
+    return null
+  } finally {
+    lab?.dispose()
   }
 }
 
