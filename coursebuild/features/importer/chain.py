@@ -138,7 +138,7 @@ class Chain:
             name
             for number in reasons
             for name in figures
-            if f'plt.savefig("{name}")' in self.codes[number]
+            if f'.savefig("{name}")' in self.codes[number]
         ]
         cells = [number for number in reasons if number not in imports or reasons[number]]
         numbers = (n for n in range(len(self.parts)) if n not in reasons)
@@ -155,8 +155,8 @@ class Chain:
                 head = " ".join((head, *keys, *([word[0]] if word else [])))
             if number in cells:
                 for name in figure_names:
-                    lines = f'\nplt.savefig("{name}")\nplt.close("all")'
-                    code = f"\n{code}".replace(lines, "").strip("\n")
+                    lines = rf'^[\w.]+\.savefig\("{re.escape(name)}"\)\n.*$'
+                    code = re.sub(lines, "", code, flags=re.MULTILINE).strip("\n")
                 note = f"*Not run here:* {reasons[number]}"
                 new = f"{marks.fence('python', code)}\n\n{note}" if code else note
             elif number in imports:

@@ -162,7 +162,11 @@ def _edit_links(
             case _:
                 continue
         text = texts.get(start or link)
-        if text is None or inline.mention or not span.text.startswith(start):
+        if inline.mention or not span.text.startswith(start):
+            continue
+        if text is None:
+            if anchor:  # of a lesson that is planned
+                yield Edit(span, start)
             continue
         target_anchor = text.anchors.get(anchor) or text.anchors.get(_letters(anchor)) or ""
         if anchor and target_anchor != anchor:

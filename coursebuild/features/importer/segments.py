@@ -35,6 +35,7 @@ _TITLE = re.compile(
     re.MULTILINE,
 )
 """A heading of level 1, of both forms."""
+_HEADING = re.compile(rf"{_TITLE.pattern}|^(?P<lower>\#{{2,5}})(?=[ \t])", re.MULTILINE)
 
 
 _SUMMARIES = ("description", "abstract", "subtitle")
@@ -83,17 +84,19 @@ def read_segments(text: str, name: str) -> ReadText:
         if match is not None and isinstance(value := _read_front_matter(match), dict):
             metadata, size = value, match.end()
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
-    # The first heading of level 1, and the segments without it; later ones get level 2
+    # The first heading of level 1, and the segments without it; from the next on, all go down by 1
     titles: list[str] = []
 
     def shift_heading(heading: re.Match[str]) -> str:
+        if heading["lower"]:  # what stands below a second title stays below it
+            return heading["lower"] + "#" * (len(titles) > 1)
         titles.append(heading["text"] or heading["line"] or "")
         if len(titles) == 1:
             return ""
         return f"## {heading['line']}" if heading["line"] else f"#{heading[0]}"
 
     shifted = [
-        replace(segment, text=_TITLE.sub(shift_heading, segment.text))
+        replace(segment, text=_HEADING.sub(shift_heading, segment.text))
         if segment.kind == "prose"
         else segment
         for segment in segments
