@@ -131,24 +131,14 @@ def _with_new_paths(code: str, context: LessonContext) -> str:
     lines = code.encode().split(b"\n")
     literals = [n for n in ast.walk(ast.parse(code)) if isinstance(n, ast.Constant)]
     for literal in sorted(literals, key=lambda n: (n.lineno, n.col_offset), reverse=True):
-        if not isinstance(literal.value, str) or literal.lineno != literal.end_lineno:
+        value, at = literal.value, literal.lineno - 1
+        if not isinstance(value, str) or literal.lineno != literal.end_lineno:
             continue
-        path = context.resolve_data(literal.value)
-        line, start, end = (
-            lines[literal.lineno - 1],
-            literal.col_offset,
-            literal.end_col_offset or 0,
-        )
-        if (
-            path
-            and path != literal.value
-            and line[start:end]
-            in (
-                f'"{literal.value}"'.encode(),
-                f"'{literal.value}'".encode(),
-            )
-        ):
-            lines[literal.lineno - 1] = line[:start] + f'"{path}"'.encode() + line[end:]
+        path, line = context.resolve_data(value), lines[at]
+        start, end = literal.col_offset, literal.end_col_offset or 0
+        is_plain = line[start:end] in (f'"{value}"'.encode(), f"'{value}'".encode())
+        if path and path != value and is_plain:
+            lines[at] = line[:start] + f'"{path}"'.encode() + line[end:]
             context.files.account.changed["path in a cell", "the new place of the file"] += 1
     return b"\n".join(lines).decode()
 

@@ -166,6 +166,7 @@ def _edit_links(
             continue
         if text is None:
             if anchor:  # of a lesson that is planned
+                resolve_label(link, anchor)  # which notes that no text sets it
                 yield Edit(span, start)
             continue
         target_anchor = text.anchors.get(anchor) or text.anchors.get(_letters(anchor)) or ""
