@@ -20,6 +20,7 @@ from benchmarks.generate.lesson import lesson_name, make_lesson  # noqa: E402
 
 FLAVORS = (
     "coursebuild",
+    "course_json",
     "mkdocs",
     "sphinx",
     "pelican",

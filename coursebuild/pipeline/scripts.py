@@ -122,14 +122,15 @@ def run(
     known_runs: Mapping[str, ScriptRun] | None = None,
     *,
     only_recorded: bool = False,
+    keeps_going: bool = False,
     imports: Mapping[str, frozenset[str]] = {},
 ) -> tuple[ScriptRun, ...]:
     """Return the results of scripts: remembered ones, and those of the others, which run now.
 
     `run_store` replaces that of the options. `perturbation`: with initial states moved, in the
     direction of this number. `known_runs`: results, by path, that are known to hold.
-    `only_recorded`: none runs of which nothing is recorded yet. `imports`: the modules that scripts
-    import, by path, as far as they are known.
+    `only_recorded`: none runs of which nothing is recorded yet. `keeps_going`: see `ScriptJob`.
+    `imports`: the modules that scripts import, by path, as far as they are known.
     """
     extractions, tell = tuple(scripts), options.on_result
     if tell is not None:
@@ -139,7 +140,7 @@ def run(
 
         options = replace(options, on_result=tell_provenance)
     run_store = options.run_store() if run_store is None else run_store
-    all_jobs = jobs(extractions, perturbation)
+    all_jobs = jobs(extractions, perturbation, keeps_going=keeps_going)
     norun = (script.path for script in extractions if script.script.norun)
     runs = {path: ScriptRun(path, Outcome.NORUN, 0, "", "", 0.0) for path in norun}
     runs |= {**(known_runs or {}), **recorded_runs(extractions, options)}

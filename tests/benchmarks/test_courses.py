@@ -14,6 +14,7 @@ from benchmarks.measure.running import measure_scripts
 from benchmarks.measure.tools import Places, all_tools
 from benchmarks.mistakes import describe, run, table
 from benchmarks.slips.changes import KINDS
+from coursebuild.cli import main
 from support.scratch_course import Folder
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -105,6 +106,24 @@ def test_every_flavor_has_the_whole_lesson(tmp_path: Path, course: Path, flavor:
     if flavor != "coursebuild":
         assert "{out}" not in text
         assert "lesson:" not in text
+
+
+@pytest.mark.long
+@pytest.mark.site
+def test_a_course_of_a_hundred_lessons_moves_in_without_an_edit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every construct of the flavor is in it; what is left is a block of another tool's kind."""
+    write_course(tmp_path / "old", 100, "course_json")
+    assert main(["import", str(tmp_path / "old"), "--out", str(tmp_path / "new")]) == 0
+    report = capsys.readouterr().out
+    assert "90 lessons, 0 scripts run: holds" in report
+    assert "error[" not in report and "warning[" not in report
+    left = (tmp_path / "new/IMPORT.md").read_text(encoding="utf-8").partition("## Left")[2]
+    assert set(re.findall(r"^- (.*)", left, re.MULTILINE)) == {
+        "a block `debug`, which is shown as JSON",
+        "a link to `#the-end`, which no text sets",
+    }
 
 
 def test_a_cold_build_finds_nothing_but_the_results_of_scripts(tmp_path: Path) -> None:

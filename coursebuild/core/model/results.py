@@ -54,6 +54,7 @@ class ScriptJob(Struct, frozen=True):
     """MiB that it may take, where the system can enforce that."""
     part_lines: tuple[int, ...] = ()
     """The lines of its file, from 1, at which its parts but the first begin."""
+    keeps_going: bool = False  # after a part that fails
 
 
 class Sign(enum.Enum):
@@ -308,8 +309,7 @@ class TrialLine(Struct, frozen=True):
     title: str
     lesson: str
     """Id of its lesson or page."""
-    status: str
-    """`ok`, `failed` or `untried`."""
+    status: str  # `ok`, `failed` or `untried`
     seconds: float = 0.0
     """Wall time."""
     steps_per_second: int | None = None

@@ -111,6 +111,7 @@ def inputs_of(job: ScriptJob, text: bytes, conditions: tuple[tuple[str, str], ..
         "figures that it draws": " ".join(job.figures),
         "MiB that it may take": "" if job.memory == Limits().scripts else str(job.memory),
         "lines at which its parts begin": " ".join(map(str, job.part_lines)),
+        "going on after a part that fails": "yes" if job.keeps_going else "",
         _PERTURBATION: str(job.perturbation or ""),
     }
     job_conditions += [(name, value) for name, value in options.items() if value]

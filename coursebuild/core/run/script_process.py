@@ -66,6 +66,8 @@ class Job(TypedDict):
     """The lines at which its parts but the first begin."""
     part_mark: str
     """What stands in its output between two of them, in hexadecimal digits."""
+    keeps_going: bool
+    """Whether it goes on after a part that fails."""
     perturbation: int
     """The direction in which initial states are moved (`perturbation`); 0: none;
     below, steps are changed (`step_changes.change_steps`)."""
@@ -243,9 +245,9 @@ class ScriptProcess:
             redirect_figures(job, self._environment["TMPDIR"])
         tracer.install()
         tracer.begin(standard)
-        if job["part_lines"]:
-            mark = PartMark(bytes.fromhex(job["part_mark"]))
-            return compile_parts(text, self.path, job["part_lines"], mark)
+        if job["part_lines"] or job["keeps_going"]:
+            mark, keeps_going = PartMark(bytes.fromhex(job["part_mark"])), job["keeps_going"]
+            return compile_parts(text, self.path, job["part_lines"], mark, keeps_going=keeps_going)
         return compile(text, self.path, "exec", dont_inherit=True)
 
     def _tracer(self) -> Tracer:

@@ -268,6 +268,7 @@ class _Work:
             "figures": list(job.figures),
             "part_lines": list(job.part_lines),
             "part_mark": "",
+            "keeps_going": job.keeps_going,
             "perturbation": job.perturbation,
             "memory": job.memory,
         }

@@ -104,7 +104,9 @@ _PATIENCE = 3.0
 """How many times as long a script may take when its initial states are moved."""
 
 
-def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[ScriptJob, ...]:
+def jobs(
+    extractions: Iterable[Extraction], perturbation: int = 0, *, keeps_going: bool = False
+) -> tuple[ScriptJob, ...]:
     """The jobs that run these scripts; see `ScriptJob.perturbation`, which takes longer."""
     patience = _PATIENCE if perturbation else 1.0
     return tuple(
@@ -120,6 +122,7 @@ def jobs(extractions: Iterable[Extraction], perturbation: int = 0) -> tuple[Scri
             tuple(figure.name for figure in extraction.script.figures),
             extraction.memory,
             extraction.script.part_lines,
+            keeps_going,
         )
         for extraction in extractions
     )

@@ -69,8 +69,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             quotation = marks.block_quote(_convert_nested(text, context))
             return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], quotation)
         case "=":
-            _note_change(context, "tab", _TAB)
-            return f"**{rewrite_prose(head, context)}**\n\n{_convert_nested(text, context)}"
+            return _write_tab(head, text, context)
         case "!" | "?":
             names, _, title = head.partition('"')
             name = names.split()[0]
@@ -82,10 +81,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             name, _, title = (part.strip() for part in head.partition("|"))
             match name:
                 case "tab":
-                    _note_change(context, "tab", _TAB)
-                    return (
-                        f"**{rewrite_prose(title, context)}**\n\n{_convert_nested(text, context)}"
-                    )
+                    return _write_tab(title, text, context)
                 case "html" | "define" | "":
                     return _convert_nested(text, context)
                 case _:
@@ -101,7 +97,10 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             return _convert_fence(head, text, context)
 
 
-_TAB = "a title in bold, and what it holds: pages show one tab below the other"
+def _write_tab(title: str, text: str, context: LessonContext) -> str:
+    change = "a title in bold, and what it holds: pages show one tab below the other"
+    _note_change(context, "tab", change)
+    return f"**{rewrite_prose(title, context)}**\n\n{_convert_nested(text, context)}"
 
 
 def _note_change(context: LessonContext, kind: str, change: str) -> None:

@@ -15,9 +15,9 @@ from coursebuild.features.importer.source_files import Segment, read_yaml
 _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULTILINE)
 """An option of a cell, as Quarto and as MyST write it."""
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
-_WINDOW = re.compile(r"^([ \t]*)plt\.show\(\)[ \t;]*$", re.MULTILINE)
+_WINDOW = re.compile(r"^([ \t]*)(?:plt|(?:\w+\.)?pyplot)\.show\([^()\n]*\)[ \t;]*$", re.MULTILINE)
 """What opens a window where there is none."""
-_FIGURE = re.compile(r"\b(?:plt|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
+_FIGURE = re.compile(r"\b(?:plt|pyplot|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
 _MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
@@ -38,8 +38,9 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
         return marks.fence("python", shown_code) if shown_code else ""
     code, figure = _with_new_paths(code, context), ""
     if _draws(cell, code):
-        if any(_PYPLOT.search(part) for part in (*context.parts, code)):
-            code, figure = _save_figure(cell, code, context)
+        pyplot = next(filter(None, map(_name_of_pyplot, (*context.parts, code))), "")
+        if pyplot:
+            code, figure = _save_figure(cell, code, pyplot, context)
         else:
             message = "a figure: save it in the script, and name it by `figure=`"
             context.leave("figure of a cell", message)
@@ -55,8 +56,24 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
 
 
 _PYPLOT = re.compile(
-    r"^[ \t]*(?:import matplotlib\.pyplot as plt|from matplotlib import pyplot as plt)", re.M
+    r"^[ \t]*(?:import matplotlib\.pyplot as (\w+)|from matplotlib import (pyplot)(?: as (\w+))?"
+    r"|import (matplotlib)(?:\.pyplot)?(?: as (\w+))?[ \t]*(?:[#;]|$))",
+    re.MULTILINE,
 )
+
+
+def _name_of_pyplot(code: str) -> str:
+    """Return what code calls the module that draws; empty where it does not import it."""
+    match = _PYPLOT.search(code)
+    if match is None:
+        return ""
+    alias, name, other_name, package, other_package = match.groups()
+    if package is None:
+        return alias or other_name or name
+    whole = f"{other_package or package}.pyplot"
+    return whole if whole in code else ""
+
+
 _DRAWN_TITLE = re.compile(r"\.(?:set_)?(?:sup)?title\(\s*[rf]?([\"'])((?:(?!\1).)+)\1")
 
 
@@ -71,7 +88,7 @@ def _draws(cell: Segment, code: str) -> bool:
     )
 
 
-def _save_figure(cell: Segment, code: str, context: LessonContext) -> tuple[str, str]:
+def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) -> tuple[str, str]:
     """Return code that saves what it draws, and the paragraph that shows it."""
     options = options_of(cell)
     title = _DRAWN_TITLE.search(code)
@@ -88,7 +105,7 @@ def _save_figure(cell: Segment, code: str, context: LessonContext) -> tuple[str,
     lines = code.rstrip("\n").split("\n")
     if lines[-1] == "pass":
         del lines[-1]
-    code = "\n".join((*lines, f'plt.savefig("{name}")', 'plt.close("all")'))
+    code = "\n".join((*lines, f'{pyplot}.savefig("{name}")', f'{pyplot}.close("all")'))
     return code, f"Figure: ![{alt}]({name}) {caption.rstrip()}{mark}"
 
 
@@ -114,24 +131,14 @@ def _with_new_paths(code: str, context: LessonContext) -> str:
     lines = code.encode().split(b"\n")
     literals = [n for n in ast.walk(ast.parse(code)) if isinstance(n, ast.Constant)]
     for literal in sorted(literals, key=lambda n: (n.lineno, n.col_offset), reverse=True):
-        if not isinstance(literal.value, str) or literal.lineno != literal.end_lineno:
+        value, at = literal.value, literal.lineno - 1
+        if not isinstance(value, str) or literal.lineno != literal.end_lineno:
             continue
-        path = context.resolve_data(literal.value)
-        line, start, end = (
-            lines[literal.lineno - 1],
-            literal.col_offset,
-            literal.end_col_offset or 0,
-        )
-        if (
-            path
-            and path != literal.value
-            and line[start:end]
-            in (
-                f'"{literal.value}"'.encode(),
-                f"'{literal.value}'".encode(),
-            )
-        ):
-            lines[literal.lineno - 1] = line[:start] + f'"{path}"'.encode() + line[end:]
+        path, line = context.resolve_data(value), lines[at]
+        start, end = literal.col_offset, literal.end_col_offset or 0
+        is_plain = line[start:end] in (f'"{value}"'.encode(), f"'{value}'".encode())
+        if path and path != value and is_plain:
+            lines[at] = line[:start] + f'"{path}"'.encode() + line[end:]
             context.files.account.changed["path in a cell", "the new place of the file"] += 1
     return b"\n".join(lines).decode()
 

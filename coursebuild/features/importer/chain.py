@@ -5,20 +5,45 @@ from __future__ import annotations
 import ast
 import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from textwrap import shorten
 
-from coursebuild.api import Edit, Recording, ScriptRun, Span, marks, model
+from coursebuild.api import Edit, Options, Recording, ScriptRun, Span, marks, model
+from coursebuild.core.run.packages import distributions
+from coursebuild.core.run.part_marks import FAILURE
 from coursebuild.features.importer.context import script_path_of
 from coursebuild.report.values import plural
 
 _MISSING_MODULE = re.compile(r"^ModuleNotFoundError: No module named '([\w.]+)'", re.MULTILINE)
 
 
-def missing_module(script_run: ScriptRun) -> str:
-    """Return the name of the module that a script could not import; empty for other failures."""
-    missing = _MISSING_MODULE.search(script_run.stderr)
-    return missing[1] if missing is not None else ""
+def missing_modules(text: str) -> list[str]:
+    """Return the modules that a script did not find, as its error output names them."""
+    return list(dict.fromkeys(_MISSING_MODULE.findall(text)))
+
+
+_PACKAGES = {
+    **{name: name for name in "control gymnasium jax networkx pandas scipy sympy torch".split()},
+    "PIL": "pillow",
+    "bs4": "beautifulsoup4",
+    "cv2": "opencv-python",
+    "dm_control": "dm-control",
+    "skimage": "scikit-image",
+    "sklearn": "scikit-learn",
+    "yaml": "PyYAML",
+}
+"""Packages by the modules that they bring, as they say themselves in their manuals."""
+
+
+def name_package(module: str, options: Options) -> str:
+    """Return a sentence on what brings a module that is missing, as far as that is known."""
+    top = module.partition(".")[0]
+    installed = [name for _, name, _ in distributions(options.store, [top])]
+    package = installed[0] if installed else _PACKAGES.get(top)
+    if package is None:
+        return f"the module `{module}` is missing; which package brings it is not known here"
+    return f"the module `{module}` is missing; the package `{package}` brings `{top}`"
 
 
 class Chain:
@@ -34,50 +59,60 @@ class Chain:
         self.codes = [part.code.text.strip("\n") for part in self.parts]
         self.is_of_cells = script.path == script_path_of(script.span.path)
         self.remarks: list[str] = []
-        name = re.escape(self.script.path)
-        lines = re.findall(rf'File "[^"\n]*{name}", line (\d+)', script_run.stderr)
-        starts = self.script.part_lines if self.script.parts else ()
-        self.failing = sum(start <= int(lines[0]) for start in starts) if lines else None
-        last_line = (script_run.stderr.strip().splitlines() or ["it failed"])[-1]
-        self.reason = shorten(last_line.replace("`", "'"), 200, placeholder="…")
-        self.module = missing_module(script_run)
+        self.failures: dict[int, list[str]] = {}
+        """The errors of each cell that failed."""
+        stderr = script_run.stderr
+        notes = re.findall(rf"^{FAILURE} (\d+)\n(.*)$", stderr, re.MULTILINE)
+        self._has_gone_on = bool(notes)
+        if not notes and stderr.strip():  # it ended where it failed, with a traceback
+            lines = re.findall(rf'File "[^"\n]*{re.escape(script.path)}", line (\d+)', stderr)
+            notes = [(line, stderr.strip().splitlines()[-1]) for line in lines[:1]]
+        starts = script.part_lines if script.parts else ()
+        for line, error in notes:
+            number = sum(start <= int(line) for start in starts)
+            self.failures.setdefault(number, []).append(error.replace("`", "'"))
+        self.modules = missing_modules("\n".join(error for _, error in notes))
 
-    def edits(self, *, is_prefix: bool) -> Iterator[Edit]:
-        """Yield the edits that show, and no longer run, what cannot.
+    def edits(self, keys: Sequence[str] = ()) -> Iterator[Edit]:
+        """Yield the edits that show, and no longer run, what cannot; the rest gets these keys.
 
-        `is_prefix`: all from the cell on that failed.
+        Of a run that did not go on after a failure, these are all cells from the failing one on.
         """
-        if self.failing is None or not self.is_of_cells or self.script.requires:
+        if not self.failures or not self.is_of_cells or self.script.requires:
             return
-        imports, names = self._without_module()
+        imports, names = self._without_modules()
         reasons: dict[int, str] = {}
-        if is_prefix:
-            reasons = dict.fromkeys(range(self.failing + 1, len(self.parts)), "a cell above fails")
-            reasons[self.failing] = f"`{self.reason}`"
-        else:
-            if not imports:
-                reasons[self.failing] = f"`{self.reason}`"
-                names = _bound_names(self.codes[self.failing])
-            for number in range(0 if imports else self.failing + 1, len(self.parts)):
-                code = imports.get(number, self.codes[number])
-                if missing_names := _loaded_names(code) & names:
-                    words = " and ".join(f"`{name}`" for name in sorted(missing_names))
-                    reasons[number] = f"it needs {words}"
-                    names |= _bound_names(code)
-                else:
-                    names -= _bound_names(code)
+        for number, code in enumerate(self.codes):
+            code = imports.get(number, code)
+            errors = self.failures.get(number, [])
+            if number in imports:
+                errors = [e for e in errors if not missing_modules(e)]
+            if reasons and not self._has_gone_on:
+                reasons[number] = "a cell above fails"
+            elif missing_names := _loaded_names(code) & names:
+                words = " and ".join(f"`{name}`" for name in sorted(missing_names))
+                reasons[number] = f"it needs {words}"
+            elif errors:
+                reasons[number] = f"`{shorten(errors[0], 200, placeholder='…')}`"
+            else:
+                names -= _bound_names(code)
+                continue
+            names |= _bound_names(code)
         rest = (imports.get(n, c) for n, c in enumerate(self.codes) if n not in reasons)
-        if self.module and not any(rest):
-            return  # nothing would be left of it: a key says what to install
-        yield from self._edits(reasons, imports)
+        if self.modules and not any(rest):
+            return  # nothing would be left of it: a key says what it requires
+        yield from self._edits(reasons, imports, keys)
         count = plural(len(reasons), "cell") if reasons else "an import"
-        self.remarks.append(f"{self.script.path}: {count} shown, not run: {self.reason}")
+        errors = list(dict.fromkeys(chain(*self.failures.values())))
+        rest_of_errors = f", and {plural(len(errors) - 1, 'more error')}" if errors[1:] else ""
+        error = shorten(errors[0], 200, placeholder="…")
+        self.remarks.append(f"{self.script.path}: {count} shown, not run: {error}{rest_of_errors}")
 
-    def _without_module(self) -> tuple[dict[int, str], Set[str]]:
+    def _without_modules(self) -> tuple[dict[int, str], set[str]]:
         """Return the cells that import a missing module without these imports, and their names."""
         cells: dict[int, str] = {}
         names = set[str]()
-        for number, code in enumerate(self.codes) if self.module else ():
+        for number, code in enumerate(self.codes) if self.modules else ():
             lines = code.split("\n")
             for statement in ast.parse(code).body:
                 match statement:
@@ -87,7 +122,7 @@ class Chain:
                         modules = [module]
                     case _:
                         continue
-                if any(f"{name}.".startswith(f"{self.module}.") for name in modules):
+                if any(f"{name}.".startswith(f"{m}.") for name in modules for m in self.modules):
                     names |= {a.asname or a.name.split(".")[0] for a in statement.names}
                     first, last = statement.lineno - 1, statement.end_lineno or statement.lineno
                     lines[first:last] = [""] * (last - first)
@@ -95,13 +130,15 @@ class Chain:
                 cells[number] = re.sub(r"\n{3,}", "\n\n", new).strip("\n")
         return cells, names
 
-    def _edits(self, reasons: Mapping[int, str], imports: Mapping[int, str]) -> Iterator[Edit]:
+    def _edits(
+        self, reasons: Mapping[int, str], imports: Mapping[int, str], keys: Sequence[str]
+    ) -> Iterator[Edit]:
         source, figures = self.script.span.source, [f.name for f in self.script.figures]
         figure_names = [
             name
             for number in reasons
             for name in figures
-            if f'plt.savefig("{name}")' in self.codes[number]
+            if f'.savefig("{name}")' in self.codes[number]
         ]
         cells = [number for number in reasons if number not in imports or reasons[number]]
         numbers = (n for n in range(len(self.parts)) if n not in reasons)
@@ -115,18 +152,20 @@ class Chain:
                 head = re.sub(r"\s+(?:open|folded|hidden)\b", "", head)
                 names = ",".join(name for name in figures if name not in figure_names)
                 head = re.sub(r"\s+figure=\S+", f" figure={names}" if names else "", head)
-                head = f"{head} {word[0]}" if word else head
+                head = " ".join((head, *keys, *([word[0]] if word else [])))
             if number in cells:
                 for name in figure_names:
-                    lines = f'\nplt.savefig("{name}")\nplt.close("all")'
-                    code = f"\n{code}".replace(lines, "").strip("\n")
+                    lines = rf'^[\w.]+\.savefig\("{re.escape(name)}"\)\n.*$'
+                    code = re.sub(lines, "", code, flags=re.MULTILINE).strip("\n")
                 note = f"*Not run here:* {reasons[number]}"
                 new = f"{marks.fence('python', code)}\n\n{note}" if code else note
             elif number in imports:
                 imports_alone = "\n".join(
                     line for line in code.split("\n") if line not in imports[number]
                 )
-                note = f"*Not run here:* `{self.reason}`"
+                errors = (*self.failures.get(number, ()), *chain(*self.failures.values()))
+                error = next(error for error in errors if missing_modules(error))
+                note = f"*Not run here:* `{error}`"
                 new = f"{marks.fence('python', imports_alone)}\n\n{note}"
                 if imports[number]:
                     new += f"\n\n{marks.fence(head, imports[number])}"

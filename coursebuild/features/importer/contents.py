@@ -10,11 +10,11 @@ from __future__ import annotations
 import itertools
 import posixpath
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from coursebuild.api import UsageError
-from coursebuild.features.importer.outlines import find_text, leave_entry, read_outline
+from coursebuild.features.importer.outlines import find_text, flatten, leave_entry, read_outline
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedCourse,
@@ -75,7 +75,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     levels: list[ImportedLevel] = []
     for kind, run in itertools.groupby((part for part in parts if part not in pages), type):
         if kind is ImportedText:
-            levels.append(ImportedLevel(title=title or "Lessons", lessons=tuple(_flatten(run))))
+            levels.append(ImportedLevel(title=title or "Lessons", lessons=tuple(flatten(run))))
         else:
             levels += (part for part in run if isinstance(part, ImportedLevel))
     return ImportedCourse(
@@ -145,15 +145,10 @@ def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | Im
         title = "" if find_text(label, files) else label
         heads = [ImportedText(file=path, title=title)] if path else []
         if inside and (path or (title and not _COURSE_KEYS & value.keys())):
-            lessons = tuple(_flatten([*heads, *inside]))
+            lessons = tuple(flatten([*heads, *inside]))
             yield ImportedLevel(title=title or title_of_file(path), lessons=lessons)
         else:
             yield from (*heads, *inside)
-
-
-def _flatten(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[ImportedText]:
-    for part in parts:
-        yield from (part,) if isinstance(part, ImportedText) else part.lessons
 
 
 def _read_nav(
@@ -163,7 +158,7 @@ def _read_nav(
     for entry in entries if isinstance(entries, list) else ():
         for title, value in entry.items() if isinstance(entry, Mapping) else [("", entry)]:
             if isinstance(value, list):
-                if inside := tuple(_flatten(_read_nav(value, folder, files))):
+                if inside := tuple(flatten(_read_nav(value, folder, files))):
                     yield ImportedLevel(title=str(title), lessons=inside)
             elif path := find_text(posixpath.join(folder, str(value)), files):
                 yield ImportedText(file=path, title=str(title))

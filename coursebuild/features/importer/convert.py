@@ -19,6 +19,7 @@ from coursebuild.core.files.errors import reason
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model.course import BIBLIOGRAPHY, CALLOUTS
+from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.account import Account
 from coursebuild.features.importer.blocks import convert_segment
@@ -113,16 +114,39 @@ def _plan_empty_lessons(
 
 
 def _find_models(files: SourceFiles) -> Mapping[str, str]:
-    """Return the new paths of models, and of what lies beside them, by their paths."""
+    """Return the new paths of models, and of the files that they are made of, by their paths."""
     models: dict[str, str] = {}
+    texts: dict[str, str] = {}
     for path in files:
         folders = posixpath.dirname(path).split("/")
         if "models" in folders:
             inner_folders = folders[folders.index("models") + 1 :]
             models[path] = "/".join(("models", *inner_folders, posixpath.basename(path)))
-        elif path.endswith(".xml") and b"<mujoco" in files.read(path):
-            models[path] = f"models/{posixpath.basename(path)}"
-    return models
+        if path.endswith(".xml") and b"<mujoco" in (data := files.read(path)):
+            texts[path] = data.decode("utf-8", "replace")
+    parts = {
+        path: [part for part in existing_files(files.folder, path, text) if part in files]
+        for path, text in texts.items()
+    }
+    included = {part for names in parts.values() for part in names if part in texts}
+    for path in sorted(texts, key=lambda path: path in included):  # what includes others first
+        folder = posixpath.dirname(path)
+        root = posixpath.commonpath([f"/{posixpath.dirname(p)}" for p in (path, *parts[path])])
+        inner, prefix = posixpath.relpath(f"/{path}", root), ""
+        if path not in models and f"models/{inner}" in models.values():
+            prefix = f"{to_anchor(root)}/"
+        new_folder = posixpath.dirname(models.setdefault(path, f"models/{prefix}{inner}"))
+        for part in parts[path]:
+            place = posixpath.join(new_folder, posixpath.relpath(part, folder or "."))
+            new = models.setdefault(part, posixpath.normpath(place))
+            if new != posixpath.normpath(place) or new.startswith("../"):
+                files.leave(path, f"it names `{part}`, which is now in another place", "model")
+        if path in included:
+            files.account.changed["fragment of a model", "beside the models that include it"] += 1
+        elif re.search(r"<mujocoinclude\b", texts[path]):
+            message = "a fragment of a model, which none includes: it is compiled with none"
+            files.leave(path, message, "fragment of a model")
+    return {path: new for path, new in models.items() if not new.startswith("../")}
 
 
 _WORK = re.compile(r"^[ \t]*@(?!comment|preamble)(\w+)[ \t]*\{[ \t]*([^,\s{}=]+)", re.M | re.I)

@@ -13,7 +13,7 @@ from coursebuild.features.importer.context import LessonContext
 _BRACES = r"\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
 _STATEMENT = (
     r"^(?:import[ ](?:[^\n]*[ ]from[ ])?['\"]|export[ ](?:const|let|function|default)\b)"
-    r"[^\n]*(?:\n[^\n]+)*\n?"
+    r"[^\n]*(?:\n(?!</)[^\n]+)*\n?"  # not the end of a script element
 )
 _MDX = re.compile(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
 _PART = re.compile(

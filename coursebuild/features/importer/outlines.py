@@ -204,13 +204,14 @@ def _as_list(value: object) -> list[object]:
 def _level(
     title: str, parts: Iterable[ImportedText | ImportedLevel]
 ) -> Iterator[ImportedText | ImportedLevel]:
-    lessons = [
-        text
-        for part in parts
-        for text in ((part,) if isinstance(part, ImportedText) else part.lessons)
-    ]
-    if lessons:
-        yield ImportedLevel(title=title, lessons=tuple(lessons))
+    if lessons := tuple(flatten(parts)):
+        yield ImportedLevel(title=title, lessons=lessons)
+
+
+def flatten(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[ImportedText]:
+    """Yield the lessons of levels, and those outside of any."""
+    for part in parts:
+        yield from (part,) if isinstance(part, ImportedText) else part.lessons
 
 
 def _find_doc(id: str, files: SourceFiles) -> str:

@@ -96,8 +96,10 @@ _ACTIVE = re.compile(
     r"^[ ]{0,3}<(?P<name>style|script)\b.*?</(?P=name)>[ \t]*\n?", re.DOTALL | re.M | re.I
 )
 """What changes how a page looks or what it does."""
-_CONTENTS = re.compile(r'<div class="toc">.*?</div>', re.DOTALL)
-"""What an extension of Jupyter writes into the first cell; the page has its own."""
+_CONTENTS = re.compile(
+    r'<div class="toc">.*?</div>|^(?:\[TOC\]|\[\[_?TOC_?\]\])[ \t]*$', re.DOTALL | re.M
+)
+"""What Jupyter's extension and Python's Markdown replace by a list; the page has its own."""
 
 
 _KEPT = {

@@ -162,7 +162,12 @@ def _edit_links(
             case _:
                 continue
         text = texts.get(start or link)
-        if text is None or inline.mention or not span.text.startswith(start):
+        if inline.mention or not span.text.startswith(start):
+            continue
+        if text is None:
+            if anchor:  # of a lesson that is planned
+                resolve_label(link, anchor)  # which notes that no text sets it
+                yield Edit(span, start)
             continue
         target_anchor = text.anchors.get(anchor) or text.anchors.get(_letters(anchor)) or ""
         if anchor and target_anchor != anchor:

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from coursebuild.api import UsageError
 from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
-_COLONS = re.compile(r" {0,3}(:{3,})[ \t]*(.*?)[ \t]*\n?")
+_MARK = re.compile(r" {0,3}(:{3,}|/{3,})[ \t]*(.*?)[ \t]*\n?")
 _TITLED = re.compile(
     r" {0,3}(?:===[!+]?[ \t]+([\"'])(?P<tab>.*)\1"
     r"|(?P<mark>!!!|\?{3}\+?)[ \t]+(?P<head>\w[^\n]*?))[ \t]*\n?"
@@ -35,6 +35,7 @@ _TITLE = re.compile(
     re.MULTILINE,
 )
 """A heading of level 1, of both forms."""
+_HEADING = re.compile(rf"{_TITLE.pattern}|^(?P<lower>\#{{2,5}})(?=[ \t])", re.MULTILINE)
 
 
 _SUMMARIES = ("description", "abstract", "subtitle")
@@ -83,17 +84,19 @@ def read_segments(text: str, name: str) -> ReadText:
         if match is not None and isinstance(value := _read_front_matter(match), dict):
             metadata, size = value, match.end()
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
-    # The first heading of level 1, and the segments without it; later ones get level 2
+    # The first heading of level 1, and the segments without it; from the next on, all go down by 1
     titles: list[str] = []
 
     def shift_heading(heading: re.Match[str]) -> str:
+        if heading["lower"]:  # what stands below a second title stays below it
+            return heading["lower"] + "#" * (len(titles) > 1)
         titles.append(heading["text"] or heading["line"] or "")
         if len(titles) == 1:
             return ""
         return f"## {heading['line']}" if heading["line"] else f"#{heading[0]}"
 
     shifted = [
-        replace(segment, text=_TITLE.sub(shift_heading, segment.text))
+        replace(segment, text=_HEADING.sub(shift_heading, segment.text))
         if segment.kind == "prose"
         else segment
         for segment in segments
@@ -197,55 +200,32 @@ def _find_blocks(text: str) -> Iterator[tuple[list[int], str, str, str]]:
             yield token.map, token.markup, head, token.content
 
 
-def _parse_div(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-    """Parse lines between colons, which can nest: a directive of MyST, a division of Quarto."""
+def _parse_marked(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """Parse lines between colons: a directive of MyST, a division of Quarto; or between slashes.
 
-    def match_colons(number: int) -> re.Match[str] | None:
-        return _COLONS.fullmatch(state.getLines(number, number + 1, state.blkIndent, False))
+    Colons nest by themselves; slashes, which extensions of MkDocs have, by their number.
+    """
 
-    opening = match_colons(start)
-    if opening is None or not opening[2]:
+    def match_mark(number: int) -> re.Match[str] | None:
+        return _MARK.fullmatch(state.getLines(number, number + 1, state.blkIndent, False))
+
+    opening = match_mark(start)
+    if opening is None or not re.match(r"." if opening[1][0] == ":" else r"[A-Za-z]", opening[2]):
+        return False
+    depth, last = 1, start
+    while depth and last + 1 < end:
+        last += 1
+        mark = match_mark(last)
+        if mark is not None and mark[1][0] == opening[1][0] == ":":
+            depth += 1 if mark[2] else -1
+        elif mark is not None and mark[1] == opening[1] and not mark[2]:
+            depth = 0
+    if depth and opening[1][0] == "/":
         return False
     if not silent:
-        depth, last = 1, start
-        while depth and last + 1 < end:
-            last += 1
-            if colons := match_colons(last):
-                depth += 1 if colons[2] else -1
-        token = state.push("div", "", 0)
+        token = state.push("marked", "", 0)
         token.markup, token.info = opening[1], opening[2]
         token.content = state.getLines(start + 1, last + (depth > 0), state.sCount[start], True)
-        state.line = last + 1
-        token.map = [start, state.line]
-    return True
-
-
-_SLASHES = re.compile(r" {0,3}(/{3,})[ \t]*(.*?)[ \t]*\n?")
-
-
-def _parse_slashes(state: StateBlock, start: int, end: int, silent: bool) -> bool:
-    """Parse a block between slashes, as extensions of MkDocs have it: they nest by their number."""
-
-    def match_slashes(number: int) -> re.Match[str] | None:
-        return _SLASHES.fullmatch(state.getLines(number, number + 1, state.blkIndent, False))
-
-    opening = match_slashes(start)
-    if opening is None or not re.match(r"[A-Za-z]", opening[2]):
-        return False
-    last = next(
-        (
-            number
-            for number in range(start + 1, end)
-            if (slashes := match_slashes(number)) and slashes[1] == opening[1] and not slashes[2]
-        ),
-        None,
-    )
-    if last is None:
-        return False
-    if not silent:
-        token = state.push("slashes", "", 0)
-        token.markup, token.info = opening[1], opening[2]
-        token.content = state.getLines(start + 1, last, state.sCount[start], True)
         state.line = last + 1
         token.map = [start, state.line]
     return True
@@ -275,9 +255,9 @@ def _parse_titled(state: StateBlock, start: int, end: int, silent: bool) -> bool
 
 
 _QUOTE = re.compile(r"^ {0,3}> ?")
-_BLOCKS = ("fence", "div", "slashes", "titled")
+_BLOCKS = ("fence", "marked", "titled")
 _PARSER = MarkdownIt("commonmark")
-for _name, _parse in (("div", _parse_div), ("slashes", _parse_slashes), ("titled", _parse_titled)):
+for _name, _parse in (("marked", _parse_marked), ("titled", _parse_titled)):
     _PARSER.block.ruler.before("fence", _name, _parse, {"alt": ["paragraph", "list", "blockquote"]})
 
 

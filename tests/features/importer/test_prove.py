@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -127,3 +133,128 @@ def test_a_script_gets_the_folder_that_it_writes_to(folder: Path) -> None:
     write_notebook(folder / "old/a.ipynb", f"{code};")
     assert main(["import", "old", "--out", "new", "--prove"]) == 0
     assert " writes=runs/\n" in lesson(folder / "new", "1.1-a")
+
+
+def runs_in(progress: str) -> list[int]:
+    """How often the scripts of the lessons a, b and c ran, as a command says on standard error."""
+    return [progress.count(f"  examples/l1_{number}_{name}.py: ") for number, name in NAMES]
+
+
+NAMES = ((1, "a"), (2, "b"), (3, "c"))
+
+
+def test_each_script_runs_at_most_twice_however_many_cells_fail(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failing = [f"x{number} = [][{number}]" for number in range(12)]
+    codes = [code for number, code in enumerate(failing) for code in (code, f"print({number})")]
+    write_notebook(folder / "old/a.ipynb", "x = 1", *codes, f"import {ABSENT}\nprint(7)")
+    write_notebook(folder / "old/b.ipynb", "print('fine', 1.5)")
+    write_notebook(folder / "old/c.ipynb", "print(2)", printed="2\n")
+    assert main(["import", "old", "--out", "new", "--prove"]) == 0
+    text = lesson(folder / "new", "1.1-a")
+    assert text.count("*Not run here:* `IndexError: list index out of range`") == len(failing)
+    assert all(f"```output\n{number}\n```" in text for number in range(len(failing)))
+    assert "part\nprint(7)\n```\n\n```output\n7\n```" in text
+    report = capsys.readouterr()
+    assert runs_in(report.err) == [2, 2, 2]
+    assert "not yet repeated" not in report.out
+    assert main(["-C", "new", "import", "--prove"]) == 0
+    assert runs_in(capsys.readouterr().err) == [0, 0, 0]
+
+
+def test_a_cell_that_fails_only_without_another_ends_what_is_run(folder: Path) -> None:
+    """What the failing cell had done before it failed made the one below possible."""
+    changing = "names = {}"
+    write_notebook(
+        folder / "old/a.ipynb", changing, "names.update(a=1)\n1 / 0", "print(names['a'])"
+    )
+    main(["import", "old", "--out", "new", "--prove"])
+    text = lesson(folder / "new", "1.1-a")
+    assert "print(names['a'])\n```\n\n*Not run here:* `KeyError: 'a'`" in text
+
+
+def test_an_output_that_varies_says_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    clock = (
+        "import time\nprint('mass 4.79 kg')\nprint('it took', time.perf_counter_ns() * 1e-9, 's')"
+    )
+    write_notebook(folder / "old/a.ipynb", clock)
+    write_notebook(folder / "old/b.ipynb", "import os\nprint(os.urandom(4).hex())")
+    assert main(["import", "old", "--out", "new", "--prove"]) == 0
+    assert '```output digits volatile="it took [-+.0-9a-fxE]+"\n' in lesson(folder / "new", "1.1-a")
+    assert "```output volatile\n" in lesson(folder / "new", "1.2-b")
+    out = capsys.readouterr().out
+    assert "everything holds" in out and "two runs differ, so an output is `volatile`" in out
+    path = folder / "new/content/lessons/1.1-a.md"
+    path.write_text(path.read_text().replace("\nmass 4.79", "\nmass 4.78"))
+    assert main(["-C", "new", "check"]) == 1
+
+
+def test_what_takes_long_is_recorded_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_notebook(folder / "old/a.ipynb", "print('trained')", "1 / 0")
+    write_notebook(folder / "old/b.ipynb", "print('trained')")
+    assert main(["import", "old", "--out", "new", "--prove", "--once", "0"]) == 0
+    for name in ("1.1-a", "1.2-b"):
+        assert " record=once\n" in lesson(folder / "new", name)
+    assert len([*(folder / "new/content/reports").glob("*.run.json")]) == 2
+    assert runs_in(capsys.readouterr().err) == [2, 1, 0]
+    assert main(["-C", "new", "check"]) == 0
+    assert runs_in(capsys.readouterr().err) == [0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("module", "sentence"),
+    [
+        ("sklearn.svm", "the package `scikit-learn` brings `sklearn`"),
+        (ABSENT, f"the module `{ABSENT}` is missing; which package brings it is not known here"),
+    ],
+)
+def test_a_package_is_named_only_where_it_is_known(
+    folder: Path, capsys: pytest.CaptureFixture[str], module: str, sentence: str
+) -> None:
+    write_notebook(folder / "old/a.ipynb", f"import {module}")
+    assert main(["import", "old", "--out", "new", "--prove"]) == 0
+    assert sentence in capsys.readouterr().out
+    assert f"requires={module.partition('.')[0]}" in lesson(folder / "new", "1.1-a")
+
+
+def test_text_that_says_what_is_printed_no_more_is_reported(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cells = [
+        {"cell_type": "markdown", "source": "# Mass\n\nIt weighs 4.812 kg, or 17 lb."},
+        {
+            "cell_type": "code",
+            "source": "print('mass', 4.792, 'or', 18)",
+            "outputs": [{"output_type": "stream", "name": "stdout", "text": "mass 4.812 or 17\n"}],
+        },
+    ]
+    (folder / "old").mkdir()
+    notebook = {"cells": cells, "metadata": {}, "nbformat": 4}
+    (folder / "old/a.ipynb").write_text(json.dumps(notebook))
+    assert main(["import", "old", "--out", "new", "--prove"]) == 0
+    sentence = "1.1-a.md:1 says `4.812` as was recorded, but `4.792` is printed"
+    assert sentence in capsys.readouterr().out
+    assert sentence in (folder / "new/IMPORT.md").read_text()
+
+
+def test_a_proof_that_was_killed_goes_on(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    wait = f"import os\nwhile not os.path.exists({str(folder / 'go')!r}):\n    pass"
+    write_notebook(folder / "old/a.ipynb", "print(1)")
+    write_notebook(folder / "old/b.ipynb", wait, "print(2)")
+    assert main(["import", "old", "--out", "new"]) == 0
+    command = [sys.executable, "-m", "coursebuild", "-C", "new", "import", "--prove", "--jobs", "1"]
+    progress = folder / "progress"
+    with (
+        progress.open("w") as stderr,
+        subprocess.Popen(command, stderr=stderr, start_new_session=True) as process,
+    ):
+        while not re.search("a.py: ok(.|\\n)*b.py", progress.read_text()):
+            assert process.poll() is None
+            time.sleep(0.05)
+        os.killpg(process.pid, signal.SIGKILL)
+    (folder / "go").touch()
+    capsys.readouterr()
+    assert main(["-C", "new", "import", "--prove"]) == 0
+    assert "```output\n2\n```" in lesson(folder / "new", "1.2-b")
+    assert runs_in(progress.read_text() + capsys.readouterr().err)[0] == 2

@@ -68,6 +68,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="run the scripts and write what that shows; without FOLDER, of an imported course",
     )
+    parser.add_argument(
+        "--once",
+        metavar="SECONDS",
+        type=float,
+        default=60.0,
+        help="with --prove: a script that takes longer is recorded once (default: %(default)g)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -76,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
         if not arguments.prove or arguments.out is not None:
             raise UsageError("name a FOLDER to import, or prove what was imported: --prove")
         options = options_of(arguments)
-        return print_report(_prove(options, ()), "text", options)
+        return print_report(_prove(options, (), arguments.once), "text", options)
     if arguments.root is not None:
         raise UsageError("import does not take -C: name the new course's folder with --out")
     files = SourceFiles(Path(arguments.source))
@@ -99,12 +106,14 @@ def run(arguments: argparse.Namespace) -> int:
         f"wrote {plural(len(converted.files), 'file')} to {out}",
         *converted.account.summary(),
     )
-    report = _prove(options, remarks) if arguments.prove else _examine(options, remarks)
+    report = (
+        _prove(options, remarks, arguments.once) if arguments.prove else _examine(options, remarks)
+    )
     return print_report(report, "text", options)
 
 
-def _prove(options: Options, remarks: tuple[str, ...]) -> Report:
-    new = prove(options)
+def _prove(options: Options, remarks: tuple[str, ...], most_seconds: float) -> Report:
+    new = prove(options, most_seconds)
     report = check(options)
     return replace(report, remarks=(*remarks, *new, *report.remarks), depends=None)
 

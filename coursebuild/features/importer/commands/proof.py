@@ -1,18 +1,23 @@
 """`coursebuild import --prove`: run what was imported, and write what running shows.
 
-A lesson of cells is a chain of states. A cell that cannot run is shown, with the reason, and so are
-those below it that need what it would define; all others remain parts of the script. Where only a
-module is missing, its import alone is taken out of the cell. A script that is no chain of cells
-gets keys: `requires` for a module that it misses, `timeout` where it needs more time, `writes`,
-`diverges`, `deep`.
+Each script runs once as a chain of cells: after one that fails, the next goes on. A cell that
+cannot run is then shown, with the reason, and so are those below it that need what it would
+define; all others remain parts of the script. Where only a module is missing, its import alone is
+taken out of the cell. What is left runs a second time: that bears out what is recorded, and shows
+what varies from run to run. What takes long is recorded from one run.
+
+A script gets the keys that it needs: `requires`, `timeout`, `record=once`, `writes`, `diverges`,
+`deep`; an output `volatile`.
 """
 
 from __future__ import annotations
 
 import math
 import posixpath
+import re
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from textwrap import shorten
 
 from msgspec.structs import replace
@@ -23,6 +28,7 @@ from coursebuild.api import (
     Excerpt,
     Options,
     Outcome,
+    Recording,
     ScriptRun,
     Source,
     Span,
@@ -31,15 +37,16 @@ from coursebuild.api import (
     model,
 )
 from coursebuild.core.files.write import FileChange
+from coursebuild.core.model import Table
 from coursebuild.core.model.results import Change, EffectKind, Sign
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
-from coursebuild.core.scripts.extract import Extraction
+from coursebuild.core.scripts.extract import Extraction, jobs
 from coursebuild.core.values import fingerprint
-from coursebuild.features.importer.chain import Chain, missing_module
+from coursebuild.features.importer.chain import Chain, name_package
 from coursebuild.features.importer.convert import change_tried_lessons
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.recordings import read_recorded, write_figures
+from coursebuild.pipeline.recordings import read_recorded, record_runs, write_figures
 from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs
 from coursebuild.pipeline.scripts import run as run_scripts
 from coursebuild.report.values import plural
@@ -47,56 +54,152 @@ from coursebuild.report.values import plural
 NOTEBOOK_OUTPUT = "notebook-output"
 """The kind of entries that say: this is recorded in a notebook, and may be replaced."""
 _LONG_TIMEOUT = 900.0
-"""Seconds allowed in the second run of a script that exceeded the usual time."""
+"""Seconds that a script may take here, if it does not say itself."""
 _TIME_FACTOR = 3.0
 """A script's new time limit, as a multiple of the time it took here."""
-_ROUNDS = 8
-"""How often cells are taken out of a script; the last time, all from the failing one on."""
 _HEADING = "\n## What running showed\n\n"
 
 
-def prove(options: Options) -> tuple[str, ...]:
+def prove(options: Options, most_seconds: float) -> tuple[str, ...]:
     """Run the scripts of an imported course, and write what that shows into its files.
 
-    Returns remarks on what is new. Scripts whose runs are remembered do not run again.
+    What takes more than `most_seconds` is recorded once. Returns remarks on what is new. Scripts
+    whose runs are remembered do not run again.
     """
+    course = _load(options)
+    if course is None:
+        return ()
+    scripts = extract_scripts(course, options).runnable
+    first_runs = _run_first(course, scripts, options)
     remarks: list[str] = []
-    for number in range(_ROUNDS + 1):
-        course = _load(options)
-        if course is None:
-            return tuple(remarks)
-        scripts = extract_scripts(course, options).runnable
-        runs = _run(course, scripts, options)
-        edits: dict[Source, list[Edit]] = {}
-        for extraction, script_run in runs:
-            if script_run.outcome is Outcome.FAILED and number < _ROUNDS:
-                is_last = number == _ROUNDS - 1
-                recordings = recorded_outputs(course)
-                chain = Chain(extraction.script, script_run, recordings)
-                changes = [*chain.edits(is_prefix=is_last)]
-                if changes:
-                    edits.setdefault(extraction.script.span.source, []).extend(changes)
-                    remarks += chain.remarks
-        if not edits:
-            break
-        _write(options, edits)
-    assert course is not None  # it was read in each round
-    edits = {}
-    for extraction, script_run in runs:
-        script = extraction.script
-        changes = edits.setdefault(script.span.source, [])
-        keys = " ".join(_missing_keys(script, script_run))
-        if keys:
-            end = script.span.first_line().end
-            changes.append(Edit(Span(script.span.source, end, end), f" {keys}"))
-            remarks.append(f"{script.path} got `{keys}`")
-        if script_run.outcome is Outcome.OK:
-            changes += _record_outputs(extraction.script, script_run, course, options, remarks)
+    edits = defaultdict[Source, list[Edit]](list)
+    changed_paths = set[str]()
+    for extraction in scripts:
+        script, script_run = extraction.script, first_runs[extraction.path]
+        keys = [*_missing_keys(script, script_run, most_seconds)]
+        cells, cell_edits = _show_failing_cells(script, script_run, course, keys, remarks)
+        if cell_edits:
+            changed_paths.add(script.path)
+            edits[script.span.source] += cell_edits
+        else:
+            keys += _divergence_keys(script, script_run)
+            if cells.modules and not script.requires:
+                keys.insert(0, f"requires={','.join(cells.modules)}")
+            edits[script.span.source] += _add_keys(script, keys, remarks)
+        remarks += (f"{script.path}: {name_package(m, options)}" for m in cells.modules)
+        if cell_edits or script_run.outcome is Outcome.OK:
+            edits[script.span.source] += _record_outputs(
+                script, script_run, course, options, remarks, cells.failures if cell_edits else ()
+            )
     _write(options, edits)
-    figures, _ = write_figures(course, None, [run for _, run in runs], options, dry_run=False)
-    remarks += figures
+    _run_again(first_runs, changed_paths, options, remarks)
     _write_remarks(options, remarks)
     return tuple(remarks)
+
+
+def _run_first(
+    course: Course, scripts: Sequence[Extraction], options: Options
+) -> Mapping[str, ScriptRun]:
+    """Run scripts once, each with much time, and on after a part that fails."""
+    store = options.run_store()
+    pairs = zip(jobs(scripts), scripts, strict=True)
+    old_runs = store.get_runs([store.inputs(job, extraction.data) for job, extraction in pairs])
+    known_runs = {path: run for path, run in old_runs.items() if run.outcome is Outcome.OK}
+    patient = [
+        extraction
+        if "timeout=" in extraction.script.span.first_line().text
+        else replace(extraction, script=replace(extraction.script, timeout=_LONG_TIMEOUT))
+        for extraction in scripts
+    ]
+    runs = run_scripts(course, patient, options, known_runs=known_runs, keeps_going=True)
+    return {run.path: run for run in runs}
+
+
+def _run_again(
+    first_runs: Mapping[str, ScriptRun],
+    changed_paths: Collection[str],
+    options: Options,
+    remarks: list[str],
+) -> None:
+    """Run once more what has changed, and what is recorded from its only run; write what differs.
+
+    Of a script that was whole in the first run as well, what differs varies from run to run.
+    """
+    course = _load(options)
+    assert course is not None  # it was read before
+    scripts = extract_scripts(course, options).runnable
+    whole_runs = [run for path, run in first_runs.items() if path not in changed_paths]
+    record_runs(scripts, whole_runs, options)
+    remarks += write_figures(course, None, whole_runs, options, dry_run=False)[0]
+    recordings = defaultdict[str, list[Recording]](list)
+    for recording in recorded_outputs(course):
+        recordings[recording.script or ""].append(recording)
+    again = [
+        extraction
+        for extraction in scripts
+        if extraction.path in changed_paths
+        or (
+            (run := first_runs[extraction.path]).outcome is Outcome.OK
+            and run.unrepeated
+            and not extraction.script.once
+            and (recordings[extraction.path] or extraction.script.figures)
+        )
+    ]
+    if not again:
+        return
+    store = options.run_store()  # for what is recorded as varying
+    store.begin()
+    run_options = replace(options, long=True, on_start=lambda path, _: store.note_start(path))
+    fresh = options.run_store(fresh=True)
+    runs = run_scripts(course, again, run_options, "running scripts again", fresh)
+    edits = defaultdict[Source, list[Edit]](list)
+    for extraction, script_run in zip(again, runs, strict=True):
+        script, changes = extraction.script, edits[extraction.script.span.source]
+        varying = []
+        if script_run.outcome is Outcome.OK and script.path not in changed_paths:
+            first = first_runs[script.path]
+            varying = [*_mark_varying(recordings[script.path], course, first, script_run)]
+            if varying:
+                changes += varying
+                remarks.append(f"{script.path}: two runs differ, so an output is `volatile`")
+                (job,) = jobs([extraction])
+                kept_run = replace(script_run, unrepeated=False, provenance=None)
+                store.put_run(store.inputs(job, extraction.data), kept_run)
+        cells, cell_edits = _show_failing_cells(script, script_run, course, [], remarks)
+        changes += cell_edits
+        if not cell_edits:
+            keys = [*_missing_keys(script, script_run, math.inf)]
+            keys += _divergence_keys(script, script_run)
+            changes += _add_keys(script, keys, remarks)
+        if (cell_edits or script_run.outcome is Outcome.OK) and not varying:
+            end = min(cells.failures, default=None)
+            later = range(end, len(cells.parts)) if end is not None else ()
+            changes += _record_outputs(script, script_run, course, options, remarks, later)
+    _write(options, edits)
+    record_runs(again, runs, options)
+    remarks += write_figures(course, None, runs, options, dry_run=False)[0]
+
+
+def _show_failing_cells(
+    script: model.Script,
+    script_run: ScriptRun,
+    course: Course,
+    keys: Sequence[str],
+    remarks: list[str],
+) -> tuple[Chain, list[Edit]]:
+    """Return the cells of a script, and the edits that show those that cannot run."""
+    recordings = recorded_outputs(course) if script_run.outcome is Outcome.FAILED else []
+    cells = Chain(script, script_run, recordings)
+    edits = [*cells.edits(keys)] if script_run.outcome is Outcome.FAILED else []
+    remarks += cells.remarks
+    return cells, edits
+
+
+def _add_keys(script: model.Script, keys: Sequence[str], remarks: list[str]) -> Iterator[Edit]:
+    if keys:
+        end = script.span.first_line().end
+        yield Edit(Span(script.span.source, end, end), f" {' '.join(keys)}")
+        remarks.append(f"{script.path} got `{' '.join(keys)}`")
 
 
 def keep_notebook_outputs(outputs: Sequence[tuple[str, str]], store: Store) -> None:
@@ -130,44 +233,36 @@ def _write_remarks(options: Options, remarks: Sequence[str]) -> None:
         change_tried_lessons(options.root, changes, options.store)
 
 
-def _run(
-    course: Course, scripts: Sequence[Extraction], options: Options
-) -> list[tuple[Extraction, ScriptRun]]:
-    """Run the scripts, those that took too long once more with more time."""
-    runs = list(zip(scripts, run_scripts(course, scripts, options), strict=True))
-    slow = [extraction for extraction, run in runs if run.outcome is Outcome.TIMEOUT]
-    retried = [replace(e, script=replace(e.script, timeout=_LONG_TIMEOUT)) for e in slow]
-    reruns = {
-        run.path: run for run in run_scripts(course, retried, options, "running slow scripts")
-    }
-    return [(extraction, reruns.get(extraction.path, run)) for extraction, run in runs]
-
-
-def _missing_keys(script: model.Script, script_run: ScriptRun) -> Iterator[str]:
+def _missing_keys(
+    script: model.Script, script_run: ScriptRun, most_seconds: float
+) -> Iterator[str]:
     """Yield the keys that a script's fence needs after this run, as `key=value`."""
-    module = missing_module(script_run) if script_run.outcome is Outcome.FAILED else ""
-    if module and not script.requires:
-        yield f"requires={module}"
     if script_run.outcome is Outcome.TIMEOUT:
         yield "norun"
     limit = script_run.seconds * _TIME_FACTOR
-    is_slow = script_run.outcome is Outcome.OK and limit > script.timeout
-    if is_slow and "timeout=" not in script.span.first_line().text:
+    has_time = "timeout=" in script.span.first_line().text
+    did_end = script_run.outcome in (Outcome.OK, Outcome.FAILED) and not script_run.recorded
+    if did_end and script_run.seconds > most_seconds and not (has_time or script.once):
+        yield "record=once"
+    if did_end and limit > script.timeout and not has_time:
         yield f"timeout={math.ceil(limit / 10) * 10}"
-    trace = script_run.trace
-    signs = {d.sign for d in trace.divergences} if trace is not None else set()
-    if signs - {Sign.CONTACT} and not script.diverges:
-        yield "diverges"
-    if Sign.CONTACT in signs and not script.deep:
-        yield "deep"
     folders = {
         f"{posixpath.dirname(effect.target)}/"
-        for effect in (trace.effects if trace is not None else ())
+        for effect in (script_run.trace.effects if script_run.trace is not None else ())
         if effect.kind is EffectKind.WRITE and not effect.target.startswith(("/", ".."))
         if posixpath.dirname(effect.target)
     }
     if folders and not script.writes:
         yield f"writes={','.join(sorted(folders))}"
+
+
+def _divergence_keys(script: model.Script, script_run: ScriptRun) -> Iterator[str]:
+    divergences = script_run.trace.divergences if script_run.trace is not None else ()
+    signs = {divergence.sign for divergence in divergences}
+    if signs - {Sign.CONTACT} and not script.diverges:
+        yield "diverges"
+    if Sign.CONTACT in signs and not script.deep:
+        yield "deep"
 
 
 # --- what a script printed
@@ -179,33 +274,37 @@ def _record_outputs(
     course: Course,
     options: Options,
     remarks: list[str],
+    failing_parts: Container[int],
 ) -> Iterator[Edit]:
-    """Yield the edits that write what a script printed where nothing or a notebook's is recorded.
+    """Yield the edits that write what a script printed where nothing or an import's is recorded.
 
-    Of a notebook's outputs, those that do not hold here are replaced, with a remark.
+    Of the outputs that an import wrote, those that do not hold here are replaced, with a remark.
     """
     recordings = [r for r in recorded_outputs(course) if r.script == script.path]
     for recording in recordings:
         comparison = course.comparison_of(recording)
         printed = script_run.output_of(recording.part)
-        verdict = compare(recording, comparison, printed)
         text = recording.body.text if isinstance(recording.body, Excerpt) else ""
+        changes = compare(recording, comparison, printed).changes
         entry = fingerprint((script.path, text.strip()))
-        is_notebook = options.store.peek(NOTEBOOK_OUTPUT, entry, bytes) is not None
-        if text.strip() and not (is_notebook and verdict.changes):
+        is_imported = options.store.peek(NOTEBOOK_OUTPUT, entry, bytes) is not None
+        if recording.part in failing_parts or (text.strip() and not (is_imported and changes)):
             continue
         edit = update_body(recording, comparison, printed)
         if isinstance(edit, Edit):
             yield edit
+            keep_notebook_outputs([(script.path, printed)], options.store)
             if text.strip():
-                remarks.append(f"{recording.span.path}: {_describe_changes(verdict.changes)}")
+                remarks.append(f"{recording.span.path}: {_describe_changes(changes)}")
+                remarks += _find_old_numbers(recording, changes, printed)
     for part, block in enumerate(script.parts or (script,)):
         printed = script_run.output_of(part)
         is_recorded = any(recording.part == part for recording in recordings)
-        if printed.strip() and not is_recorded:
+        if printed.strip() and not is_recorded and part not in failing_parts:
             end, text = block.span.end, marks.fence("output", printed.rstrip("\n"))
             below = textwrap.indent(f"\n\n{text}", block.prefix, lambda line: True)
             yield Edit(Span(block.span.source, end, end), below.removeprefix(block.prefix))
+            keep_notebook_outputs([(script.path, printed)], options.store)
 
 
 def _describe_changes(changes: Sequence[Change]) -> str:
@@ -220,3 +319,71 @@ def _describe_changes(changes: Sequence[Change]) -> str:
         "the recorded output does not hold here and is replaced: "
         f"{recorded} was recorded, {printed} is printed{rest}"
     )
+
+
+def _find_old_numbers(
+    recording: Recording, changes: Sequence[Change], printed: str
+) -> Iterator[str]:
+    """Yield the places of a text that say a number which was recorded, and is printed no more."""
+    source, body = recording.span.source, recording.body_span
+    for change in changes:
+        digits = re.sub(r"\D", "", change.recorded)
+        pattern = rf"(?<![\w.]){re.escape(change.recorded)}(?![\w]|\.\d)"
+        if change.relative_error is None or len(digits) < 3 or re.search(pattern, printed):
+            continue  # no number, or one that stands elsewhere by accident, or is still printed
+        for match in re.finditer(pattern, source.text):
+            if not body.start <= match.start() < body.end:
+                place = f"{source.path}:{source.position(match.start())[0]}"
+                old, new = change.recorded, change.printed
+                yield f"{place} says `{old}` as was recorded, but `{new}` is printed"
+
+
+# --- what varies from run to run
+
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?|[-+]?\.\d+(?:[eE][-+]?\d+)?|0x[0-9a-f]+")
+_ANY_NUMBER = r"[-+.0-9a-fxE]+"
+_WORDS_BEFORE = re.compile(r"[^\W\d](?:[^\W\d]|[ .,:;=()/%-])*\Z")
+_MOST_PATTERNS = 4
+
+
+def _mark_varying(
+    recordings: Iterable[Recording], course: Course, first: ScriptRun, second: ScriptRun
+) -> Iterator[Edit]:
+    """Yield the edits that say which recorded outputs are not the same in two runs of a script."""
+    for recording in recordings:
+        texts = [run.output_of(recording.part) for run in (first, second)]
+        comparison = course.comparison_of(recording)
+        results = [compare(recording, comparison, text).changes for text in texts]
+        is_borne_out = not all(results)
+        if texts[0] == texts[1] or not any(results) or recording.comparison is not None:
+            continue
+        if isinstance(recording.body, Table):
+            continue
+        pattern = varying_pattern(*texts)
+        at = recording.body_span.start - 1  # the end of the line that opens the fence
+        place = Span(recording.span.source, at, at)
+        if pattern:
+            yield Edit(place, f' digits volatile="{pattern}"')
+        elif is_borne_out:
+            yield Edit(place, " volatile")
+
+
+def varying_pattern(first: str, second: str) -> str:
+    """Return a pattern of the numbers that differ in two outputs, with the words before them.
+
+    Empty where the outputs differ in anything else, or where nothing would be left to compare.
+    """
+    patterns = dict[str, None]()
+    if _NUMBER.split(first) != _NUMBER.split(second):
+        return ""
+    for number, changed in zip(_NUMBER.finditer(first), _NUMBER.finditer(second), strict=True):
+        if number[0] == changed[0]:
+            continue
+        words = _WORDS_BEFORE.search(first, 0, number.start())
+        if words is None:
+            return ""
+        patterns[re.sub(r"([.()])", r"[\1]", words[0]) + _ANY_NUMBER] = None
+    pattern = "|".join(patterns)
+    rest = re.sub(pattern, "", first)
+    is_enough = len(patterns) <= _MOST_PATTERNS and re.search(r"\w{2}", rest) is not None
+    return pattern if is_enough and rest == re.sub(pattern, "", second) else ""

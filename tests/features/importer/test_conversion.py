@@ -1,0 +1,95 @@
+"""What of a course is converted in ways that need more than one place to be seen."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from coursebuild.features.importer.convert import ConvertedCourse, convert
+from coursebuild.features.importer.source_files import SourceFiles
+
+MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+BASE = '<mujoco><asset><mesh name="m" file="m.obj"/></asset></mujoco>'
+ROBOT = """<mujoco>
+  <compiler meshdir="../meshes"/>
+  <include file="parts/base.xml"/>
+  <worldbody><body><freejoint/><geom type="mesh" mesh="m"/></body></worldbody>
+</mujoco>"""
+
+
+def convert_files(folder: Path, files: dict[str, str]) -> ConvertedCourse:
+    for name, text in files.items():
+        path = folder / "old" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    return convert(SourceFiles(folder / "old"))
+
+
+def account_of(course: ConvertedCourse) -> str:
+    return course.files["IMPORT.md"].decode()
+
+
+@pytest.mark.parametrize("folder", ["robots/arm", "content/models"])
+def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str) -> None:
+    above = folder.rpartition("/")[0]
+    course = convert_files(
+        tmp_path,
+        {
+            "one.md": "# One\n\nText.\n",
+            f"{folder}/arm.xml": ROBOT,
+            f"{folder}/parts/base.xml": BASE,
+            f"{above}/meshes/m.obj": MESH,
+            "other/arm.xml": "<mujoco model='other'/>",
+            "loose/part.xml": "<mujocoinclude><asset/></mujocoinclude>",
+        },
+    )
+    for path, data in course.files.items():
+        (tmp_path / "new" / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "new" / path).write_bytes(data)
+    arms = [path for path in course.files if path.endswith("arm.xml")]
+    models = [mujoco.MjModel.from_xml_path(str(tmp_path / "new" / path)) for path in arms]
+    assert sorted(model.nmesh for model in models) == [0, 1]
+    account = account_of(course)
+    assert "- fragment of a model: beside the models that include it (1 time)" in account
+    assert "a fragment of a model, which none includes" in account
+    assert "used by no text" not in account
+
+
+def test_links_to_places_of_a_planned_lesson_lead_to_the_lesson(tmp_path: Path) -> None:
+    lessons = [{"id": "1.1", "title": "One", "file": "one.md"}, {"id": "1.2", "title": "Two"}]
+    course_map = {"title": "C", "levels": [{"id": 1, "title": "L", "lessons": lessons}]}
+    text = "# One\n\nLater: [the end](#/lesson/1.2#end) and [all](#/lesson/1.2).\n"
+    course = convert_files(tmp_path, {"course.json": json.dumps(course_map), "one.md": text})
+    lesson = course.files["content/lessons/1.1-one.md"].decode()
+    assert lesson == "Later: [the end](lesson:1.2) and [all](lesson:1.2).\n"
+
+
+def test_what_stands_below_a_second_title_stays_below_it(tmp_path: Path) -> None:
+    text = "# One\n\n[TOC]\n\n## A\n\nText.\n\n# Two\n\n## B\n\nText.\n\n### C\n\nText.\n"
+    course = convert_files(tmp_path, {"one.md": text})
+    lines = course.files["content/lessons/1.1-one.md"].decode().splitlines()
+    headings = [line for line in lines if line and line != "Text."]
+    assert headings == ["## A", "## Two", "### B", "#### C"]
+    assert "table of contents: dropped" in account_of(course)
+
+
+@pytest.mark.parametrize(
+    ("statement", "name"),
+    [
+        ("import matplotlib.pyplot as plt  # plots", "plt"),
+        ("import matplotlib as mpl", "mpl.pyplot"),
+        ("import matplotlib.pyplot", "matplotlib.pyplot"),
+        ("from matplotlib import pyplot", "pyplot"),
+    ],
+)
+def test_a_figure_is_saved_whatever_its_library_is_called(
+    tmp_path: Path, statement: str, name: str
+) -> None:
+    code = f"{statement}\n{name}.plot([1, 2])\n{name}.show(block=True)"
+    course = convert_files(tmp_path, {"one.qmd": f"# One\n\n```{{python}}\n{code}\n```\n"})
+    lesson = course.files["content/lessons/1.1-one.md"].decode()
+    saving = f'{name}.savefig("l1-1-one-1.svg")\n{name}.close("all")'
+    assert saving in lesson and ".show(" not in lesson
