@@ -100,7 +100,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
 def _write_tab(title: str, text: str, context: LessonContext) -> str:
     change = "a title in bold, and what it holds: pages show one tab below the other"
     _note_change(context, "tab", change)
-    return f"**{rewrite_prose(title, context)}**\n\n{_convert_nested(text, context)}"
+    return f"**{rewrite_prose(title, context).strip()}**\n\n{_convert_nested(text, context)}"
 
 
 def _note_change(context: LessonContext, kind: str, change: str) -> None:
@@ -187,7 +187,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     if kind in ("mjcf", *fence_names()) or (kind == "python" and "file=" in head):
         context.files.account.taken[f"block of `{kind}`"] += 1
         return marks.fence(head, text)
-    language = re.split(r"[\s,]", head.strip("{}. "), maxsplit=1)[0].rstrip("}")
+    language = re.split(r"[\s,{}]", head.strip("{}. "), maxsplit=1)[0]
     language = "" if re.search("[=#]", language) and language.lower() != "c#" else language
     if language not in highlighted_languages() and language.lower() in highlighted_languages():
         language = language.lower()

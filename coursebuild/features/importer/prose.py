@@ -21,7 +21,7 @@ from coursebuild.features.importer.roles import convert_code, convert_role, writ
 from coursebuild.features.importer.source_files import title_of_file
 
 _ATTRIBUTES = (
-    r"\{(?:[ ]*(?:#[\w:.-]+|\.[A-Za-z][\w:-]*"
+    r"\{(?:[ ]*(?:#[^\s{}\"'#]+|\.[A-Za-z][\w:-]*"
     r"|[\w:-]+=(?:\"[^\"\n]*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}"
     r"|\{:[^{}\n]*\}"
 )
@@ -92,6 +92,9 @@ _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
 """The first or last line of a block of code in a quotation or a list."""
 _COMMENT = re.compile(r"^(?:%[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE)
 """A comment of MyST, or its break between two cells."""
+_COMMENT_AS_HEADING = re.compile(
+    r"^(#{1,6})[ \t]+<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$", re.MULTILINE
+)
 _ACTIVE = re.compile(
     r"^[ ]{0,3}<(?P<name>style|script)\b.*?</(?P=name)>[ \t]*\n?", re.DOTALL | re.M | re.I
 )
@@ -172,6 +175,10 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
             account.changed[kind, "dropped: readers did not see it, or the site has its own"] += (
                 count
             )
+    text, count = _COMMENT_AS_HEADING.subn(r"\1 `\2`", text)
+    if count:
+        change = "the words of a heading that has no others: its tool replaces it"
+        account.changed["comment", change] += count
     for pattern, kind in _KEPT.items():
         if count := len(pattern.findall(text)):
             account.taken[kind] += count
@@ -391,7 +398,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             is_behind = whole[0] == "{" and re.search(r"[`\]*>:\"]$|\]\([^()]*\)$", before)
             if not (is_heading or is_whole or is_marked or is_behind):
                 return whole  # an index in a formula, a set, an argument
-            id = re.search(r"#([\w:.-]+)", whole)
+            id = re.search(r"#([^\s{}\"'#]+)", whole)
             if id is None or not (":" in id[1] or is_heading):
                 return ""
             return whole if ":" in id[1] else f" {{#{to_anchor(id[1])}}}"
