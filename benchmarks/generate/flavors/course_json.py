@@ -80,8 +80,8 @@ def write(lessons: list[Lesson], folder: Path) -> None:
                 for piece in lesson.pieces
             ),
         ]
-        chosen = (CONSTRUCTS[(number * EACH + k) % len(CONSTRUCTS)] for k in range(EACH))
-        extra = (text.format(first=lessons[0].id, next=following) for text in chosen)
+        constructs = (CONSTRUCTS[(number * EACH + k) % len(CONSTRUCTS)] for k in range(EACH))
+        extra = (text.format(first=lessons[0].id, next=following) for text in constructs)
         text = "\n\n".join((*pieces, "## More of it", *extra)) + "\n"
         write_text(folder / "content" / "lessons" / f"{lesson.name}.md", text)
     course_map = {
