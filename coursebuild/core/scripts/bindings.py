@@ -31,6 +31,7 @@ from coursebuild.core.scripts.bound_places import (
     BoundNumber,
     bound_values,
     document_bindings,
+    mark_edits,
     place_note,
     reworded_addresses,
 )
@@ -92,7 +93,21 @@ def _with_likely_scripts(
     outputs: PrintedOutputs,
     finding: Diagnostic,
 ) -> Diagnostic:
-    """A diagnostic that also says which other script may be meant."""
+    """A diagnostic that also says which other output or script may be meant."""
+    is_open = finding.rule == "binding-mismatch" and not finding.help
+    if is_open and binding.script is None and not binding.words:
+        text = BoundText.of(binding.text, binding.comma)
+        paths = {
+            verdict.recording.script or ""
+            for verdict in outputs.of_document(document)
+            if verdict.recording.span.start < binding.span.start
+            and verdict.comparison.mode is not model.Mode.VOLATILE
+            and text.is_in([outputs.text(verdict)])
+        }
+        if len(paths) == 1:
+            path = paths.pop()
+            help = f"an output further up has it: write `{{out={path}}}`"
+            return replace(finding, help=help, edits=mark_edits(binding, path))
     verdicts = [] if binding.script is not None else outputs.of_binding(binding)
     start = end_of_body(verdicts[0]) if verdicts else binding.span.start
     scripts = [  # between it and the output further up that it depends on
@@ -100,7 +115,7 @@ def _with_likely_scripts(
         for script in model.document_scripts(document)
         if start < script.span.start < binding.span.start
     ]
-    if finding.rule == "binding-mismatch" and scripts and not finding.edits:
+    if is_open and scripts:
         help = f"if `{scripts[-1].path}` prints it, record its output above the number"
         return replace(finding, help=help)
     if binding.script is not None and binding.script not in outputs.scripts:
@@ -319,6 +334,7 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     """The diagnostic of a binding at whose address stands another number now, or none."""
     binding, text = bound.binding, bound.text
     places_now = next(filter(None, map(bound.look_up, bound.groups)), [])
+    places_now.sort(key=lambda place: _distance(text.numbers, place.numbers))
     if len({text.rewrite(place) for place in places_now}) > 1:
         message = f"the places that showed `{binding.text}` have different numbers now"
         if binding.words:
