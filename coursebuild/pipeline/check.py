@@ -18,7 +18,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import change_files
-from coursebuild.core.model import Citation, Course, Script, document_scripts, find_inlines
+from coursebuild.core.model import Citation, Course, document_scripts, find_inlines
 from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.model.results import Reports, Results, TrialLine
 from coursebuild.core.pages.library import named_models
