@@ -154,7 +154,9 @@ def _check(bound: BoundNumber) -> _Finding:
         quantities = {place.quantity(binding.words) for place in places} - {None}
         return _ambiguous(bound, places) if len(quantities) > 1 else None, places
     varying = [v.recording for v in verdicts if v not in bound.steady or v.comparison.volatile]
-    if varying and (not bound.steady or bound.text.is_in(map(PrintedText.of_recording, varying))):
+    is_unsteady = bool(bound.text.numbers) and not bound.text.is_in(bound.recorded)
+    unfiltered = map(PrintedText.of_recording, varying)
+    if varying and (not bound.steady or (is_unsteady and bound.text.is_in(unfiltered))):
         message = f"`{binding.text}` is bound to an output that differs from run to run"
         help = "remove `{out}`, or narrow `volatile` so that this number is compared"
         return diagnose("binding-volatile", binding.text_span, message, help=help), ()

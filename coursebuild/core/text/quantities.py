@@ -55,10 +55,13 @@ _SYMBOL = re.compile(r"\w{1,2}|\\[a-z]+")
 _TO_NUMBER = re.compile(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
 """From the end of a label to a number, perhaps past other numbers."""
 _CELLS = (
-    re.compile(r"[^\s|;,](?:(?!\s\s|\s*[\t|;,]).)*"),
-    re.compile(r"[^\s|;,]+(?: ?[(\[][^()\[\]]*[)\]])?"),
+    re.compile(r"\u2026|[^\s|;,\u2026](?:(?!\s\s|\s*[\t|;,]|\u2026).)*"),
+    re.compile(r"\u2026|[^\s|;,\u2026]+(?: ?[(\[][^()\[\]]*[)\]])?"),
 )
-"""Cells of a row, with wide gaps or signs between them, and with single spaces."""
+"""Cells of a row, with wide gaps or signs between them, and with single spaces.
+
+`\u2026` is one, without gaps: what varies from run to run stands there.
+"""
 _RULE = re.compile(r"[\s\-=+|:─━═┼]*")
 
 
@@ -261,7 +264,7 @@ def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
     for pattern in _CELLS:
         row = [*pattern.finditer(line)]
         column = next((i for i, cell in enumerate(row) if cell.end() > start), 0)
-        if len(row) < 2 or not all(only_number(cell[0]) for cell in row[1:]):
+        if len(row) < 2 or not all(only_number(c[0]) or c[0] == "\u2026" for c in row[1:]):
             continue
         for header in reversed(above):
             cells = pattern.findall(header)
