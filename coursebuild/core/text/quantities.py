@@ -301,6 +301,6 @@ def title_of_column(line: str, start: int, header: str) -> str:
     return ""
 
 
-def _with_signs_of(other: str, line: str) -> str:
+def _with_signs_of(neighbour: str, line: str) -> str:
     """A line whose cells are parted only by signs that another one has as well."""
-    return "".join("_" if sign in "|;," and sign not in other else sign for sign in line)
+    return "".join("_" if sign in "|;," and sign not in neighbour else sign for sign in line)
