@@ -32,7 +32,7 @@ CHANGES = (
     ("0.1", "HEIGHT = 5.0 ", "HEIGHT = 6.0 "),
     ("0.3", "WAY = 0.2  # m, by", "WAY = 0.25  # m, by"),
     ("1.1", "ANGLE = 0.3 ", "ANGLE = 0.35 "),
-    ("1.2", "DURATION = 2.0 ", "DURATION = 2.5 "),
+    ("1.2", '    data.joint("elbow").qvel = 1.0 ', '    data.joint("elbow").qvel = 1.2 '),
     ("2.2", "TORQUE = 0.01 ", "TORQUE = 0.012 "),
     ("4.2", "DURATION = 20.0 ", "DURATION = 25.0 "),
     ("4.3", "SPEED = 0.5 ", "SPEED = 0.6 "),

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import change_files
-from coursebuild.core.model import Citation, Course, Script, document_scripts, find_inlines
+from coursebuild.core.model import Citation, Course, document_scripts, find_inlines
 from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.model.results import Reports, Results, TrialLine
 from coursebuild.core.pages.library import named_models
@@ -274,13 +274,11 @@ def judge(
     """Make the report of a command that began at this moment of `time.monotonic`.
 
     `documents`: the lessons and pages that it is about, by path. `strict`: warnings count as
-    errors, and so does a script that was not run, unless the map lets it pass, or was recorded from
-    its only run. `inventory`: warnings that somebody asked for, such as a list of numbers; they
-    stay warnings.
+    errors, and so does a script that was not run, unless the map lets it pass. `inventory`:
+    warnings that somebody asked for, such as a list of numbers; they stay warnings.
     """
     if strict and course is not None:
-        unrepeated = _refuse_unrepeated(course, scripts)
-        diagnostics = (*diagnostics, *_refuse_unproven(course, scripts), *unrepeated)
+        diagnostics = (*diagnostics, *_refuse_unproven(course, scripts))
     if course is None:
         lesson_count = 0
     elif documents is None:
@@ -316,7 +314,7 @@ def judge(
 
 
 def _refuse_unproven(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Diagnostic]:
-    by_path = _scripts_by_path(course)
+    by_path = {s.path: s for document in course.documents for s in document_scripts(document)}
     allowed_paths = {entry.path for entry in course.unproven}
     for line in lines:
         if line.did_run or line.path in allowed_paths:
@@ -335,23 +333,6 @@ def _refuse_unproven(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Di
             f"`{line.path}` was not run ({reason}), so nothing proves {unproven}",
             help=f'{cure}, or allow it: `unproven = ["{line.path}"]` in `[verify]` of the map',
         )
-
-
-def _scripts_by_path(course: Course) -> dict[str, Script]:
-    return {s.path: s for document in course.documents for s in document_scripts(document)}
-
-
-def _refuse_unrepeated(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Diagnostic]:
-    by_path = _scripts_by_path(course)
-    for line in lines:
-        if line.unrepeated and line.path in by_path:
-            yield diagnose(
-                "output-unrepeated",
-                by_path[line.path].span.first_line(),
-                f"the output recorded from `{line.path}` comes from its only run, "
-                "which is not yet repeated",
-                help=f"run `coursebuild check --sensitivity {line.lesson}`",
-            )
 
 
 def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnostic]:

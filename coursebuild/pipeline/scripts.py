@@ -7,7 +7,7 @@ that have no remembered result which still holds, the longest first.
 from __future__ import annotations
 
 import functools
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from msgspec import Struct
@@ -133,12 +133,12 @@ def run(
     `imports`: the modules that scripts import, by path, as far as they are known.
     """
     extractions, tell = tuple(scripts), options.on_result
+
+    def complete(run: ScriptRun) -> ScriptRun:
+        return with_provenance({run.path: run}, extractions, options, imports)[run.path]
+
     if tell is not None:
-
-        def tell_provenance(run: ScriptRun) -> None:
-            tell(with_provenance({run.path: run}, extractions, options, imports)[run.path])
-
-        options = replace(options, on_result=tell_provenance)
+        options = replace(options, on_result=lambda run: tell(complete(run)))
     run_store = options.run_store() if run_store is None else run_store
     all_jobs = jobs(extractions, perturbation, keeps_going=keeps_going)
     norun = (script.path for script in extractions if script.script.norun)
@@ -153,7 +153,7 @@ def run(
         runs |= run_store.get_runs(tuple(inputs.values()))
     jobs_to_run = [job for job in all_jobs if job.path not in runs]
     if jobs_to_run:
-        records = _Records(course, options.root)
+        records = _Records(course, options.root, complete)
         if only_recorded:
             blank = {job.path for job in jobs_to_run if records.is_blank(job.path)}
             runs |= {path: ScriptRun(path, Outcome.UNRECORDED, 0, "", "", 0.0) for path in blank}
@@ -166,8 +166,12 @@ def run(
 class _Records:
     """What is recorded of the scripts of a course."""
 
-    def __init__(self, course: Course, root: Path) -> None:
+    def __init__(
+        self, course: Course, root: Path, complete: Callable[[ScriptRun], ScriptRun]
+    ) -> None:
+        """`complete` adds to a run what it ran with, which decides how figures are compared."""
         self._course, self._read = course, functools.partial(read_recorded, root)
+        self._complete = complete
         self._outputs: dict[str, list[Recording]] = {}
         for recording in recorded_outputs(course):
             self._outputs.setdefault(recording.script or "", []).append(recording)
@@ -195,12 +199,13 @@ class _Records:
         outputs = self._outputs.get(script_run.path, ())
         figures = self._figures.get(script_run.path, ())
         comparison_of, output_of = self._course.comparison_of, script_run.output_of
+        complete_run = self._complete(script_run) if figures else script_run
         holds = all(
             compare(r, comparison_of(r), output_of(r.part)).status != "drift" for r in outputs
         ) and not any(
             finding
             for figure, record in figures
-            for finding in compare_figure(figure, script_run, self._read(figure.path), record)
+            for finding in compare_figure(figure, complete_run, self._read(figure.path), record)
         )
         return replace(script_run, unrepeated=not (holds and (outputs or figures)))
 

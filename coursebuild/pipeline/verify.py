@@ -222,14 +222,16 @@ class _ScriptRunner:
         """The scripts of which one run does not say enough, so that they should run once more.
 
         An output that has drifted though nobody edited its script may vary by itself: that is tried
-        where it is quick, and was not tried before. With `repeat`, it is tried in any case, and
-        what was recorded from the only run must be borne out.
+        where it is quick, and was not tried before; with `repeat`, in any case. With this or
+        `strict`, what was recorded from the only run must be borne out.
         """
         doubtful_paths = set[str]()
+        bears_out = repeat or self.options.strict or self.course.strict
         for line in lines:
             is_new = not line.cached and line.path not in self.store.edited_paths
             is_quick = is_new and line.seconds < _QUICK
-            if (line.status == "drift" and (repeat or is_quick)) or (repeat and line.unrepeated):
+            varies = line.status == "drift" and (repeat or is_quick)
+            if varies or (bears_out and line.unrepeated):
                 doubtful_paths.add(line.path)
         return doubtful_paths
 

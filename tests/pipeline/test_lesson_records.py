@@ -223,6 +223,7 @@ def test_figure_of_another_version_is_compared_by_what_it_draws(make: Make) -> N
     assert "the recorded figure differs" in check.out, "the same version draws the same"
     folder.replace(RECORD, version_here, '["matplotlib","3.9.0"]')
     assert folder.main("check").status == 0, "the layout of another version is not this one's"
+    assert "not yet repeated" not in folder.main("check", "--no-cache").out
     before = folder.read("content/lessons/fall.svg")
     assert folder.main("update").status == 0
     assert folder.read("content/lessons/fall.svg") == before

@@ -155,10 +155,18 @@ Figure: ![A swing of `2.006`{out} s](swing.svg) It takes `2.006 s`{out}.
 ```lab simlab
 {
   "model": "swing",
-  "title": "A swing",
+  "title": "A swing of `2.006`{out} s",
   "plots": [{"traces": [{"label": "t", "expr": "data.time"}],
              "refLines": [{"y": "`2.006`{out}", "label": "period"}]}]
 }
+```
+
+```lab plot
+title = "Lengths"
+x = {name = "r", max = 3, label = "length"}
+[[plots]]
+traces = [{label = "r", expr = "r"}]
+refLines = [{y = "`2.006`{out}", label = "at `2.006`{out} s"}]
 ```
 """
 PLACES = {
@@ -169,7 +177,10 @@ PLACES = {
     "answer": '"answer": "`{}`{{out}}"',
     "explanation": '"explain": "It takes `{}`{{out=examples/swing.py \\"period\\"}} s."',
     "option": '"options": ["`{}`{{out}} s", "less"]',
+    "title of a lab": '"title": "A swing of `{}`{{out}} s"',
     "line of a plot": '"refLines": [{{"y": "`{}`{{out}}"',
+    "line of a plot without an engine": 'refLines = [{{y = "`{}`{{out}}"',
+    "its label": 'label = "at `{}`{{out}} s"',
 }
 
 
@@ -178,7 +189,10 @@ def test_numbers_are_bound_wherever_a_course_shows_them(make: Make) -> None:
     folder = make(EVERYWHERE)
     folder.write("models/swing.xml", "<mujoco/>\n")
     summary = 'summary = "It takes `{}`{{out=examples/swing.py}} s."\n'
+    objectives = 'objectives = ["Measure `{}`{{out=examples/swing.py}} s"]\n'
     folder.replace("content/course.toml", "[course]\n", "[course]\n" + summary.format("2.006"))
+    lesson = "[[level.lesson]]\n"
+    folder.replace("content/course.toml", lesson, lesson + objectives.format("2.006"))
     folder.write("content/lessons/swing.svg", "")
     assert folder.main("update").status == 0
     check = folder.main("check")
@@ -187,16 +201,17 @@ def test_numbers_are_bound_wherever_a_course_shows_them(make: Make) -> None:
     assert folder.main("update").status == 0
     text, course_map = folder.text(folder.lesson()), folder.text("content/course.toml")
     assert [name for name, place in PLACES.items() if place.format("2.500") not in text] == []
-    assert summary.format("2.500") in course_map
+    assert summary.format("2.500") in course_map and objectives.format("2.500") in course_map
     assert folder.main("build").status == 0
     page = folder.text("public/lessons/1.1-one.html")
     assert 'alt="A swing of 2.500 s"' in page and "{out" not in page
+    assert "A swing of 2.500 s" in page and "at 2.500 s" in page
     assert "It takes 2.500 s." in folder.text("public/index.html")
     line = course_map.split("\n").index(summary.format("2.500").strip()) + 1
     explain = folder.main("explain", f"content/course.toml:{line}")
     assert "`2.500` is printed by examples/swing.py" in explain.out
     folder.write(folder.lesson(), text.replace("2.500", "2.501").replace("= 2.501", "= 2.5"))
-    folder.replace("content/course.toml", "2.500", "2.501")
+    folder.write("content/course.toml", course_map.replace("2.500", "2.501"))
     result = folder.main("check")
     lines = {line.split(":")[1] for line in result.out.split("\n") if "-->" in line}
-    assert result.out.count("error[binding-mismatch]") == len(PLACES) + 1, (lines, result.out)
+    assert result.out.count("error[binding-mismatch]") == len(PLACES) + 2, (lines, result.out)

@@ -146,7 +146,7 @@ class LessonTable(Struct, frozen=True, forbid_unknown_fields=True):
     status: Annotated[
         Literal["complete", "draft", "planned"], describe("a planned lesson has no file yet")
     ]
-    summary: Annotated[fields.Summary, describe("one sentence, for the course map")] = ""
+    summary: Annotated[str, describe("one sentence, for the course map")] = ""
     aliases: Annotated[
         tuple[fields.Text, ...], describe("other names, by which the search finds it")
     ] = ()

@@ -1,8 +1,8 @@
 """Types of fields that several declarations share, and who wrote a course, and ways through it.
 
 In the `extra` of a `Meta` are two remarks for the decoder: `text` ("blocks" or "inlines": the
-string is Markdown; "plain" or "number": it is none, but may bind numbers) and `expects` (words for
-what the pattern or the bounds allow).
+string is Markdown; "number": it may be a number that is bound) and `expects` (words for what the
+pattern or the bounds allow). Any other text without a pattern is plain, and may bind numbers.
 """
 
 from __future__ import annotations
@@ -34,9 +34,6 @@ BoundFloat: TypeAlias = Annotated[
     float, Meta(extra={"text": "number"}, extra_json_schema={"type": ["number", "string"]})
 ]
 """A number, or a text that binds one to what a script printed, as in `` `1.42`{out} ``."""
-
-Summary: TypeAlias = Annotated[str, Meta(extra={"text": "plain"})]
-"""A plain text with numbers that may be bound."""
 
 Positive: TypeAlias = Annotated[float, Meta(gt=0)]
 NotNegative: TypeAlias = Annotated[float, Meta(ge=0)]
@@ -117,7 +114,7 @@ class CoursePath(Struct, frozen=True, forbid_unknown_fields=True):
 
     title: Annotated[Text, describe("plain text")]
     lessons: Annotated[tuple[Text, ...], describe("ids of lessons in the order of reading")]
-    summary: Annotated[Summary, describe("for whom it is, or where it leads")] = ""
+    summary: Annotated[str, describe("for whom it is, or where it leads")] = ""
     picture: Annotated[
         Text | None, describe("the lesson whose picture it has; otherwise the last with one")
     ] = None

@@ -31,6 +31,7 @@ from coursebuild.core.scripts.bound_places import (
     BoundNumber,
     bound_values,
     document_bindings,
+    mark_edits,
     place_note,
     reworded_addresses,
 )
@@ -92,7 +93,21 @@ def _with_likely_scripts(
     outputs: PrintedOutputs,
     finding: Diagnostic,
 ) -> Diagnostic:
-    """A diagnostic that also says which other script may be meant."""
+    """A diagnostic that also says which other output or script may be meant."""
+    is_open = finding.rule == "binding-mismatch" and not finding.help
+    if is_open and binding.script is None and not binding.words:
+        text = BoundText.of(binding.text, binding.comma)
+        paths = {
+            verdict.recording.script or ""
+            for verdict in outputs.of_document(document)
+            if verdict.recording.span.start < binding.span.start
+            and verdict.comparison.mode is not model.Mode.VOLATILE
+            and text.is_in([outputs.text(verdict)])
+        }
+        if len(paths) == 1:
+            path = paths.pop()
+            help = f"an output further up has it: write `{{out={path}}}`"
+            return replace(finding, help=help, edits=mark_edits(binding, path))
     verdicts = [] if binding.script is not None else outputs.of_binding(binding)
     start = end_of_body(verdicts[0]) if verdicts else binding.span.start
     scripts = [  # between it and the output further up that it depends on
@@ -100,7 +115,7 @@ def _with_likely_scripts(
         for script in model.document_scripts(document)
         if start < script.span.start < binding.span.start
     ]
-    if finding.rule == "binding-mismatch" and scripts and not finding.edits:
+    if is_open and scripts:
         help = f"if `{scripts[-1].path}` prints it, record its output above the number"
         return replace(finding, help=help)
     if binding.script is not None and binding.script not in outputs.scripts:
@@ -139,7 +154,9 @@ def _check(bound: BoundNumber) -> _Finding:
         quantities = {place.quantity(binding.words) for place in places} - {None}
         return _ambiguous(bound, places) if len(quantities) > 1 else None, places
     varying = [v.recording for v in verdicts if v not in bound.steady or v.comparison.volatile]
-    if varying and (not bound.steady or bound.text.is_in(map(PrintedText.of_recording, varying))):
+    is_unsteady = bool(bound.text.numbers) and not bound.text.is_in(bound.recorded)
+    unfiltered = map(PrintedText.of_recording, varying)
+    if varying and (not bound.steady or (is_unsteady and bound.text.is_in(unfiltered))):
         message = f"`{binding.text}` is bound to an output that differs from run to run"
         help = "remove `{out}`, or narrow `volatile` so that this number is compared"
         return diagnose("binding-volatile", binding.text_span, message, help=help), ()
@@ -319,6 +336,7 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     """The diagnostic of a binding at whose address stands another number now, or none."""
     binding, text = bound.binding, bound.text
     places_now = next(filter(None, map(bound.look_up, bound.groups)), [])
+    places_now.sort(key=lambda place: _distance(text.numbers, place.numbers))
     if len({text.rewrite(place) for place in places_now}) > 1:
         message = f"the places that showed `{binding.text}` have different numbers now"
         if binding.words:

@@ -138,14 +138,18 @@ def place_note(
     if not words:
         return Note(f"`{line}`", place.span)
     target = f"{binding.script} " if binding.script else ""
+    quote = '\\"' if binding.in_string else '"'
+    edits = mark_edits(binding, f"{target}{quote}{words}{quote}")
+    return Note(f'`{{out={target}"{words}"}}` chooses `{line}`', place.span, edits)
+
+
+def mark_edits(binding: model.NumberBinding, target: str) -> tuple[Edit, ...]:
+    """The edit that writes `{out=target}` behind a bound number; none where it has no braces."""
     end = binding.text_span.end
     attribute = binding.span.source.text[end : binding.span.end]
     braces = binding.span.source.span(end + attribute.find("{"), binding.span.end)
-    quote = '\\"' if binding.in_string else '"'
-    edit = Edit(braces, f"{{out={target}{quote}{words}{quote}}}")
     is_whole = attribute.endswith("}") and "{" in attribute
-    message = f'`{{out={target}"{words}"}}` chooses `{line}`'
-    return Note(message, place.span, (edit,) if is_whole else ())
+    return (Edit(braces, f"{{out={target}}}"),) if is_whole else ()
 
 
 class BoundNumber(Struct, frozen=True, dict=True):

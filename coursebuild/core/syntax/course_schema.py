@@ -30,7 +30,6 @@ from coursebuild.core.model.fields import (
     NotNegative,
     RelativeTolerance,
     Slug,
-    Summary,
     Text,
     describe,
     matching,
@@ -208,7 +207,7 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
         Slug | None, describe("what readers' progress is kept under; without it, the title")
     ] = None
     summary: Annotated[
-        Summary, describe("one or two sentences, for the home page and search engines")
+        str, describe("one or two sentences, for the home page and search engines")
     ] = ""
     language: Annotated[
         Language, describe("the language of the lessons and the interface, as in `en` or `pt-BR`")
@@ -297,7 +296,7 @@ class LevelTable(Struct, frozen=True, forbid_unknown_fields=True):
         describe("letters and digits, as in `4` or `A`"),
     ]
     title: Annotated[Text, describe("plain text")]
-    summary: Annotated[Summary, describe("one sentence, for the course map")] = ""
+    summary: Annotated[str, describe("one sentence, for the course map")] = ""
     lesson: tuple[LessonTable, ...] = ()
 
 

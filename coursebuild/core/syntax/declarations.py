@@ -67,6 +67,10 @@ def parse_declarations(source: Source) -> Parsed[Declarations | None]:
         *decoding.diagnostics,
         *_check_scenarios(decoding),
         *_check_sweeps(decoding),
+        *(
+            diagnose("field-value", node.mark, "numbers of outputs are not bound in this file")
+            for node, _ in decoding.texts
+        ),
     ]
     for table, field, message in (
         (ScenarioTable, "name", "two scenarios have the name `{}`"),

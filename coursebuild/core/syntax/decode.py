@@ -156,13 +156,13 @@ class _Decoder:
             message = f"{format_name(name)} cannot be {format_value(node)}"
             help = f"expected: {remarks.get('expects', '')}"
             return self.report("field-value", node.mark, message, help)
-        if (kind := remarks.get("text", "plain")) != "plain":
-            self.texts.append((node, kind))
+        if "text" in remarks:
+            self.texts.append((node, remarks["text"]))
         elif (character := REORDERING.search(value)) is not None:
             message = f"U+{ord(character[0]):04X} shows the text in another order than it is read"
             return self.report("control-character", node.mark, message, "delete it")
-        elif "text" in remarks and _BOUND_NUMBER.search(value):
-            self.texts.append((node, kind))
+        elif (blank or not type.pattern) and _BOUND_NUMBER.search(value):
+            self.texts.append((node, "plain"))
             value = _BOUND_NUMBER.sub(lambda match: match["text"], value)
         return value
 

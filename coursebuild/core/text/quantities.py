@@ -55,10 +55,13 @@ _SYMBOL = re.compile(r"\w{1,2}|\\[a-z]+")
 _TO_NUMBER = re.compile(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
 """From the end of a label to a number, perhaps past other numbers."""
 _CELLS = (
-    re.compile(r"[^\s|;,](?:(?!\s\s|\s*[\t|;,]).)*"),
-    re.compile(r"[^\s|;,]+(?: ?[(\[][^()\[\]]*[)\]])?"),
+    re.compile(r"\u2026|[^\s|;,\u2026](?:(?!\s\s|\s*[\t|;,]|\u2026).)*"),
+    re.compile(r"\u2026|[^\s|;,\u2026]+(?: ?[(\[][^()\[\]]*[)\]])?"),
 )
-"""Cells of a row, with wide gaps or signs between them, and with single spaces."""
+"""Cells of a row, with wide gaps or signs between them, and with single spaces.
+
+`\u2026` is one, without gaps: what varies from run to run stands there.
+"""
 _RULE = re.compile(r"[\s\-=+|:─━═┼]*")
 
 
@@ -261,7 +264,7 @@ def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
     for pattern in _CELLS:
         row = [*pattern.finditer(line)]
         column = next((i for i, cell in enumerate(row) if cell.end() > start), 0)
-        if len(row) < 2 or not all(only_number(cell[0]) for cell in row[1:]):
+        if len(row) < 2 or not all(only_number(c[0]) or c[0] == "\u2026" for c in row[1:]):
             continue
         for header in reversed(above):
             cells = pattern.findall(header)
@@ -275,11 +278,29 @@ def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
 
 
 def title_of_column(line: str, start: int, header: str) -> str:
-    """The title in a header above the number of a row; empty where the two have other columns."""
+    """The title in a header above a number of a row, in whose cell no words stand before it.
+
+    Empty where the two have other columns. Words with single spaces may be a sentence: they are
+    titles only above a row of nothing but numbers, or where they line up with its cells.
+    """
     for pattern in _CELLS:
-        ends, titles = [cell.end() for cell in pattern.finditer(line)], pattern.findall(header)
-        column = sum(end <= start for end in ends)
-        shift = len(ends) - len(titles)  # the names of rows may have no title
-        if len(titles) > 1 and shift in (0, 1) and column >= shift:
-            return str(titles[column - shift])
+        row = [*pattern.finditer(_with_signs_of(header, line))]
+        titles = [*pattern.finditer(_with_signs_of(line, header))]
+        column = next((i for i, cell in enumerate(row) if cell.end() > start), 0)
+        shift = len(row) - len(titles)  # the names of rows may have no title
+        if column < shift or len(titles) < 2 or shift not in (0, 1):
+            continue
+        if not all(map(only_number, line[row[column].start() : start].split())):
+            continue
+        pairs = [*zip(row[shift:], titles, strict=True)]
+        are_aligned = all(a.start() == b.start() or a.end() == b.end() for a, b in pairs)
+        are_numbers = shift == 0 and all(only_number(cell[0]) for cell in row)
+        if pattern is _CELLS[0] or are_aligned or are_numbers:
+            title = titles[column - shift]
+            return header[title.start() : title.end()]
     return ""
+
+
+def _with_signs_of(neighbour: str, line: str) -> str:
+    """A line whose cells are parted only by signs that another one has as well."""
+    return "".join("_" if sign in "|;," and sign not in neighbour else sign for sign in line)

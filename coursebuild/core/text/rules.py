@@ -190,7 +190,6 @@ GROUPS: dict[str, dict[str, str]] = {
         "output-unmarked": "A text is what a script printed, but is not compared.",
         "output-noise": "Digits of an output change if initial states are moved by 1e-12.",
         "output-unstable": "Two runs of a script print different lines.",
-        "output-unrepeated": "An output was recorded from the only run of its script.",
         "output-not-updatable": "`update` cannot rewrite a recorded output.",
     },
     "Models and reports": {

@@ -102,12 +102,12 @@ def parse_lab(
         if kind == SIMLAB:
             diagnostics += check_lab(node, decoding.structs)
             lab = sim_lab(span, kind_span, node, decoding.structs, prose)
-            lab = None if lab is None else replace(lab, numbers=prose.numbers)
         elif isinstance(decoding.value, CommonLab):
             common = decoding.value
             fields = SimLab(title=common.title, height=common.height, dock=common.dock)
             note = prose.blocks(node.get("note"))
             lab = Lab(span, kind, kind_span, to_one_line(node).text, fields, note)
+    lab = None if lab is None else replace(lab, numbers=prose.numbers)
     return Parsed(None if diagnostics else lab, sort_diagnostics(diagnostics))
 
 

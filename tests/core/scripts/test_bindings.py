@@ -329,6 +329,20 @@ def test_a_title_and_the_beginning_of_a_row_choose_a_number() -> None:
         assert (mistake is None) is holds, words
 
 
+def test_words_above_a_line_are_titles_only_of_columns() -> None:
+    for printed, words, holds in (
+        ("t v w\n0.1 1.5 2.5", "w", True),
+        ("  run     v\nfirst   2.5\nlast   10.5", "v", True),
+        ("lag, added  by formula\n1.5 deg  2.5 deg", "formula", True),
+        ("h      |x|  data.time\n1 ms   1.5  2.5 s", "data.time", True),
+        ("what the balls do\nboth 1.5 and 2.5", "do", False),
+        ("reset: ctrl, mocap_pos\nservo, growth in 10 s 2.5", "mocap_pos", False),
+        ("turned by  difference\nw = 2.5     +90.0", "by", False),
+    ):
+        mistake = find_mistake(f'`2.5`{{out="{words}"}}', f"{printed}\n")
+        assert (mistake is None) is holds, (printed, mistake)
+
+
 def test_choice_in_a_quiz_is_written_as_json_needs_it() -> None:
     printed = "measured 2.5, formula 2.5\n"
     quiz = '{"id": "q", "questions": [{"kind": "open", "q": "`2.5`{out}?", "reference": "Yes."}]}'
