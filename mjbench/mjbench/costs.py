@@ -34,7 +34,7 @@ Clock: TypeAlias = Callable[[], int]
 Job: TypeAlias = Callable[[], None]
 """Does what is timed, always the same amount."""
 
-MIN_ROUNDS, MAX_ROUNDS = 8, 60
+MIN_ROUNDS, QUICK_MIN_ROUNDS, MAX_ROUNDS = 8, 3, 60
 """Rounds."""
 _BUDGET, _QUICK_BUDGET = 20e9, 2e9
 """ns after which no round begins that is not among the fewest."""
@@ -66,6 +66,7 @@ def time_jobs(
     """Time jobs, of which number `baseline` is what the others are compared with."""
     times = np.zeros((MAX_ROUNDS, len(jobs)))
     budget, began = _QUICK_BUDGET if quick else _BUDGET, clock()
+    fewest = QUICK_MIN_ROUNDS if quick else MIN_ROUNDS
     gc_was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -79,7 +80,7 @@ def time_jobs(
             order = range(len(jobs))
             for index in order if turn % 2 else reversed(order):
                 times[turn, index] = _time_job(jobs[index], repeats[index], clock)
-            if turn + 1 < MIN_ROUNDS:
+            if turn + 1 < fewest:
                 continue
             timings = _timings(times[: turn + 1] / repeats, baseline)
             widest = max((timing.ratio.half_width for timing in timings), default=0.0)

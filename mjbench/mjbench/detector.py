@@ -192,6 +192,8 @@ class Passages:
     def __init__(self, model: Any, setup: Setup = _UNBOUNDED) -> None:
         self.model, self.setup = model, setup
         self.thickness = thickness(model)
+        self._shallow = _DIPPING * self.thickness.min()
+        """What is no deeper than this is no dip into anything, m."""
         self.through: dict[tuple[int, int], float] = {}
         """Pairs that parted on the other side, and when, s."""
         self.inside: dict[tuple[int, int], Array] = {}
@@ -206,6 +208,8 @@ class Passages:
     def look(self, data: Any) -> None:
         """Look at a state whose contacts are computed."""
         if not (data.ncon or self.inside):
+            return
+        if not self.inside and data.contact.dist.min() >= -self._shallow:
             return
         present: dict[tuple[int, int], tuple[float, Array]] = {}
         geoms = data.contact.geom

@@ -173,18 +173,19 @@ def _judge_rival(
     claim = f"{rival.name} {_advantage(cost, _gain([own_ratios]), figure)}"
     if cost > 1 - _WORTH_SAYING and min(own_ratios.values()) > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, which is within what such runs differ by", False, ()
-    nearby = starts(number)
+    nearby, elsewhere = starts(number), "from starts nearby"
+    elsewhere += " or with drawn parameters" if report.drawn else ""
     if nearby is None:
-        text = f"{claim} here; whether that holds from starts nearby was not measured"
+        text = f"{claim} here; whether that holds {elsewhere} was not measured"
         return text, False, ()
     everywhere = [own_ratios, *nearby]
     gain, worse = _gain(everywhere), tuple(worse_columns(spreads(everywhere)))
     if worse:
         unresolved = unresolved_columns(pair[0], leasts)
         texts = tuple(part.text(figure, unresolved) for part in worse)
-        return f"{none}{claim} here, but from starts nearby {texts[0]}", False, texts
+        return f"{none}{claim} here, but {elsewhere} {texts[0]}", False, texts
     if cost > 1 - _WORTH_SAYING and gain.high > 1 - _WORTH_SAYING:
-        return f"{none}{claim} here, but is no better from starts nearby", False, ()
+        return f"{none}{claim} here, but is no better {elsewhere}", False, ()
     text = f"{rival.name} is better: it {_advantage(cost, gain, figure)}"
     quantity = quantity_of(report)
     if not resolved:
