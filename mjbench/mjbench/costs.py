@@ -35,7 +35,7 @@ Job: TypeAlias = Callable[[], None]
 """Does what is timed, always the same amount."""
 
 MIN_ROUNDS, QUICK_MIN_ROUNDS, MAX_ROUNDS = 8, 3, 60
-"""Rounds."""
+"""Rounds; of a first look that takes long already, fewer are enough."""
 _BUDGET, _QUICK_BUDGET = 20e9, 2e9
 """ns after which no round begins that is not among the fewest."""
 _TARGET_WIDTH = 0.01
@@ -66,7 +66,6 @@ def time_jobs(
     """Time jobs, of which number `baseline` is what the others are compared with."""
     times = np.zeros((MAX_ROUNDS, len(jobs)))
     budget, began = _QUICK_BUDGET if quick else _BUDGET, clock()
-    fewest = QUICK_MIN_ROUNDS if quick else MIN_ROUNDS
     gc_was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -80,11 +79,12 @@ def time_jobs(
             order = range(len(jobs))
             for index in order if turn % 2 else reversed(order):
                 times[turn, index] = _time_job(jobs[index], repeats[index], clock)
-            if turn + 1 < fewest:
+            is_late = clock() - began > budget
+            if turn + 1 < (QUICK_MIN_ROUNDS if quick and is_late else MIN_ROUNDS):
                 continue
             timings = _timings(times[: turn + 1] / repeats, baseline)
             widest = max((timing.ratio.half_width for timing in timings), default=0.0)
-            if widest <= _TARGET_WIDTH or clock() - began > budget:
+            if widest <= _TARGET_WIDTH or is_late:
                 break
     finally:
         if gc_was_enabled:

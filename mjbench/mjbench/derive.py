@@ -30,7 +30,7 @@ from mjbench.judge import (
     mark_luck,
     rival_row,
 )
-from mjbench.reports import Interval
+from mjbench.reports import Interval, PartFailure
 from mjbench.reports.case_report import (
     RIGHT,
     BoundaryLine,
@@ -74,7 +74,10 @@ FIGURES = (
 
 
 def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
-    """The report with all that follows from what was measured; `starts` as for `judge_setting`."""
+    """The report with all that follows from what was measured but charts.
+
+    `starts` as for `judge_setting`.
+    """
     baseline = report.own_setting
     rows = tuple(
         replace(row, name=setting_text(row.setting, baseline), idle=is_idle(row))
@@ -108,7 +111,18 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
         report = replace(report, verdict=judge_setting(report, starts))
         lines = five_lines(report)
         report = replace(report, verdict=replace(report.verdict, lines=lines))
+    return report
+
+
+def derive_charts(report: ScenarioReport) -> ScenarioReport:
+    """The report, which has its verdict, with its charts."""
     return replace(report, charts=scenario_charts(report))
+
+
+def derive_failures(report: ScenarioReport, failures: Sequence[PartFailure]) -> ScenarioReport:
+    """The report with what was not measured, which its last line tells."""
+    report = replace(report, failures=tuple(failures))
+    return replace(report, verdict=replace(report.verdict, lines=five_lines(report)))
 
 
 def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...]:

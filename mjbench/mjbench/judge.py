@@ -339,9 +339,15 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
 
     The report has its verdict already.
     """
-    row = report.own_row
+    row, failures = report.own_row, dict[str, list[str]]()
+    for failure in report.failures:
+        failures.setdefault(failure.reason, []).append(
+            failure.part.removeprefix(f"{report.name}: ")
+        )
+    missing = [f"{', '.join(names)}: {reason}" for reason, names in failures.items()]
     if row is None:
-        return ("the scene's own setting was not measured",)
+        missing.insert(0, "the scene's own setting was not measured")
+        return (f"not known: {'; '.join(missing)}",)
     quantity = quantity_of(report)
     speed = f"{setting_text(row.setting)}: "
     speed += "not timed" if row.realtime is None else f"{_rounded(row.realtime)} times real time"
@@ -358,7 +364,6 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
             error += f", and by {row.seen:.2g} with the model of contacts"
     better, *_ = report.verdict.text.split("; the scene's own error")
     lines = [speed, error + parts_text(report.parts), better, stability_text(report)]
-    missing = [f"{failure.part}: {failure.reason}" for failure in report.failures]
     if report.horizon < report.duration * (1 - 1e-9):
         missing.append(f"nothing beyond {seconds_text(report.horizon, 3)} can be predicted")
     if report.parts is None and row.parted is None and row.status == "ok":

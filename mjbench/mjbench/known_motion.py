@@ -432,6 +432,9 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
         return {"": Cone(reference, None, 0.0)}
     limits = {}
     for cone, number in CONES.items():
+        if reference.kind == "self" and model.opt.cone == number:
+            limits[cone] = reference
+            continue
         variant = with_integrator(model, Integrator.EULER, scene.timestep)
         variant.opt.cone = number
         limits[cone] = self_reference(variant, pilot, quick=quick)

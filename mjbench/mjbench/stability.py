@@ -382,7 +382,7 @@ def stable_rows(
                 model,
                 scene.scenario,
                 declared_limit if limits else None,
-                smooth=pilot.smooth,
+                smooth=pilot.smooth and not quick,  # an orbit takes longer than all the rest
                 visits=partial(_comes_near, motion, model),
             )
         ),

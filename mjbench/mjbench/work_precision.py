@@ -22,7 +22,7 @@ from mjbench import known_motion, measure, simulation
 from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
 from mjbench.costs import Clock, costs
 from mjbench.delays import loop_note
-from mjbench.derive import derive_profile, derive_scenario
+from mjbench.derive import derive_charts, derive_failures, derive_profile, derive_scenario
 from mjbench.detector import driving_force, pair_names
 from mjbench.judge import compared_rows
 from mjbench.measured_setting import Basis, measure_setting
@@ -85,8 +85,11 @@ def measure_scenario(
     states = reference.states
     largest = stable_rows(model, pilot, states, parts, quick=quick)
     notes = list(_notes(basis, largest, rows, cost_of))
-    draws = parts.collect(f"{scene.name}: drawn parameters", _measure_draws(basis, drawn, quick))
-    notes += [draw.text for draw in draws]
+    draws = list[_Draw]()
+    if drawn:
+        measured = _measure_draws(basis, drawn, quick)
+        draws = parts.collect(f"{scene.name}: drawn parameters", measured)
+        notes += [draw.text for draw in draws]
     if scene.scenario.loop is not None:
         delays = partial(loop_note, model, pilot, states)
         notes.append(parts.run(f"{scene.name}: delays", delays, ""))
@@ -134,15 +137,17 @@ def measure_scenario(
         near = partial(_nearby_ratios, basis, report, setting, quick)
         ratios = parts.run(f"{scene.name}: starts nearby", near, None)
         with_draws = partial(_drawn_ratios, draws, report, setting)
-        more = parts.run(f"{scene.name}: drawn parameters", with_draws, None)
+        more = parts.run(f"{scene.name}: drawn parameters", with_draws, None) if drawn else []
         is_known = len(draws) == len(drawn) and ratios is not None and more is not None
         return [*ratios, *more] if is_known else None
 
-    report = parts.run(f"{scene.name}: verdict", lambda: derive_scenario(report, starts), report)
+    verdict = partial(derive_scenario, report, starts)
+    report = parts.run(f"{scene.name}: verdict", verdict, report, at_once=True)
+    report = parts.run(f"{scene.name}: plots", partial(derive_charts, report), report, at_once=True)
     if profile:
         phases = partial(profile_rows, model, scene, compared_rows(report), quick=quick)
         report = derive_profile(report, parts.run(f"{scene.name}: where the time goes", phases, ()))
-    report = replace(report, failures=tuple(parts.failures))
+    report = derive_failures(report, parts.failures)
     if parts.stopped:
         raise StoppedError(report)
     return report
@@ -293,16 +298,18 @@ def _nearby_ratios(
         nudged_scenario = replace(scenario, **start)
         setup = replace(pilot.setup, scenario=nudged_scenario)
         near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
-        pair = []
-        for setting in (basis.baseline, rival):
-            base = with_setting(model, replace(basis.baseline, cone=setting.cone))
-            cone = basis.cones[setting.cone]
+        cones = {}
+        for name in {basis.baseline.cone, rival.cone}:
+            base = with_setting(model, replace(basis.baseline, cone=name))
+            cone = basis.cones[name]
             exact = known_motion.find_nearby(base, near, cone.reference, quick=quick)
             if exact is None:
                 return None
             reference = replace(cone.reference, states=exact)
-            cones = {**basis.cones, setting.cone: replace(cone, reference=reference, sticks=None)}
-            row, _ = measure_setting(replace(basis, pilot=near, cones=cones), setting)
+            cones[name] = replace(cone, reference=reference, sticks=None)
+        near_basis, pair = replace(basis, pilot=near, cones=cones), []
+        for setting in (basis.baseline, rival):
+            row, _ = measure_setting(near_basis, setting)
             if row.status != "ok":
                 return result if setting == basis.baseline else [*result, {(LOST, WHOLE): math.inf}]
             pair.append(columns_of(row, report.contact_model))
