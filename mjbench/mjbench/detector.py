@@ -167,7 +167,8 @@ def judge(
         (peaks.velocity, setup.velocity_bound, "velocities"),
     ):
         if peaks.finite and not size <= bound:
-            text = f"{subject} reached {size / bound:.3g} times what can be"
+            times = "a little more than" if size < 1.005 * bound else f"{size / bound:.3g} times"
+            text = f"{subject} reached {times} what can be"
             symptoms.append((RunStatus.SLOW_GROWTH, text))
     if peaks.finite and not peaks.energy <= setup.energy_bound:
         text = f"energy reached {peaks.energy:.3g} J, where {setup.energy_bound:.3g} J can be"
