@@ -134,12 +134,13 @@ def measure_scenario(
 
     def starts(number: int) -> Sequence[Mapping[Column, float]] | None:
         setting = report.rows[number].setting
-        near = partial(_nearby_ratios, basis, report, setting, quick)
-        ratios = parts.run(f"{scene.name}: starts nearby", near, None)
+        nearby = partial(_nearby_ratios, basis, report, setting, quick)
+        near = parts.run(f"{scene.name}: starts nearby", nearby, None)
+        if near is None or not drawn:
+            return near
         with_draws = partial(_drawn_ratios, draws, report, setting)
-        more = parts.run(f"{scene.name}: drawn parameters", with_draws, None) if drawn else []
-        is_known = len(draws) == len(drawn) and ratios is not None and more is not None
-        return [*ratios, *more] if is_known else None
+        more = parts.run(f"{scene.name}: drawn parameters", with_draws, None)
+        return None if more is None or len(draws) < len(drawn) else [*near, *more]
 
     verdict = partial(derive_scenario, report, starts)
     report = parts.run(f"{scene.name}: verdict", verdict, report, at_once=True)
