@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import resource
 import sys
 import tempfile
 import time
@@ -90,7 +91,7 @@ def _unpack(package: str, keep: Path) -> Path:
 def _measure(model: Path, report: Path, minutes: int, *, full: bool) -> bool:
     """Measure a model and print what is said of it; whether it was measured without a failure."""
     words = (str(model), "--json", "--profile", *(() if full else ("--quick",)))
-    began = time.monotonic()
+    began, before = time.monotonic(), sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
     try:
         done = gate.finish(
             gate.module_command("mjbench", *words), gate.environment(), seconds=60.0 * minutes
@@ -98,7 +99,9 @@ def _measure(model: Path, report: Path, minutes: int, *, full: bool) -> bool:
     except TimeoutError:
         print(f"\n{report.stem}: not measured in {minutes} minutes", flush=True)
         return False
-    print(f"\n{report.stem}: {(time.monotonic() - began) / 60:.1f} minutes", flush=True)
+    processor = sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]) - before
+    minutes_text = f"{(time.monotonic() - began) / 60:.1f} minutes"
+    print(f"\n{report.stem}: {minutes_text}, {processor / 60:.1f} of a processor", flush=True)
     failures = []
     if done.output:
         report.write_bytes(done.output)

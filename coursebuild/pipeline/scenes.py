@@ -162,7 +162,7 @@ def _hash_file(file: Path) -> bytes:
 
 
 _LATER: tuple[str, ...] = ("room", "stable_for", "search", "limits", "expected", "precision")
-_LATER += ("horizon_error", "act", "push", "poses")
+_LATER += ("horizon_error", "act", "push", "poses", "draw", "draws")
 _PLAIN = asdict(ScenarioTable("plain"))
 
 

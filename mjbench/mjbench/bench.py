@@ -24,7 +24,7 @@ from mjbench.declarations import (
     Place,
     parse_declarations,
 )
-from mjbench.derive import derive_sweep, known_cases
+from mjbench.derive import derive_seeds, derive_sweep, known_cases
 from mjbench.fair import fair_declarations
 from mjbench.host import Host
 from mjbench.loop import Loop, LoopError
@@ -37,7 +37,7 @@ from mjbench.reports.model_report import SceneCard, SceneReport
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.scene import ExactMotion, ExactStates, Scene, SceneError, scenes
 from mjbench.simulation import silent
-from mjbench.sweep import THREADS, measure_sweep
+from mjbench.sweep import THREADS, drawn_models, measure_sweep
 from mjbench.work_precision import measure_scenario
 
 EXACT_SECONDS = 20.0
@@ -217,10 +217,14 @@ def run_scenario(
     """
     clock = time.thread_time_ns if timed else None
     with report_errors(compiled_model.subject), one_processor():
-        scenario = compiled_model.scenarios[number]
+        scene, spec = compiled_model.scenarios[number], compiled_model.spec
+        if scene.declaration.draw and spec is None:
+            message = "a compiled model has no parameters to draw"
+            raise SceneError(message, scene.declaration.place("draw"))
         return measure_scenario(
             compiled_model.model,
-            scenario,
+            scene,
+            drawn_models(spec, scene.declaration),
             quick=quick,
             clock=clock,
             tell=host.tell,
@@ -280,6 +284,8 @@ def join_parts(
 
     `failures`: what was not measured.
     """
+    if compiled_model.subject.fair and not compiled_model.subject.declarations_path:
+        scenarios = derive_seeds(scenarios)
     report = SceneReport(
         model=compiled_model.subject.name,
         digest=compiled_model.subject.digest,

@@ -20,7 +20,7 @@ import mujoco
 
 from mjbench import bench, diet, text
 from mjbench.bench import CannotMeasureError, Subject
-from mjbench.cases import DisagreementError, measure_case
+from mjbench.cases import measure_case
 from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measure_engines
 from mjbench.host import LocalHost
 from mjbench.loop import LoopError, read_loop
@@ -53,6 +53,10 @@ timestep, and what a model could do without. `mjbench MODEL.xml` is `mjbench ben
 """
 
 
+_STOPPED = 130
+"""The exit status of a command that the user stopped."""
+
+
 class _UsageError(Exception):
     """The command cannot be done as it is given."""
 
@@ -65,13 +69,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     namespace = _parser().parse_args(words)
     try:
         status: int = namespace.run(namespace)
+    except KeyboardInterrupt:
+        print("mjbench: stopped before anything was known", file=sys.stderr)
+        return _STOPPED
     except (_UsageError, LoopError, UnknownEngineError, RecordError, OSError) as error:
         print(f"mjbench: error: {error}", file=sys.stderr)
         return 2
-    except (CannotMeasureError, DisagreementError) as error:
-        place = f"{error.place}: " if isinstance(error, CannotMeasureError) else ""
-        print(f"mjbench: error: {place}{error}", file=sys.stderr)
-        if isinstance(error, CannotMeasureError) and error.help:
+    except CannotMeasureError as error:
+        print(f"mjbench: error: {error.place}: {error}", file=sys.stderr)
+        if error.help:
             print(f"  help: {error.help}", file=sys.stderr)
         return 1
     return status
@@ -237,15 +243,18 @@ def _bench(arguments: argparse.Namespace) -> int:
         departures = scene_departures(recorded, scene, compiled_model.declarations.bench)
         _print(arguments, departures, text.departures_text(departures))
         return 1 if departures else 0
-    _print(arguments, scene, text.scene_text(scene, _style()))
-    if arguments.html is not None:
-        arguments.html.write_text(scene_page(scene), "utf-8")
+    parts = Parts()
+    words = parts.run("the text", partial(text.scene_text, scene, _style()), "")
+    page = None if arguments.html is None else parts.run("the page", partial(scene_page, scene), "")
+    _print(arguments, scene, words, [f"{f.part} was not made: {f.reason}" for f in parts.failures])
+    if page:
+        arguments.html.write_text(page, "utf-8")
     if is_stopped:
         print("mjbench: stopped; this is what is known", file=sys.stderr)
-        return 130
+        return _STOPPED
     if not scene.scenarios and scene.failures:
         return 1
-    return _record(arguments, BENCH.encode(scene))
+    return _record(arguments, BENCH.encode(scene)) or int(bool(parts.failures))
 
 
 def _measure_scene(
@@ -318,15 +327,22 @@ def _stability(arguments: argparse.Namespace) -> int:
     recorded = None
     if arguments.check is not None:
         recorded = STABILITY.decode(arguments.check.read_bytes())
-    machine, reports = this_machine(pinned=True), []
-    for problem in cases.values():
+    machine, reports, parts = this_machine(pinned=True), [], Parts()
+    for name, problem in cases.items():
         with one_processor():
-            reports.append(measure_case(problem, machine, time.thread_time_ns))
+            case = partial(measure_case, problem, machine, time.thread_time_ns)
+            report = parts.run(name, case, None)
+        reports += [] if report is None else [report]
+    failures = [f"{failure.part} was not measured: {failure.reason}" for failure in parts.failures]
     if recorded is not None:
-        departures = case_departures([c for c in recorded if c.name in cases], reports)
-        _print(arguments, departures, text.departures_text(departures))
-        return 1 if departures else 0
-    _print(arguments, reports, "\n".join(text.case_text(r, _style()) for r in reports))
+        names = {report.name for report in reports}
+        departures = case_departures([c for c in recorded if c.name in names], reports)
+        _print(arguments, departures, text.departures_text(departures), failures)
+        return 1 if departures or failures else 0
+    words = "\n".join(text.case_text(r, _style()) for r in reports)
+    _print(arguments, reports, words, failures)
+    if failures:
+        return _STOPPED if parts.stopped else 1
     return _record(arguments, STABILITY.encode(tuple(reports)))
 
 

@@ -34,8 +34,8 @@ Clock: TypeAlias = Callable[[], int]
 Job: TypeAlias = Callable[[], None]
 """Does what is timed, always the same amount."""
 
-MIN_ROUNDS, MAX_ROUNDS = 8, 60
-"""Rounds."""
+MIN_ROUNDS, QUICK_MIN_ROUNDS, MAX_ROUNDS = 8, 3, 60
+"""Rounds; of a first look that takes long already, fewer are enough."""
 _BUDGET, _QUICK_BUDGET = 20e9, 2e9
 """ns after which no round begins that is not among the fewest."""
 _TARGET_WIDTH = 0.01
@@ -79,11 +79,12 @@ def time_jobs(
             order = range(len(jobs))
             for index in order if turn % 2 else reversed(order):
                 times[turn, index] = _time_job(jobs[index], repeats[index], clock)
-            if turn + 1 < MIN_ROUNDS:
+            is_late = clock() - began > budget
+            if turn + 1 < (QUICK_MIN_ROUNDS if quick and is_late else MIN_ROUNDS):
                 continue
             timings = _timings(times[: turn + 1] / repeats, baseline)
             widest = max((timing.ratio.half_width for timing in timings), default=0.0)
-            if widest <= _TARGET_WIDTH or clock() - began > budget:
+            if widest <= _TARGET_WIDTH or is_late:
                 break
     finally:
         if gc_was_enabled:

@@ -20,6 +20,8 @@ Positive: TypeAlias = Annotated[float, Meta(gt=0)]
 Share: TypeAlias = Annotated[float, Meta(gt=0, le=1)]
 Slug: TypeAlias = Annotated[str, Meta(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
 Text: TypeAlias = Annotated[str, Meta(pattern=r"\S")]
+Deviation: TypeAlias = Annotated[str, Meta(pattern=r"^±\s*(?!0+(?:\.0+)?\s*%)\d+(?:\.\d+)?\s*%$")]
+"""To both sides of the model's own value, as in `± 10 %`."""
 Integrator: TypeAlias = Literal["Euler", "implicit", "implicitfast", "RK4", "discrete"]
 Expected: TypeAlias = Literal[
     "restitution", "penetration", "slip", "crossing", "last", "largest", "smallest"
@@ -104,6 +106,8 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     act: tuple[float, ...] = ()
     push: tuple[PushTable, ...] = ()
     poses: dict[str, Annotated[tuple[Pose, ...], Meta(min_length=1)]] = {}
+    draw: dict[str, tuple[float, float] | Deviation] = {}
+    draws: Annotated[int, Meta(ge=1, le=100)] = 3
     measure: Annotated[str, Meta(pattern=r"^(body|site|sensor):\S.*$")] | None = None
     reference: Annotated[str, Meta(pattern=r"^(ode|self|closed:\S.*)$")] | None = None
     conserved: tuple[Literal["energy", "angular-momentum"], ...] | None = None
@@ -141,6 +145,12 @@ class DeclaredScenario(ScenarioTable, frozen=True, kw_only=True):
         """The place of a field's value."""
         return Place(self.table.path, (*self.table.keys, field))
 
+    @property
+    def ranges(self) -> tuple[Variation, ...]:
+        """What is drawn, each with two values, between which it is."""
+        place = self.place("draw")
+        return tuple(variation(place, *pair) for pair in self.draw.items())
+
 
 class Variation(Struct, frozen=True):
     """A parameter, and the values that a sweep gives it."""
@@ -159,8 +169,7 @@ class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
     name: Slug
     vary: dict[
         str,
-        Annotated[tuple[float | str | tuple[float, ...], ...], Meta(min_length=1)]
-        | Annotated[str, Meta(pattern=r"^±\s*(?!0+(?:\.0+)?\s*%)\d+(?:\.\d+)?\s*%$")],
+        Annotated[tuple[float | str | tuple[float, ...], ...], Meta(min_length=1)] | Deviation,
     ]
     title: Text | None = None
     scenario: Slug | None = None
@@ -218,12 +227,13 @@ def parse_declarations(path: str, text: str) -> Declarations:
         if sweep.scenario is not None and sweep.scenario not in {s.name for s in scenarios}:
             raise DeclarationError(f"no scenario is called `{sweep.scenario}`")
         place = Place(path, ("sweep", number, "vary"))
-        variations = tuple(_variation(place, *pair) for pair in sweep.vary.items())
+        variations = tuple(variation(place, *pair) for pair in sweep.vary.items())
         sweeps.append(DeclaredSweep(**asdict(sweep), variations=variations))
     return Declarations(path, scenarios, file.keep, file.bench, tuple(sweeps))
 
 
-def _variation(table: Place, parameter: str, values: Any) -> Variation:
+def variation(table: Place, parameter: str, values: Any) -> Variation:
+    """A parameter at values, or at both ends of a deviation from the model's own."""
     place = Place(table.path, (*table.keys, parameter))
     if not isinstance(values, str):
         return Variation(parameter, values, relative=False, place=place)

@@ -7,11 +7,20 @@ be judged anew without measuring.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 
 from msgspec.structs import asdict, replace
 
-from mjbench.columns import mark_dominated
+from mjbench.columns import (
+    columns_of,
+    leasts_of,
+    mark_dominated,
+    ratios,
+    spreads,
+    unresolved_columns,
+    worse_columns,
+)
 from mjbench.judge import (
     Starts,
     find_parts,
@@ -21,7 +30,7 @@ from mjbench.judge import (
     mark_luck,
     rival_row,
 )
-from mjbench.reports import Interval
+from mjbench.reports import Interval, PartFailure
 from mjbench.reports.case_report import (
     RIGHT,
     BoundaryLine,
@@ -36,6 +45,7 @@ from mjbench.reports.profile_table import profile_text
 from mjbench.reports.scene_report import (
     ErrorQuantity,
     MeasuredRun,
+    MeasuredSetting,
     PhaseProfile,
     ScenarioReport,
     StableRow,
@@ -64,7 +74,10 @@ FIGURES = (
 
 
 def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
-    """The report with all that follows from what was measured; `starts` as for `judge_setting`."""
+    """The report with all that follows from what was measured but charts.
+
+    `starts` as for `judge_setting`.
+    """
     baseline = report.own_setting
     rows = tuple(
         replace(row, name=setting_text(row.setting, baseline), idle=is_idle(row))
@@ -98,7 +111,59 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
         report = replace(report, verdict=judge_setting(report, starts))
         lines = five_lines(report)
         report = replace(report, verdict=replace(report.verdict, lines=lines))
+    return report
+
+
+def derive_charts(report: ScenarioReport) -> ScenarioReport:
+    """The report, which has its verdict, with its charts."""
     return replace(report, charts=scenario_charts(report))
+
+
+def derive_failures(report: ScenarioReport, failures: Sequence[PartFailure]) -> ScenarioReport:
+    """The report with what was not measured, which its last line tells."""
+    report = replace(report, failures=tuple(failures))
+    return replace(report, verdict=replace(report.verdict, lines=five_lines(report)))
+
+
+def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...]:
+    """Reports on the same under commands from several seeds.
+
+    What is better under one seed is better if it is no worse under any: which one an author meets
+    is chance.
+    """
+    derived = []
+    for report in reports:
+        verdict, number = report.verdict, report.verdict.better
+        if number is not None and report.own_row is not None and report.own_row.status == "ok":
+            setting = report.rows[number].setting
+            others = (other for other in reports if other is not report)
+            reason = next(filter(None, (_why_worse(other, setting) for other in others)), "")
+            if reason:
+                claim, semicolon, remark = verdict.text.partition("; ")
+                claim = claim.replace(" is better: it ", " ", 1)
+                text = f"no difference that holds: {claim} here, but {reason}{semicolon}{remark}"
+                verdict = replace(
+                    verdict, on_front=True, better=None, text=text, worse=(reason, *verdict.worse)
+                )
+                report = replace(report, verdict=verdict)
+                report = replace(report, verdict=replace(verdict, lines=five_lines(report)))
+        derived.append(report)
+    return tuple(derived)
+
+
+def _why_worse(report: ScenarioReport, setting: MeasuredSetting) -> str:
+    """In what a setting is worse than the own one, in words; empty where it is in nothing."""
+    baseline = report.own_row
+    row = next((row for row in report.rows if row.setting == setting), None)
+    if baseline is None or baseline.status != "ok" or row is None:
+        return ""
+    if row.status != "ok":
+        return f"in {report.name} it is lost"
+    pair, leasts = [columns_of(r, report.contact_model) for r in (baseline, row)], leasts_of(report)
+    worse = next(worse_columns(spreads([ratios(pair[0], pair[1], leasts)])), None)
+    if worse is None:
+        return ""
+    return f"in {report.name} {worse.text(report.figure, unresolved_columns(pair[0], leasts))}"
 
 
 def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) -> ScenarioReport:

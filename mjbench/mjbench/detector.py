@@ -167,7 +167,8 @@ def judge(
         (peaks.velocity, setup.velocity_bound, "velocities"),
     ):
         if peaks.finite and not size <= bound:
-            text = f"{subject} reached {size / bound:.3g} times what can be"
+            times = "a little more than" if size < 1.005 * bound else f"{size / bound:.3g} times"
+            text = f"{subject} reached {times} what can be"
             symptoms.append((RunStatus.SLOW_GROWTH, text))
     if peaks.finite and not peaks.energy <= setup.energy_bound:
         text = f"energy reached {peaks.energy:.3g} J, where {setup.energy_bound:.3g} J can be"
@@ -192,6 +193,8 @@ class Passages:
     def __init__(self, model: Any, setup: Setup = _UNBOUNDED) -> None:
         self.model, self.setup = model, setup
         self.thickness = thickness(model)
+        self._shallow = _DIPPING * self.thickness.min()
+        """What is no deeper than this is no dip into anything, m."""
         self.through: dict[tuple[int, int], float] = {}
         """Pairs that parted on the other side, and when, s."""
         self.inside: dict[tuple[int, int], Array] = {}
@@ -206,6 +209,8 @@ class Passages:
     def look(self, data: Any) -> None:
         """Look at a state whose contacts are computed."""
         if not (data.ncon or self.inside):
+            return
+        if not self.inside and data.contact.dist.min() >= -self._shallow:
             return
         present: dict[tuple[int, int], tuple[float, Array]] = {}
         geoms = data.contact.geom

@@ -217,7 +217,8 @@ def _declared_readers(declarations: Declarations) -> list[ModelReader]:
     names = {s.observable.name for s in scenarios if s.observable is not None}
     fields = {"energy"} if any("energy" in (s.conserved or ()) for s in scenarios) else set()
     kinds: set[str] = set()
-    for part in (part for sweep in declarations.sweeps for part in sweep.variations):
+    swept = (part for sweep in declarations.sweeps for part in sweep.variations)
+    for part in (*swept, *(part for scenario in scenarios for part in scenario.ranges)):
         things, _, field = part.parameter.rpartition(".")
         kind, _, name = things.partition(":")
         names |= {name} - {""}

@@ -119,7 +119,7 @@ def _extrapolate(rate: Rate, y: State, step: Any, columns: int) -> tuple[State, 
     return rows[-1], float(error)
 
 
-def dop853(rate: Rate, start: Array, times: Array) -> Array:
+def dop853(rate: Rate, start: Array, times: Array, tolerance: float = 1e-13) -> Array:
     """The states (n, d) at the rising times (n,) s, as by `bulirsch_stoer`."""
     from scipy.integrate import DOP853  # which few commands need
 
@@ -128,9 +128,8 @@ def dop853(rate: Rate, start: Array, times: Array) -> Array:
     for time in times.tolist():
         if time > now:
             first = min(step, time - now) if math.isfinite(step) else None
-            solver = DOP853(
-                lambda _, y: rate(y), now, y, time, rtol=1e-13, atol=1e-13, first_step=first
-            )
+            bounds = {"rtol": tolerance, "atol": tolerance, "first_step": first}
+            solver = DOP853(lambda _, y: rate(y), now, y, time, **bounds)
             while solver.status == "running":
                 solver.step()
                 step = solver.h_abs

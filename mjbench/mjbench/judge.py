@@ -173,18 +173,19 @@ def _judge_rival(
     claim = f"{rival.name} {_advantage(cost, _gain([own_ratios]), figure)}"
     if cost > 1 - _WORTH_SAYING and min(own_ratios.values()) > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, which is within what such runs differ by", False, ()
-    nearby = starts(number)
+    nearby, elsewhere = starts(number), "from starts nearby"
+    elsewhere += " or with drawn parameters" if report.drawn else ""
     if nearby is None:
-        text = f"{claim} here; whether that holds from starts nearby was not measured"
+        text = f"{claim} here; whether that holds {elsewhere} was not measured"
         return text, False, ()
     everywhere = [own_ratios, *nearby]
     gain, worse = _gain(everywhere), tuple(worse_columns(spreads(everywhere)))
     if worse:
         unresolved = unresolved_columns(pair[0], leasts)
         texts = tuple(part.text(figure, unresolved) for part in worse)
-        return f"{none}{claim} here, but from starts nearby {texts[0]}", False, texts
+        return f"{none}{claim} here, but {elsewhere} {texts[0]}", False, texts
     if cost > 1 - _WORTH_SAYING and gain.high > 1 - _WORTH_SAYING:
-        return f"{none}{claim} here, but is no better from starts nearby", False, ()
+        return f"{none}{claim} here, but is no better {elsewhere}", False, ()
     text = f"{rival.name} is better: it {_advantage(cost, gain, figure)}"
     quantity = quantity_of(report)
     if not resolved:
@@ -338,9 +339,15 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
 
     The report has its verdict already.
     """
-    row = report.own_row
+    row, failures = report.own_row, dict[str, list[str]]()
+    for failure in report.failures:
+        failures.setdefault(failure.reason, []).append(
+            failure.part.removeprefix(f"{report.name}: ")
+        )
+    missing = [f"{', '.join(names)}: {reason}" for reason, names in failures.items()]
     if row is None:
-        return ("the scene's own setting was not measured",)
+        missing.insert(0, "the scene's own setting was not measured")
+        return (f"not known: {'; '.join(missing)}",)
     quantity = quantity_of(report)
     speed = f"{setting_text(row.setting)}: "
     speed += "not timed" if row.realtime is None else f"{_rounded(row.realtime)} times real time"
@@ -357,7 +364,6 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
             error += f", and by {row.seen:.2g} with the model of contacts"
     better, *_ = report.verdict.text.split("; the scene's own error")
     lines = [speed, error + parts_text(report.parts), better, stability_text(report)]
-    missing = [f"{failure.part}: {failure.reason}" for failure in report.failures]
     if report.horizon < report.duration * (1 - 1e-9):
         missing.append(f"nothing beyond {seconds_text(report.horizon, 3)} can be predicted")
     if report.parts is None and row.parted is None and row.status == "ok":

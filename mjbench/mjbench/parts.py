@@ -27,9 +27,14 @@ class Parts:
         self.failures: list[PartFailure] = []
         self.stopped = False
 
-    def run(self, name: str, measure: Callable[[], _T], default: _T) -> _T:
-        """The result of a part, or `default` where it fails or the user has stopped."""
-        if self.stopped:
+    def run(
+        self, name: str, measure: Callable[[], _T], default: _T, *, at_once: bool = False
+    ) -> _T:
+        """The result of a part, or `default` where it fails or the user has stopped.
+
+        `at_once`: it measures nothing, so that nobody waits for it, and is made after a stop too.
+        """
+        if self.stopped and not at_once:
             self.failures.append(PartFailure(name, STOPPED))
             return default
         try:

@@ -28,7 +28,7 @@ _ROUNDS, _QUICK_ROUNDS = 12, 5
 """How often a scenario is run."""
 _STRETCH = 16
 """Steps of a stretch, at most."""
-_BUDGET = 20.0
+_BUDGET, _QUICK_BUDGET = 20.0, 5.0
 """Seconds that rounds may take in all, by MuJoCo's timers; there are two of them at least."""
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 _TIMERS = mujoco.mjtTimer
@@ -64,7 +64,7 @@ def profile_rows(
         with silent():
             for count in range(_QUICK_ROUNDS if quick else _ROUNDS):
                 spent = sum(job.run() for job in jobs)
-                if count and (count + 2) * spent > _BUDGET:
+                if count and (count + 2) * spent > (_QUICK_BUDGET if quick else _BUDGET):
                     break
             return tuple(job.profile() for job in jobs)
     finally:

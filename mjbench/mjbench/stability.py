@@ -201,15 +201,16 @@ def search_row(
     resolution = _COARSE if quick else _FINE
     largest = _look_closer(partial(laboratory.is_lost, 0), grid, resolution, quick)
     near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
-    estimates = [bisect(partial(laboratory.is_lost, 0, spans=2), near, resolution, _NEAR)]
-    by_start = {
-        n: bisect(partial(laboratory.is_lost, n, spans=2), near, math.inf, _NEAR)
-        for n in range(1, laboratory.starts)
-    }
+    # A first look asks other starts and times about that limit alone, where most of them fail.
+    enough = min(largest, grid[-1]) / _NEAR if quick else 0.0
+
+    def estimate(start: int, width: float) -> float:
+        return bisect(partial(laboratory.is_lost, start, spans=2), near, width, _NEAR, enough)
+
+    estimates = [estimate(0, resolution)]
+    by_start = {n: estimate(n, math.inf) for n in range(1, laboratory.starts)}
     if by_start:
-        worst = min(by_start, key=lambda n: by_start[n])
-        is_lost = partial(laboratory.is_lost, worst, spans=2)
-        estimates.append(bisect(is_lost, near, resolution, _NEAR))
+        estimates.append(estimate(min(by_start, key=lambda n: by_start[n]), resolution))
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
     limit, orbital = theory.limit(integrator, search), theory.orbital(integrator)
     gain = _first_gain(laboratory, grid, setup)
@@ -271,15 +272,17 @@ def bisect(
     grid: Sequence[float],
     resolution: float,
     reach: float = _REACH,
+    enough: float = 0.0,
 ) -> float:
     """The largest timestep below which none is lost: infinite for all of the grid, 0 for none.
 
-    The grid is tried from above, down to `1 / reach` of the shortest that is lost.
+    The grid is tried from above, down to `1 / reach` of the shortest that is lost, or to `enough`
+    (s) where none is.
     """
     lost = math.inf
     stable = 0.0
     for step in reversed(grid):
-        if lost < math.inf and step < lost / reach:
+        if step < (enough if math.isinf(lost) else lost / reach):
             break
         if is_lost(step):
             lost, stable = step, 0.0
@@ -379,7 +382,7 @@ def stable_rows(
                 model,
                 scene.scenario,
                 declared_limit if limits else None,
-                smooth=pilot.smooth,
+                smooth=pilot.smooth and not quick,  # an orbit takes longer than all the rest
                 visits=partial(_comes_near, motion, model),
             )
         ),
@@ -393,8 +396,9 @@ def stable_rows(
             variant = with_integrator(model, integrator, step)
             return run_trial(setup, variant, span, motion, start=start)
 
-        span, limit = duration, theory.limit(integrator, (low, high))
-        if pilot.settles and pilot.smooth and limit is not None and math.isfinite(limit.timestep):
+        span, settles = duration, pilot.settles and pilot.smooth
+        limit = theory.limit(integrator, (low, high)) if settles else None
+        if limit is not None and math.isfinite(limit.timestep):
             span = max(span, _SETTLED_STEPS * limit.timestep)
         search = max(low, span / MOST_STEPS), min(high, span / FEWEST_STEPS)
         if search[1] <= search[0]:

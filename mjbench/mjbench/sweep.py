@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import copy
 import re
+import zlib
 from collections.abc import Iterator
 from itertools import islice
 from typing import Any
@@ -24,7 +25,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench.costs import Clock, Job, scenario_job, time_jobs
-from mjbench.declarations import DeclaredSweep, SweepValue, Variation
+from mjbench.declarations import DeclaredScenario, DeclaredSweep, SweepValue, Variation
 from mjbench.measure import (
     Pair,
     contact_speeds,
@@ -124,17 +125,59 @@ def _variant(
     """A row on which nothing is known, and the model with the parameter at this value."""
     changed_spec = spec.copy()
     before, after = _change(changed_spec, part, value)
+    text = _text(part, value)
     try:
         model = _runnable(changed_spec.compile())
         scenario.steps(float(model.opt.timestep))
     except ValueError as error:
-        message = (
-            f"`{part.parameter}` cannot be `{_value_text(value)}`: {' '.join(str(error).split())}"
-        )
+        message = f"`{part.parameter}` cannot be `{text}`: {' '.join(str(error).split())}"
         raise SceneError(message, part.place) from None
-    text = f"{100 * (float(value) - 1):+g} %" if part.relative else _value_text(value)  # type: ignore[arg-type]
     is_own = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
     return SweepRow(part.parameter, text, own=is_own, status="ok"), model
+
+
+class DrawnModel(Struct, frozen=True):
+    """A model whose parameters were drawn from the ranges of a scenario."""
+
+    model: Any
+    """An `mjModel`."""
+    text: str
+    """What was drawn, so that it can be declared: `geom.friction[0] = 0.6312`."""
+
+
+def drawn_models(spec: Any, declaration: DeclaredScenario) -> tuple[DrawnModel, ...]:
+    """The models (of a `MjSpec`) that a scenario draws; a `SceneError` where one is none.
+
+    What a parameter is depends on the number of the draw and on its name alone.
+    """
+    models = []
+    for number in range(declaration.draws if declaration.draw else 0):
+        changed_spec, texts, place = spec.copy(), [], declaration.place("draw")
+        for part in declaration.ranges:
+            if part.parameter in _COMPARED:
+                message = f"`{part.parameter}` is what is compared, and cannot be drawn"
+                raise SceneError(message, place)
+            random = np.random.default_rng((number, zlib.crc32(part.parameter.encode())))
+            low, high = sorted(value for value in part.values if isinstance(value, float))
+            value = float(f"{random.uniform(low, high):.4g}")
+            _change(changed_spec, part, value)
+            texts.append(f"{part.parameter} {'' if part.relative else '= '}{_text(part, value)}")
+        text = ", ".join(texts)
+        try:
+            models.append(DrawnModel(changed_spec.compile(), text))
+        except ValueError as error:
+            message = f"with {text} the model does not compile: {' '.join(str(error).split())}"
+            raise SceneError(message, place) from None
+    return tuple(models)
+
+
+_COMPARED = ("option.timestep", "option.integrator")
+
+
+def _text(part: Variation, value: SweepValue) -> str:
+    if part.relative and isinstance(value, float):
+        return f"{100 * (value - 1):+.4g} %"
+    return _value_text(value)
 
 
 def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], list[Any]]:

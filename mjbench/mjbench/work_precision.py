@@ -15,13 +15,14 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench import known_motion, measure, simulation
 from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
 from mjbench.costs import Clock, costs
 from mjbench.delays import loop_note
-from mjbench.derive import derive_profile, derive_scenario
+from mjbench.derive import derive_charts, derive_failures, derive_profile, derive_scenario
 from mjbench.detector import driving_force, pair_names
 from mjbench.judge import compared_rows
 from mjbench.measured_setting import Basis, measure_setting
@@ -43,8 +44,9 @@ from mjbench.reports.shown_errors import (
     setting_text,
     solving_parts,
 )
-from mjbench.scene import Scene
+from mjbench.scene import Scene, SceneError
 from mjbench.stability import stable_rows
+from mjbench.sweep import DrawnModel
 from mjbench.theory_figures import measure_expected
 
 _CONSERVED = 1e-8
@@ -54,6 +56,7 @@ _CONSERVED = 1e-8
 def measure_scenario(
     model: Any,
     scene: Scene,
+    drawn: Sequence[DrawnModel] = (),
     *,
     quick: bool = False,
     clock: Clock | None,
@@ -62,23 +65,13 @@ def measure_scenario(
 ) -> scene_report.ScenarioReport:
     """Measure a model (`mjModel`) in one of its scenarios.
 
+    `drawn`: the model with other parameters, for which a verdict has to hold too.
     `clock`: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
     `tell` gets a line about each stage; `profile`: whether to say where the time goes. A
     `SceneError` where the scenario does not fit the model, or diverges at every timestep.
     """
-    tell(f"{scene.name}: a first run")
-    pilot = run_pilot(model, scene)
-    tell(f"{scene.name}: the reference")
-    cones = known_motion.find_references(model, pilot, quick=quick)
-    baseline = own_setting(model, pilot)
-    reference = cones[baseline.cone].reference
-    conserved = find_conserved(model, pilot, reference)
-    late_energy = measure.mean_late_energy(model, pilot, reference.horizon)
-    leasts = zip(
-        *(known_motion.least_known(model, scene, cone.reference) for cone in cones.values()),
-        strict=True,
-    )
-    basis = Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
+    basis = _find_basis(model, scene, quick=quick, tell=tell)
+    pilot, cones, baseline, reference = basis.pilot, basis.cones, basis.baseline, basis.reference
     parts = Parts(tell)
     # A mistake in what is expected is told before all the rest is measured.
     figures = measure_expected(model, scene, baseline)
@@ -95,6 +88,11 @@ def measure_scenario(
     states = reference.states
     largest = stable_rows(model, pilot, states, parts, quick=quick)
     notes = list(_notes(basis, largest, rows, cost_of))
+    draws = list[_Draw]()
+    if drawn:
+        measured = _measure_draws(basis, drawn, quick)
+        draws = parts.collect(f"{scene.name}: drawn parameters", measured)
+        notes += [draw.text for draw in draws]
     if scene.scenario.loop is not None:
         delays = partial(loop_note, model, pilot, states)
         notes.append(parts.run(f"{scene.name}: delays", delays, ""))
@@ -132,20 +130,48 @@ def measure_scenario(
         ),
         contact_model={name: cone.visible_model_error for name, cone in cones.items() if name},
         parts=error_parts,
+        drawn=tuple(part.text for part in drawn),
     )
 
     def starts(number: int) -> Sequence[Mapping[Column, float]] | None:
-        near = partial(_nearby_ratios, basis, report, report.rows[number].setting, quick)
-        return parts.run(f"{scene.name}: starts nearby", near, None)
+        setting = report.rows[number].setting
+        nearby = partial(_nearby_ratios, basis, report, setting, quick)
+        near = parts.run(f"{scene.name}: starts nearby", nearby, None)
+        if near is None or not drawn:
+            return near
+        with_draws = partial(_drawn_ratios, draws, report, setting)
+        more = parts.run(f"{scene.name}: drawn parameters", with_draws, None)
+        return None if more is None or len(draws) < len(drawn) else [*near, *more]
 
-    report = parts.run(f"{scene.name}: verdict", lambda: derive_scenario(report, starts), report)
+    verdict = partial(derive_scenario, report, starts)
+    report = parts.run(f"{scene.name}: verdict", verdict, report, at_once=True)
+    report = parts.run(f"{scene.name}: plots", partial(derive_charts, report), report, at_once=True)
     if profile:
         phases = partial(profile_rows, model, scene, compared_rows(report), quick=quick)
         report = derive_profile(report, parts.run(f"{scene.name}: where the time goes", phases, ()))
-    report = replace(report, failures=tuple(parts.failures))
+    report = derive_failures(report, parts.failures)
     if parts.stopped:
         raise StoppedError(report)
     return report
+
+
+def _find_basis(
+    model: Any, scene: Scene, *, quick: bool, tell: Callable[[str], None] = lambda _: None
+) -> Basis:
+    """What settings are compared with; a `SceneError` where the scene has no motion."""
+    tell(f"{scene.name}: a first run")
+    pilot = run_pilot(model, scene)
+    tell(f"{scene.name}: the reference")
+    cones = known_motion.find_references(model, pilot, quick=quick)
+    baseline = own_setting(model, pilot)
+    reference = cones[baseline.cone].reference
+    conserved = find_conserved(model, pilot, reference)
+    late_energy = measure.mean_late_energy(model, pilot, reference.horizon)
+    leasts = zip(
+        *(known_motion.least_known(model, scene, cone.reference) for cone in cones.values()),
+        strict=True,
+    )
+    return Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
 
 
 class StoppedError(Exception):
@@ -274,19 +300,72 @@ def _nearby_ratios(
         nudged_scenario = replace(scenario, **start)
         setup = replace(pilot.setup, scenario=nudged_scenario)
         near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
-        pair = []
-        for setting in (basis.baseline, rival):
-            base = with_setting(model, replace(basis.baseline, cone=setting.cone))
-            cone = basis.cones[setting.cone]
+        cones = {}
+        for name in {basis.baseline.cone, rival.cone}:
+            base = with_setting(model, replace(basis.baseline, cone=name))
+            cone = basis.cones[name]
             exact = known_motion.find_nearby(base, near, cone.reference, quick=quick)
             if exact is None:
                 return None
             reference = replace(cone.reference, states=exact)
-            cones = {**basis.cones, setting.cone: replace(cone, reference=reference, sticks=None)}
-            row, _ = measure_setting(replace(basis, pilot=near, cones=cones), setting)
+            cones[name] = replace(cone, reference=reference, sticks=None)
+        near_basis, pair = replace(basis, pilot=near, cones=cones), []
+        for setting in (basis.baseline, rival):
+            row, _ = measure_setting(near_basis, setting)
             if row.status != "ok":
                 return result if setting == basis.baseline else [*result, {(LOST, WHOLE): math.inf}]
             pair.append(columns_of(row, report.contact_model))
+        result.append(ratios(pair[0], pair[1], leasts_of(report)))
+    return result
+
+
+class _Draw(Struct, frozen=True, eq=False):
+    """The scene with drawn parameters."""
+
+    basis: Basis | None
+    """`None` where it has no motion."""
+    row: scene_report.WorkPrecisionRow | None
+    """Of the scene's own setting."""
+    text: str
+
+
+def _measure_draws(basis: Basis, drawn: Sequence[DrawnModel], quick: bool) -> Iterator[_Draw]:
+    """Measure the scene's own setting with parameters that are drawn."""
+    scene = replace(basis.pilot.scene, exact=None)  # which is the motion of the model as it is
+    for part in drawn:
+        words = f"with {part.text} (drawn) the scene's own setting"
+        try:
+            drawn_basis = _find_basis(part.model, scene, quick=quick)
+        except SceneError as error:
+            yield _Draw(None, None, f"{words} cannot be measured: {error.message}")
+            continue
+        row, _ = measure_setting(drawn_basis, drawn_basis.baseline)
+        text = f"{words} is lost: {'; '.join(row.reasons)}"
+        if row.status == "ok":
+            text = f"{words} errs by "
+            text += "what cannot be predicted" if row.seen is None else f"{row.seen:.2g}"
+            text += " in what is seen"
+        yield _Draw(drawn_basis, row, text)
+
+
+def _drawn_ratios(
+    draws: Sequence[_Draw],
+    report: scene_report.ScenarioReport,
+    rival: scene_report.MeasuredSetting,
+) -> list[Mapping[Column, float]] | None:
+    """With parameters that are drawn, how many times as large errors are under another setting.
+
+    `None` where nobody knows.
+    """
+    result: list[Mapping[Column, float]] = []
+    for draw in draws:
+        if draw.basis is None or draw.row is None or draw.row.status != "ok":
+            return None
+        cone = rival.cone if rival.cone in draw.basis.cones else draw.basis.baseline.cone
+        row, _ = measure_setting(draw.basis, replace(rival, cone=cone))
+        if row.status != "ok":
+            return [*result, {(LOST, WHOLE): math.inf}]
+        pair = [columns_of(r, report.contact_model) for r in (draw.row, row)]
         result.append(ratios(pair[0], pair[1], leasts_of(report)))
     return result
 

@@ -111,6 +111,58 @@ def test_mistakes_are_told_in_words(
     assert f"mjbench: error: {message}" in capsys.readouterr().err
 
 
+SPRING = """\
+<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody><body>
+  <joint name="rail" type="slide" damping="1"/><geom size=".1" mass="1"/></body></worldbody>
+  <actuator><motor joint="rail"/></actuator></mujoco>
+"""
+STEP = '[[scenario]]\nname = "step"\nduration = 0.8\nsample = 0.02\ntimesteps = [0.005, 0.01]\n'
+POLICY = """\
+import os, signal
+period = 0.02
+def control(model, data):
+    is_searched = model.opt.timestep > 0.011  # the search for stable timesteps tries longer ones
+    if is_searched and {condition}:
+        {action}
+    return [1 - 5 * data.qpos[0]]
+"""
+
+
+def measure_under(policy: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """What `mjbench` says of a spring under a controller, in a process of its own."""
+    (folder / "spring.xml").write_text(SPRING)
+    (folder / "spring.toml").write_text(STEP)
+    (folder / "policy.py").write_text(policy)
+    words = ["spring.xml", "--quick", "--control", "policy.py"]
+    command = [sys.executable, "-m", "mjbench", *words]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.long
+def test_what_is_known_is_printed_when_the_user_interrupts(tmp_path: Path) -> None:
+    interrupt = "os.kill(os.getpid(), signal.SIGINT)"
+    run = measure_under(POLICY.format(condition="True", action=interrupt), tmp_path)
+    assert run.returncode == 130
+    assert run.stderr == "mjbench: stopped; this is what is known\n"
+    out = " ".join(run.stdout.split())
+    assert "Euler at 10 ms: " in out and "errs by " in out and "│" in out, "verdict and plot"
+    assert "largest timestep" not in out
+    parts = [f"stable timesteps of {name}" for name in ("Euler", "implicit", "implicitfast")]
+    assert f"not known: {', '.join(parts)}, " in out
+    assert "delays, what theory knows: stopped before it was done" in out
+
+
+@pytest.mark.long
+def test_an_integrator_that_fails_takes_nothing_else_with_it(tmp_path: Path) -> None:
+    condition = "model.opt.integrator == 1"  # RK4
+    run = measure_under(POLICY.format(condition=condition, action="raise ValueError(7)"), tmp_path)
+    assert (run.returncode, run.stderr) == (0, "")
+    out = " ".join(run.stdout.split())
+    assert "not known: stable timesteps of RK4: LoopError: policy.py fails at 0 s" in out
+    assert "Euler stays bounded at " in out and "RK4 at 10 ms" in out
+    assert "with policy.py every 0.02 s it stays bounded " in out
+
+
 def converse(lines: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The answers to requests, and to questions where they stand in between."""
     text = "".join(json.dumps(line) + "\n" for line in lines)

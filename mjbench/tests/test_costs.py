@@ -8,7 +8,7 @@ from collections.abc import Callable
 import mujoco
 import pytest
 
-from mjbench.costs import MIN_ROUNDS, Job, costs, scenario_job, time_jobs
+from mjbench.costs import MIN_ROUNDS, QUICK_MIN_ROUNDS, Job, costs, scenario_job, time_jobs
 from mjbench.problem import Scenario
 from mjbench.reports import Interval
 from mjbench.reports.scene_report import MeasuredSetting
@@ -85,6 +85,12 @@ def test_a_slow_model_is_not_timed_for_ever() -> None:
     machine = Machine(Neighbours(3))
     time_jobs([machine.job(c) for c in (2e9, 4e9)], 0, machine.clock)
     assert len(machine.done) == 2 * (MIN_ROUNDS + 1)
+    machine = Machine(Neighbours(3))
+    time_jobs([machine.job(c) for c in (2e9, 4e9)], 0, machine.clock, quick=True)
+    assert len(machine.done) == 2 * (QUICK_MIN_ROUNDS + 1)
+    machine = Machine(Neighbours(3))
+    time_jobs([machine.job(c) for c in (2e6, 4e6)], 0, machine.clock, quick=True)
+    assert len(machine.done) >= 2 * (MIN_ROUNDS + 1), "what takes little is timed as often as ever"
 
 
 SPRING = """\

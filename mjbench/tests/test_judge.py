@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from mjbench.columns import Column
-from mjbench.derive import derive_scenario
+from mjbench.derive import derive_scenario, derive_seeds
 from mjbench.judge import mark_luck
 from mjbench.reports import Interval
 from mjbench.reports.scene_report import ErrorParts, ScenarioReport, StableRow, WorkPrecisionRow
@@ -168,6 +168,34 @@ def test_what_is_worse_from_starts_nearby_is_not_better() -> None:
     verdict = judged(masked(position=(0.0049, 0.0049)), None, contact_model=CONES).verdict
     assert verdict.better is None
     assert "whether that holds from starts nearby was not measured" in verdict.text
+
+
+def test_what_is_worse_with_drawn_parameters_is_not_better() -> None:
+    starts = [{("step_error", "over the whole run"): ratio} for ratio in (0.9, 1.4)]
+    rows, drawn = masked(position=(0.0049, 0.0049)), ("joint.damping = 0.1",)
+    text = judged(rows, starts, contact_model=CONES, drawn=drawn).verdict.text
+    assert "here, but from starts nearby or with drawn parameters what is seen is 0.9 to" in text
+
+
+def test_what_is_better_under_one_seed_and_worse_under_another_is_not_better() -> None:
+    good = masked(position=(0.0049, 0.0049))
+    seeds = [
+        replace(judged(rows, contact_model=CONES), name=f"seed-{n}")
+        for n, rows in enumerate((good, masked()), 1)
+    ]
+    assert [seed.verdict.better for seed in seeds] == [1, None]
+    first, second = derive_seeds(seeds)
+    assert second == seeds[1]
+    reason = "in seed-2 the error of position is 2.1 times as large over the whole run"
+    claim = "no difference that holds: implicit at 4.16667 ms takes 0.47 of the time and errs no "
+    assert first.verdict.text.startswith(f"{claim}more in any column here, but {reason}; ")
+    assert first.verdict.better is None and first.verdict.worse == (reason,)
+    assert any(reason in line for line in first.verdict.lines)
+    alike = [replace(seeds[0], name=name) for name in ("seed-1", "seed-2")]
+    assert list(derive_seeds(alike)) == alike
+    lost = masked(status="diverged", reasons=("it is not finite",))
+    (first, _) = derive_seeds([seeds[0], replace(judged(lost, contact_model=CONES), name="b")])
+    assert "here, but in b it is lost; " in first.verdict.text
 
 
 def test_gains_are_told_with_their_spread() -> None:

@@ -13,7 +13,8 @@ from mjbench.reports import Interval
 from mjbench.reports.records import scene_departures
 from mjbench.reports.scene_report import SweepReport, SweepRow
 from mjbench.scene import SceneError, scenes
-from mjbench.sweep import measure_sweep
+from mjbench.sweep import DrawnModel, drawn_models, measure_sweep
+from mjbench.work_precision import measure_scenario
 from samples.reports import scene
 from samples.surveys import parse_declared
 
@@ -149,6 +150,64 @@ def test_a_cylinder_that_hops_as_it_rolls_slides_all_the_way() -> None:
     distance = 9.81 * (math.sin(0.5) - 3 * 0.12 * math.cos(0.5)) * 0.4**2 / 2
     for row in rows:
         assert row.slip == pytest.approx(distance, rel=0.05), row.value
+
+
+def drawn(lines: str, mjcf: str = BALL) -> tuple[DrawnModel, ...]:
+    (scenario,) = parse_declared(f"{TOML}{lines}\n").scenarios
+    return drawn_models(mujoco.MjSpec.from_string(mjcf), scenario)
+
+
+def test_parameters_are_drawn_from_their_ranges_each_by_itself() -> None:
+    both = drawn('draw = { "geom:ball.mass" = [2, 1], "geom:wall.size[0]" = "± 50 %" }\ndraws = 4')
+    masses = [float(part.model.body("ball").mass[0]) for part in both]
+    widths = [float(part.model.geom("wall").size[0]) for part in both]
+    assert all(1 <= mass <= 2 for mass in masses) and len(set(masses)) == 4
+    assert all(0.5 <= width <= 1.5 for width in widths)
+    alone = drawn('draw = { "geom:ball.mass" = [1, 2] }')
+    assert [part.text for part in alone] == [f"geom:ball.mass = {mass:g}" for mass in masses[:3]]
+    assert both[0].text == f"{alone[0].text}, geom:wall.size[0] {100 * (widths[0] - 1):+.4g} %"
+    assert drawn("draws = 4") == ()
+
+
+@pytest.mark.parametrize(
+    ("draw", "message"),
+    [
+        ('"geom.solrof" = [0, 1]', "the model has no parameter `geom.solrof`"),
+        ('"option.timestep" = [0.001, 0.002]', "`option.timestep` is what is compared"),
+        ('"geom:ball.size[0]" = [-2, -1]', "with geom:ball.size[0] = -1."),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(draw: str, message: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        drawn(f"draw = {{ {draw} }}")
+    assert caught.value.message.startswith(message)
+    assert caught.value.place is not None and caught.value.place.keys[:3] == ("scenario", 0, "draw")
+
+
+def test_a_setting_that_is_lost_with_drawn_parameters_is_told() -> None:
+    # Under Euler at 50 ms an oscillator is stable up to 40 rad/s.
+    spring = """<mujoco><option timestep="0.05" gravity="0 0 0"/><worldbody><body>
+      <joint name="rail" type="slide" stiffness="0"/><geom size=".1" mass="1"/></body>
+      </worldbody></mujoco>"""
+    toml = """[[scenario]]
+name = "push"
+qpos = [0.1]
+qvel = [1]
+duration = 2
+sample = 0.2
+timesteps = [0.025, 0.05]
+draws = 1
+"""
+    for low, high, said in ((100, 900, "errs by "), (2000, 6000, "is lost: ")):
+        text = f'{toml}draw = {{ "joint:rail.stiffness" = [{low}, {high}] }}'
+        model, declarations = mujoco.MjModel.from_xml_string(spring), parse_declared(text)
+        (scene,) = scenes(model, declarations, quick=True)
+        models = drawn_models(mujoco.MjSpec.from_string(spring), scene.declaration)
+        report = measure_scenario(model, scene, models, quick=True, clock=None)
+        assert report.drawn == (models[0].text,)
+        words = f"with {models[0].text} (drawn) the scene's own setting "
+        assert any(note.startswith(words + said) for note in report.notes), (said, report.notes)
+        assert report.failures == ()
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from mjbench.derive import derive_case, derive_scenario
+from mjbench.derive import derive_case, derive_charts, derive_scenario
 from mjbench.reports import Interval
 from mjbench.reports.diet_report import (
     INTERFACE_LABEL,
@@ -26,7 +26,7 @@ from samples.reports import MACHINE, awkward, row, scenario, scene, swing
 
 
 def test_the_verdict_comes_first_then_the_table_then_the_plot() -> None:
-    text = scene_text(scene(derive_scenario(swing(), lambda _: ())), Style(80))
+    text = scene_text(scene(derive_charts(derive_scenario(swing(), lambda _: ()))), Style(80))
     parts = (
         "Euler at 2 ms: 100 times real time",
         "RK4 at 10 ms is better",
@@ -41,7 +41,9 @@ def test_the_verdict_comes_first_then_the_table_then_the_plot() -> None:
 
 
 def test_a_report_that_is_hard_to_show_and_one_without_anything() -> None:
-    text = scene_text(scene(derive_scenario(awkward(), lambda _: ()), quick=True), Style(100))
+    text = scene_text(
+        scene(derive_charts(derive_scenario(awkward(), lambda _: ())), quick=True), Style(100)
+    )
     assert "quick: fewer settings" in text and "velocities reached 12 times what can be" in text
     empty = replace(scene(), scenarios=())
     assert "nothing in it can move, so nothing was measured" in scene_text(empty)
@@ -66,7 +68,7 @@ def test_a_hard_case_has_its_orders_limits_figures_and_runs() -> None:
 
 
 def test_a_page_needs_nothing_else_and_escapes_names() -> None:
-    report = derive_scenario(replace(swing(), title="<b>"), lambda _: ())
+    report = derive_charts(derive_scenario(replace(swing(), title="<b>"), lambda _: ()))
     html = scene_page(scene(report, model="<arm>"))
     assert html.count("<svg") == 1 and "<li>Euler at 2 ms: 100 times real time</li>" in html
     assert "<b>" not in html and "&lt;arm&gt;" in html and "http" not in html

@@ -81,6 +81,8 @@ class PushTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 Pose: TypeAlias = tuple[float, float, float, float, float, float, float]
+_SHARE = r"^±\s*(?!0+(?:\.0+)?\s*%)\d+(?:\.\d+)?\s*%$"
+"""How a share is named of the model's own value."""
 
 
 class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
@@ -119,6 +121,17 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
             "`hold` seconds, the last to the end"
         ),
     ] = {}
+    draw: Annotated[
+        dict[
+            str,
+            tuple[float, float]
+            | Annotated[str, matching(_SHARE, "two values, or a share: `±1 %`")],
+        ],
+        describe(
+            "parameters for which verdicts have to hold too, named as in sweeps, with their ranges"
+        ),
+    ] = {}
+    draws: Annotated[int, describe("how often all of them are drawn", ge=1, le=100)] = 3
     measure: Annotated[
         Annotated[
             str, matching(r"^(body|site|sensor):\S.*$", "`body:NAME`, `site:NAME` or `sensor:NAME`")
@@ -224,8 +237,6 @@ SweepFigure: TypeAlias = Literal[
     "change", "figure", "penetration", "slip", "restitution",
     "residual", "iterations", "cost", "throughput"
 ]  # fmt: skip
-_SHARE = r"^±\s*(?!0+(?:\.0+)?\s*%)\d+(?:\.\d+)?\s*%$"
-"""How a sweep names a share of the model's own value."""
 _WORD: TypeAlias = Annotated[
     str, matching(r"^[^±%]*$", "a number or a word of MuJoCo's; a share stands alone: `±1 %`")
 ]

@@ -432,6 +432,8 @@ class ScenarioReport(Record, frozen=True):
     above half the largest stable one, and in all; `None` without a search."""
     cut_short: bool = False
     """Whether the search for stable timesteps ended because of the scenario's duration."""
+    drawn: tuple[str, ...] = ()
+    """Parameters with which verdicts have to hold too, as they were drawn."""
 
     @property
     def own_row(self) -> WorkPrecisionRow | None:
