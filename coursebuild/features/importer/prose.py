@@ -117,7 +117,7 @@ _KEPT = {
 }
 """What is Markdown here as well."""
 _OVER_LINES = re.compile(
-    r"\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
+    r"(?<![\w$\\])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
 )
 """A role or a note that goes on in the next line."""

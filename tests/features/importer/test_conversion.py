@@ -93,3 +93,27 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
     lesson = course.files["content/lessons/1.1-one.md"].decode()
     saving = f'{name}.savefig("l1-1-one-1.svg")\n{name}.close("all")'
     assert saving in lesson and ".show(" not in lesson
+
+
+@pytest.mark.parametrize(
+    ("source", "lesson"),
+    [
+        (
+            "<script setup>\nimport A from './a.vue'\n</script>\n\nText.\n\n"
+            "```html\n</script>\n```\n",
+            "Text.\n\n```html\n</script>\n```\n",
+        ),
+        ("## <!-- md:setting config.on -->\n\nText.\n", "## `md:setting config.on`\n\nText.\n"),
+        ("## A {#a-–-b}\n\nText.\n", "## A {#a-b}\n\nText.\n"),
+        ('=== ":simple-linux: Linux"\n\n    Text.\n', "**Linux**\n\nText.\n"),
+        ("```js{1,3}\nf()\n```\n", "```js\nf()\n```\n"),
+        ("- a\n\n  ```js\n  `${x}`\n  }\n  ```\n", "- a\n\n  ```js\n  `${x}`\n  }\n  ```\n"),
+        ("Code `\\a{b}` and\n`c` here.\n", "Code `\\a{b}` and\n`c` here.\n"),
+    ],
+    ids=["script", "comment", "id", "icon", "lines", "fence in a list", "code over lines"],
+)
+def test_a_text_of_another_tool_keeps_all_that_readers_see(
+    tmp_path: Path, source: str, lesson: str
+) -> None:
+    course = convert_files(tmp_path, {"one.md": f"# One\n\n{source}"})
+    assert course.files["content/lessons/1.1-one.md"].decode() == lesson
