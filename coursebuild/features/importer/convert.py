@@ -128,25 +128,55 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
         path: [part for part in existing_files(files.folder, path, text) if part in files]
         for path, text in texts.items()
     }
+    for root, names in _group_by_folder(parts).items():
+        _place_models(root, names, models)
     included = {part for names in parts.values() for part in names if part in texts}
-    for path in sorted(texts, key=lambda path: path in included):  # what includes others first
-        folder = posixpath.dirname(path)
-        root = posixpath.commonpath([f"/{posixpath.dirname(p)}" for p in (path, *parts[path])])
-        inner, prefix = posixpath.relpath(f"/{path}", root), ""
-        if path not in models and f"models/{inner}" in models.values():
-            prefix = f"{to_anchor(root)}/"
-        new_folder = posixpath.dirname(models.setdefault(path, f"models/{prefix}{inner}"))
-        for part in parts[path]:
-            place = posixpath.join(new_folder, posixpath.relpath(part, folder or "."))
-            new = models.setdefault(part, posixpath.normpath(place))
-            if new != posixpath.normpath(place) or new.startswith("../"):
-                files.leave(path, f"it names `{part}`, which is now in another place", "model")
+    for path in texts:
         if path in included:
             files.account.changed["fragment of a model", "beside the models that include it"] += 1
         elif re.search(r"<mujocoinclude\b", texts[path]):
             message = "a fragment of a model, which none includes: it is compiled with none"
             files.leave(path, message, "fragment of a model")
-    return {path: new for path, new in models.items() if not new.startswith("../")}
+    return models
+
+
+def _group_by_folder(parts: Mapping[str, Sequence[str]]) -> Mapping[str, set[str]]:
+    """Return models with their parts, by the innermost folder that holds all of them.
+
+    What lies in a folder of another group is of that group, so that no path between them breaks.
+    """
+    groups: dict[str, set[str]] = {}
+    folders = {
+        path: posixpath.commonpath([f"/{posixpath.dirname(name)}" for name in (path, *names)])
+        for path, names in parts.items()
+    }
+    for path, folder in sorted(folders.items(), key=lambda item: item[1]):
+        root = next((root for root in groups if _holds(root, folder)), folder)
+        groups.setdefault(root, set()).update((path, *parts[path]))
+    return groups
+
+
+def _holds(root: str, folder: str) -> bool:
+    return posixpath.commonpath((root, folder)) == root
+
+
+def _place_models(root: str, names: set[str], models: dict[str, str]) -> None:
+    """Give files of a group new paths, which lie to each other as they did.
+
+    They are below `models`, unless some are in a folder of that name already, which counts.
+    """
+    fixed = min(names & models.keys(), default=None)
+    if fixed is None:
+        folder, source = "models", root
+        taken = {*models.values()}
+        if any(f"models/{posixpath.relpath(f'/{name}', root)}" in taken for name in names):
+            folder = f"models/{to_anchor(root)}"
+    else:
+        folder, source = posixpath.dirname(models[fixed]), f"/{posixpath.dirname(fixed)}"
+    for name in names - models.keys():
+        new = posixpath.normpath(posixpath.join(folder, posixpath.relpath(f"/{name}", source)))
+        if not new.startswith("../"):
+            models[name] = new
 
 
 _WORK = re.compile(r"^[ \t]*@(?!comment|preamble)(\w+)[ \t]*\{[ \t]*([^,\s{}=]+)", re.M | re.I)
