@@ -11,7 +11,7 @@ from msgspec import structs
 from coursebuild.core.model import measurements
 from coursebuild.core.model.report_files import VERSION, ReportKind
 from coursebuild.core.model.results import Machine
-from mjbench.derive import derive_case, derive_scenario
+from mjbench.derive import derive_case, derive_charts, derive_scenario
 from mjbench.reports.case_report import CaseReport
 from mjbench.reports.model_report import SceneReport
 from mjbench.reports.scene_report import ScenarioReport
@@ -42,7 +42,8 @@ diverged_row = _maker(reports.diverged_row, measurements.WorkPrecisionRow)
 
 def derived(report: ScenarioReport) -> ScenarioReport:
     """The report with all that mjbench says of it, but for its verdict."""
-    return structs.replace(derive_scenario(report, lambda _: ()), verdict=report.verdict)
+    whole = derive_charts(derive_scenario(report, lambda _: ()))
+    return structs.replace(whole, verdict=report.verdict)
 
 
 def _scenario(rows: list[dict[str, Any]], **fields: Any) -> ScenarioReport:
