@@ -147,7 +147,7 @@ def _run_again(
     ]
     if not again:
         return
-    store = options.run_store()  # for what is recorded as varying
+    store = options.run_store()
     store.begin()
     run_options = replace(options, long=True, on_start=lambda path, _: store.note_start(path))
     fresh = options.run_store(fresh=True)
@@ -162,9 +162,6 @@ def _run_again(
             if varying:
                 changes += varying
                 remarks.append(f"{script.path}: two runs differ, so an output is `volatile`")
-                (job,) = jobs([extraction])
-                kept_run = replace(script_run, unrepeated=False, provenance=None)
-                store.put_run(store.inputs(job, extraction.data), kept_run)
         cells, cell_edits = _show_failing_cells(script, script_run, course, [], remarks)
         changes += cell_edits
         if not cell_edits:
