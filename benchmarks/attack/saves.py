@@ -66,8 +66,8 @@ class Saves:
             return violation
         last = _mark(numbers[-1])
         lessons = (folder.root / "content").rglob("*.md")
-        kept = any(last in path.read_text(errors="replace") for path in lessons)
-        return "" if kept else f"save {numbers[-1]} is lost"
+        is_kept = any(last in path.read_text(errors="replace") for path in lessons)
+        return "" if is_kept else f"save {numbers[-1]} is lost"
 
 
 @contextmanager
@@ -77,16 +77,16 @@ def _editor(
     """Save the text with a number in it, again and again; give the numbers that were saved."""
     count, pause, renames = habit
     numbers: list[int] = []
-    ended = threading.Event()
+    end = threading.Event()
 
     def save() -> None:
-        beside = folder.root.parent / "buffer.md"
+        buffer = folder.root.parent / "buffer.md"
         for number in range(count):
-            if ended.is_set():
+            if end.is_set():
                 return
             if renames:
-                beside.write_text(text + _mark(number))
-                beside.replace(path)
+                buffer.write_text(text + _mark(number))
+                buffer.replace(path)
             else:
                 path.write_text(text + _mark(number))
             numbers.append(number)
@@ -97,7 +97,7 @@ def _editor(
     try:
         yield numbers
     finally:
-        ended.set()
+        end.set()
         thread.join()
 
 

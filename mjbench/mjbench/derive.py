@@ -136,8 +136,8 @@ def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...
         verdict, number = report.verdict, report.verdict.better
         if number is not None and report.own_row is not None and report.own_row.status == "ok":
             setting = report.rows[number].setting
-            others = (other for other in reports if other is not report)
-            reason = next(filter(None, (_why_worse(other, setting) for other in others)), "")
+            rivals = (rival for rival in reports if rival is not report)
+            reason = next(filter(None, (_why_worse(rival, setting) for rival in rivals)), "")
             if reason:
                 claim, semicolon, remark = verdict.text.partition("; ")
                 claim = claim.replace(" is better: it ", " ", 1)

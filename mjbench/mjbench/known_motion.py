@@ -59,8 +59,7 @@ from mjbench.simulation import (
 EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
 """Accelerations that a reference may take."""
 TOLERANCE, QUICK_TOLERANCE = 1e-13, 1e-9
-"""Of an integration, for a step and relative to 1 + |y|: where forces have kinks, as the drag of a
-fluid has, each digit takes many more steps, and a first look shows two."""
+"""Of an integration, for a step and relative to 1 + |y|. Kinks of forces make each digit dear."""
 FINER, QUICK_FINER = 16, 8
 """How many times shorter the steps of a `self` reference are than the shortest measured."""
 PARTING_DISTANCE, _PARTING_SHARE = 0.01, 0.1
@@ -287,17 +286,11 @@ def _integrate(model: Any, pilot: Pilot, quick: bool) -> KnownMotion:
     variant.actuator_actearly[:] = 0  # it looks ahead by a timestep, which tends to nothing
     most = QUICK_EVALUATIONS if quick else EVALUATIONS
     tolerance = QUICK_TOLERANCE if quick else TOLERANCE
-
-    def run(method: integrate.Method) -> EngineStates:
-        return integrate.forward_states(
-            variant, pilot.scene.scenario, times, method, evaluations=most
-        )
-
+    run = partial(integrate.forward_states, variant, pilot.scene.scenario, times, evaluations=most)
     states = run(partial(integrate.bulirsch_stoer, tolerance=tolerance))
     source = "Bulirsch–Stoer over mj_forward"
     second_states = run(partial(integrate.dop853, tolerance=tolerance))
-    second = "DOP853 over mj_forward"
-    return _combine(model, pilot, "ode", source, states, second, second_states)
+    return _combine(model, pilot, "ode", source, states, "DOP853 over mj_forward", second_states)
 
 
 def self_reference(
@@ -432,12 +425,11 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
         return {"": Cone(reference, None, 0.0)}
     limits = {}
     for cone, number in CONES.items():
-        if reference.kind == "self" and model.opt.cone == number:
-            limits[cone] = reference
-            continue
-        variant = with_integrator(model, Integrator.EULER, scene.timestep)
-        variant.opt.cone = number
-        limits[cone] = self_reference(variant, pilot, quick=quick)
+        limits[cone] = reference
+        if reference.kind != "self" or model.opt.cone != number:
+            variant = with_integrator(model, Integrator.EULER, scene.timestep)
+            variant.opt.cone = number
+            limits[cone] = self_reference(variant, pilot, quick=quick)
     cones = {}
     for cone, limit in limits.items():
         truth = reference if reference.kind == "closed" else limits["elliptic"]

@@ -56,7 +56,7 @@ _CONSERVED = 1e-8
 def measure_scenario(
     model: Any,
     scene: Scene,
-    drawn: Sequence[DrawnModel] = (),
+    variants: Sequence[DrawnModel] = (),
     *,
     quick: bool = False,
     clock: Clock | None,
@@ -65,7 +65,7 @@ def measure_scenario(
 ) -> scene_report.ScenarioReport:
     """Measure a model (`mjModel`) in one of its scenarios.
 
-    `drawn`: the model with other parameters, for which a verdict has to hold too.
+    `variants`: the model with other parameters, for which a verdict has to hold too.
     `clock`: time so far in ns, best the processor time of the thread; `None`: nothing is timed.
     `tell` gets a line about each stage; `profile`: whether to say where the time goes. A
     `SceneError` where the scenario does not fit the model, or diverges at every timestep.
@@ -89,9 +89,9 @@ def measure_scenario(
     largest = stable_rows(model, pilot, states, parts, quick=quick)
     notes = list(_notes(basis, largest, rows, cost_of))
     draws = list[_Draw]()
-    if drawn:
-        measured = _measure_draws(basis, drawn, quick)
-        draws = parts.collect(f"{scene.name}: drawn parameters", measured)
+    if variants:
+        draw_all = _measure_draws(basis, variants, quick)
+        draws = parts.collect(f"{scene.name}: drawn parameters", draw_all)
         notes += [draw.text for draw in draws]
     if scene.scenario.loop is not None:
         delays = partial(loop_note, model, pilot, states)
@@ -130,18 +130,18 @@ def measure_scenario(
         ),
         contact_model={name: cone.visible_model_error for name, cone in cones.items() if name},
         parts=error_parts,
-        drawn=tuple(part.text for part in drawn),
+        drawn=tuple(part.text for part in variants),
     )
 
     def starts(number: int) -> Sequence[Mapping[Column, float]] | None:
         setting = report.rows[number].setting
         nearby = partial(_nearby_ratios, basis, report, setting, quick)
         near = parts.run(f"{scene.name}: starts nearby", nearby, None)
-        if near is None or not drawn:
-            return near
+        if near is None or len(draws) < len(variants):
+            return None
         with_draws = partial(_drawn_ratios, draws, report, setting)
-        more = parts.run(f"{scene.name}: drawn parameters", with_draws, None)
-        return None if more is None or len(draws) < len(drawn) else [*near, *more]
+        ratios = parts.run(f"{scene.name}: drawn parameters", with_draws, None)
+        return None if ratios is None else [*near, *ratios]
 
     verdict = partial(derive_scenario, report, starts)
     report = parts.run(f"{scene.name}: verdict", verdict, report, at_once=True)
@@ -329,10 +329,10 @@ class _Draw(Struct, frozen=True, eq=False):
     text: str
 
 
-def _measure_draws(basis: Basis, drawn: Sequence[DrawnModel], quick: bool) -> Iterator[_Draw]:
+def _measure_draws(basis: Basis, variants: Sequence[DrawnModel], quick: bool) -> Iterator[_Draw]:
     """Measure the scene's own setting with parameters that are drawn."""
     scene = replace(basis.pilot.scene, exact=None)  # which is the motion of the model as it is
-    for part in drawn:
+    for part in variants:
         words = f"with {part.text} (drawn) the scene's own setting"
         try:
             drawn_basis = _find_basis(part.model, scene, quick=quick)
@@ -342,9 +342,8 @@ def _measure_draws(basis: Basis, drawn: Sequence[DrawnModel], quick: bool) -> It
         row, _ = measure_setting(drawn_basis, drawn_basis.baseline)
         text = f"{words} is lost: {'; '.join(row.reasons)}"
         if row.status == "ok":
-            text = f"{words} errs by "
-            text += "what cannot be predicted" if row.seen is None else f"{row.seen:.2g}"
-            text += " in what is seen"
+            size = "what cannot be predicted" if row.seen is None else f"{row.seen:.2g}"
+            text = f"{words} errs by {size} in what is seen"
         yield _Draw(drawn_basis, row, text)
 
 
@@ -353,10 +352,7 @@ def _drawn_ratios(
     report: scene_report.ScenarioReport,
     rival: scene_report.MeasuredSetting,
 ) -> list[Mapping[Column, float]] | None:
-    """With parameters that are drawn, how many times as large errors are under another setting.
-
-    `None` where nobody knows.
-    """
+    """How many times as large errors are under another setting, for each draw; `None`: unknown."""
     result: list[Mapping[Column, float]] = []
     for draw in draws:
         if draw.basis is None or draw.row is None or draw.row.status != "ok":

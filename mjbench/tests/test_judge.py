@@ -172,8 +172,8 @@ def test_what_is_worse_from_starts_nearby_is_not_better() -> None:
 
 def test_what_is_worse_with_drawn_parameters_is_not_better() -> None:
     starts = [{("step_error", "over the whole run"): ratio} for ratio in (0.9, 1.4)]
-    rows, drawn = masked(position=(0.0049, 0.0049)), ("joint.damping = 0.1",)
-    text = judged(rows, starts, contact_model=CONES, drawn=drawn).verdict.text
+    rows, draws = masked(position=(0.0049, 0.0049)), ("joint.damping = 0.1",)
+    text = judged(rows, starts, contact_model=CONES, drawn=draws).verdict.text
     assert "here, but from starts nearby or with drawn parameters what is seen is 0.9 to" in text
 
 

@@ -152,21 +152,23 @@ def test_a_cylinder_that_hops_as_it_rolls_slides_all_the_way() -> None:
         assert row.slip == pytest.approx(distance, rel=0.05), row.value
 
 
-def drawn(lines: str, mjcf: str = BALL) -> tuple[DrawnModel, ...]:
+def draw_models(lines: str, mjcf: str = BALL) -> tuple[DrawnModel, ...]:
     (scenario,) = parse_declared(f"{TOML}{lines}\n").scenarios
     return drawn_models(mujoco.MjSpec.from_string(mjcf), scenario)
 
 
 def test_parameters_are_drawn_from_their_ranges_each_by_itself() -> None:
-    both = drawn('draw = { "geom:ball.mass" = [2, 1], "geom:wall.size[0]" = "± 50 %" }\ndraws = 4')
-    masses = [float(part.model.body("ball").mass[0]) for part in both]
-    widths = [float(part.model.geom("wall").size[0]) for part in both]
+    pairs = draw_models(
+        'draw = { "geom:ball.mass" = [2, 1], "geom:wall.size[0]" = "± 50 %" }\ndraws = 4'
+    )
+    masses = [float(part.model.body("ball").mass[0]) for part in pairs]
+    widths = [float(part.model.geom("wall").size[0]) for part in pairs]
     assert all(1 <= mass <= 2 for mass in masses) and len(set(masses)) == 4
     assert all(0.5 <= width <= 1.5 for width in widths)
-    alone = drawn('draw = { "geom:ball.mass" = [1, 2] }')
+    alone = draw_models('draw = { "geom:ball.mass" = [1, 2] }')
     assert [part.text for part in alone] == [f"geom:ball.mass = {mass:g}" for mass in masses[:3]]
-    assert both[0].text == f"{alone[0].text}, geom:wall.size[0] {100 * (widths[0] - 1):+.4g} %"
-    assert drawn("draws = 4") == ()
+    assert pairs[0].text == f"{alone[0].text}, geom:wall.size[0] {100 * (widths[0] - 1):+.4g} %"
+    assert draw_models("draws = 4") == ()
 
 
 @pytest.mark.parametrize(
@@ -179,7 +181,7 @@ def test_parameters_are_drawn_from_their_ranges_each_by_itself() -> None:
 )
 def test_what_cannot_be_drawn_is_told(draw: str, message: str) -> None:
     with pytest.raises(SceneError) as caught:
-        drawn(f"draw = {{ {draw} }}")
+        draw_models(f"draw = {{ {draw} }}")
     assert caught.value.message.startswith(message)
     assert caught.value.place is not None and caught.value.place.keys[:3] == ("scenario", 0, "draw")
 
@@ -198,7 +200,7 @@ sample = 0.2
 timesteps = [0.025, 0.05]
 draws = 1
 """
-    for low, high, said in ((100, 900, "errs by "), (2000, 6000, "is lost: ")):
+    for low, high, outcome in ((100, 900, "errs by "), (2000, 6000, "is lost: ")):
         text = f'{toml}draw = {{ "joint:rail.stiffness" = [{low}, {high}] }}'
         model, declarations = mujoco.MjModel.from_xml_string(spring), parse_declared(text)
         (scene,) = scenes(model, declarations, quick=True)
@@ -206,7 +208,10 @@ draws = 1
         report = measure_scenario(model, scene, models, quick=True, clock=None)
         assert report.drawn == (models[0].text,)
         words = f"with {models[0].text} (drawn) the scene's own setting "
-        assert any(note.startswith(words + said) for note in report.notes), (said, report.notes)
+        assert any(note.startswith(words + outcome) for note in report.notes), (
+            outcome,
+            report.notes,
+        )
         assert report.failures == ()
 
 

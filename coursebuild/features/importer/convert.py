@@ -168,8 +168,8 @@ def _place_models(root: str, names: set[str], models: dict[str, str]) -> None:
     fixed = min(names & models.keys(), default=None)
     if fixed is None:
         folder, source = "models", root
-        taken = {*models.values()}
-        if any(f"models/{posixpath.relpath(f'/{name}', root)}" in taken for name in names):
+        places = {*models.values()}
+        if any(f"models/{posixpath.relpath(f'/{name}', root)}" in places for name in names):
             folder = f"models/{to_anchor(root)}"
     else:
         folder, source = posixpath.dirname(models[fixed]), f"/{posixpath.dirname(fixed)}"
