@@ -59,7 +59,7 @@ from mjbench.simulation import (
 EVALUATIONS, QUICK_EVALUATIONS = 2_000_000, 400_000
 """Accelerations that a reference may take."""
 TOLERANCE, QUICK_TOLERANCE = 1e-13, 1e-12
-"""Of an integration, per step and relative to 1 + |y|. With fewer digits, drifts would not be seen."""
+"""Of an integration, per step and relative to 1 + |y|. With fewer digits, drifts are hidden."""
 FINER, QUICK_FINER = 16, 8
 """How many times shorter the steps of a `self` reference are than the shortest measured."""
 PARTING_DISTANCE, _PARTING_SHARE = 0.01, 0.1
