@@ -275,8 +275,9 @@ def _measure_scene(
                 compiled_model, number, host, quick=quick, timed=timed, profile=profile
             )
         except StoppedError as error:
-            scenarios.append(error.report)
-            raise KeyboardInterrupt from None
+            scenarios.append(error.report)  # which says itself what is not known
+            parts.stopped = True
+            return
         except CannotMeasureError as error:
             reason = f"{error.place}: {error}" + (f"; {error.help}" if error.help else "")
             name = compiled_model.scenarios[number].name

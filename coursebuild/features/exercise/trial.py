@@ -26,8 +26,8 @@ from coursebuild.core.model.results import TrialLine
 from coursebuild.core.run.mjcf import readable_error
 from coursebuild.core.run.v8 import LimitError, ScriptError
 from coursebuild.core.values import fingerprint
-from coursebuild.features.exercise.export import export_exercise
 from coursebuild.features.exercise.model import MODEL, Exercise, ExerciseOutput, exercise_inputs
+from coursebuild.features.exercise.python_trials import export_exercise
 from coursebuild.features.lab.compile import LabModule, compile_lab, trial_data
 from coursebuild.features.lab.engines.native import NativeError
 from coursebuild.features.lab.export.script import LabExport

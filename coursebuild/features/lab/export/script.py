@@ -15,14 +15,14 @@ import math
 import platform
 import re
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 from msgspec import Struct
 
-from coursebuild.api import Lesson, Trial, TrialContext
+from coursebuild.api import Lesson, Store, Trial, TrialContext
 from coursebuild.core.text.source import unique_name
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.engines.native import (
@@ -319,12 +319,17 @@ def export_lab(
     readouts = [picture["readouts"] for picture in main["pictures"]]
     code = lab_digest(".", "export/script.jinja")
     key = fingerprint((code, lab.config, metadata, {**model}, main.get("recorded"), readouts))
-    store = context.run_store.store
+    write = functools.partial(_try_export, native, lab, metadata, model, main)
+    return kept_export(context.run_store.store, key, write)
+
+
+def kept_export(store: Store, key: str, write: Callable[[], LabExport]) -> LabExport:
+    """Take an export from the store, or write and keep it."""
     export = store.get_value("exports", key, LabExport)
     if export is not None:
         return export
     try:
-        export = _try_export(native, lab, metadata, model, main)
+        export = write()
     except NativeError as error:
         return LabExport(None, f"the script {error}")
     store.put_value("exports", key, export)

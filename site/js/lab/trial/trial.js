@@ -19,25 +19,21 @@
  *   parity   whether to record what native MuJoCo needs (`true`)
  *   mjb      the model in base64, instead of the reserved buffer
  *
- * The reply:
+ * The reply, whose types are in `reply.py` of the feature:
  *
- *   version         of the engine
  *   tried           `[{entry, what}]` in order
  *   failures        `[{entry, kind, message, at, during}]`: `at` is a simulated time or `null`, `during` the attempt as in `tried`. The
  *                   kind `nan` is a value that is not finite, unless the lab's own code writes `NaN` or `Infinity`; `type` a value of
  *                   the wrong type; `engine` an engine that ended or does not load the model. Every divergence is a failure here
  *   stepsPerSecond  of the lab with its controller and samples, without recording
- *   printed         by the engine
  *   main            the main run, or `null` if the lab does not start:
  *
- *     seconds, steps, timestep   how long it was
  *     stopped, diverged          `stopAt`, `code` or `null`; whether it diverged
  *     plots                      `{times, plots: [[values of each trace]]}`, at most 1000 times; a gap is `null`
  *     pictures                   `{time, frame, readouts}` at the start and at the end
  *     scene                      as the page gets it, with textures of at most 256 × 256 and faces of cubes of 64 × 64
  *     fill                       the part of the picture that the motion fills which Play gives
  *     moved                      the part of it in which something is seen to move within 3 s after Play
- *     fallen                     `[{name, height, time}]`: bodies that have fallen out of the scene, and where they are at the end
  *     arrows                     metres for each unit of momentum, angular momentum and force: the middle arrow seen is 0.3 of the
  *                                picture's height
  *     parity                     what native MuJoCo needs (parity.js)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import msgspec
 from msgspec.structs import replace
@@ -20,7 +21,6 @@ from coursebuild.features.exercise.model import CONTROLLER, FORMULA, MATHS, MODE
 from coursebuild.features.lab.engines.native import (
     LAB_ENGINE,
     NativeEngine,
-    NativeError,
     lab_digest,
 )
 from coursebuild.features.lab.export.script import (
@@ -29,6 +29,7 @@ from coursebuild.features.lab.export.script import (
     LabExport,
     export_metadata,
     export_script,
+    kept_export,
 )
 from coursebuild.features.lab.model import Test, Writing
 
@@ -54,16 +55,8 @@ def export_exercise(
     code = lab_digest(".", "export/script.jinja")
     texts = (exercise.solution.text, exercise.lab.config, exercise.lab.fields)
     key = fingerprint((code, exercise.data(), texts, metadata, {**files}, tuple(start)))
-    store = context.run_store.store
-    export = store.get_value("exports", key, LabExport)
-    if export is not None:
-        return export
-    try:
-        export = _try(context, native, exercise, metadata, files, start)
-    except NativeError as error:
-        return LabExport(None, f"the script {error}")
-    store.put_value("exports", key, export)
-    return export
+    write = partial(_try, context, native, exercise, metadata, files, start)
+    return kept_export(context.run_store.store, key, write)
 
 
 def _try(
