@@ -183,5 +183,5 @@ def label_anchor(label: str) -> str:
 
 
 def to_anchor(name: str) -> str:
-    """Turn a name into an anchor."""
-    return re.sub("[^A-Za-z0-9]+", "-", name).strip("-").lower() or "x"
+    """Turn a name, in any script, into an anchor."""
+    return re.sub(r"[\W_]+", "-", name).strip("-").lower() or "x"

@@ -12,7 +12,9 @@ from coursebuild.features.importer.context import LessonContext
 
 _BRACES = r"\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
 _STATEMENT = (
-    r"^(?:import[ ](?:[^\n]*[ ]from[ ])?['\"]|export[ ](?:const|let|function|default)\b)"
+    r"(?:\A\n*|(?<=\n\n))"  # in a paragraph it is text
+    r"(?:import[ ](?:(?:[\w$*{},. \t]|\n(?!\n))+?\sfrom[ ])?['\"]"
+    r"|export[ ](?:const|let|function|default)\b)"
     r"[^\n]*(?:\n(?!</)[^\n]+)*\n?"  # not the end of a script element
 )
 _MDX = re.compile(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
@@ -44,7 +46,7 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
         return part[0]
     if name is None:
         if part["statement"]:
-            message = f"`{part[0].splitlines()[0]}`, which is JavaScript"
+            message = f"`{part[0].strip().splitlines()[0]}`, which is JavaScript"
             context.leave("statement of JavaScript", message)
         return ""
     if name[0].isupper():

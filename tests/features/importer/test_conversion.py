@@ -103,14 +103,29 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
             "```html\n</script>\n```\n",
             "Text.\n\n```html\n</script>\n```\n",
         ),
+        (
+            "import {\n  A,\n} from './a'\n\n<A className='b' />\n\nText may\nexport const, too.\n",
+            "Text may\nexport const, too.\n",
+        ),
         ("## <!-- md:setting config.on -->\n\nText.\n", "## `md:setting config.on`\n\nText.\n"),
+        ("## A {#标题}\n\n[Text](#标题).\n", "## A {#标题}\n\n[Text](#标题).\n"),
         ("## A {#a-–-b}\n\nText.\n", "## A {#a-b}\n\nText.\n"),
         ('=== ":simple-linux: Linux"\n\n    Text.\n', "**Linux**\n\nText.\n"),
         ("```js{1,3}\nf()\n```\n", "```js\nf()\n```\n"),
         ("- a\n\n  ```js\n  `${x}`\n  }\n  ```\n", "- a\n\n  ```js\n  `${x}`\n  }\n  ```\n"),
         ("Code `\\a{b}` and\n`c` here.\n", "Code `\\a{b}` and\n`c` here.\n"),
     ],
-    ids=["script", "comment", "id", "icon", "lines", "fence in a list", "code over lines"],
+    ids=[
+        "script",
+        "import",
+        "comment",
+        "letters",
+        "id",
+        "icon",
+        "lines",
+        "fence in a list",
+        "code over lines",
+    ],
 )
 def test_a_text_of_another_tool_keeps_all_that_readers_see(
     tmp_path: Path, source: str, lesson: str
