@@ -212,7 +212,7 @@ class PagePart(Struct, frozen=True, kw_only=True):
     bundled: str = ""
     """The name of a script of coursebuild itself, instead of `code`."""
     late: bool = False
-    """Whether it is loaded only when a reader comes near."""
+    """Whether the scripts of all pages load it, when it is needed."""
     kinds: tuple[str, ...] = ()
     """The kinds of pages it is for, if not all with the mark."""
     texts: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-/** The script of quizzes, loaded when one comes near (see page/quizzes.js), and with the page of the review. */
+/** The script of quizzes, loaded with a page that holds some (see page/quizzes.js), and with the page of the review. */
 
 import { leaveQuizzes, mountQuestion, mountQuizzes } from './quiz/mount.js'
 

@@ -23,7 +23,6 @@ def review_of(page: Page) -> Locator:
 
 
 def is_chosen(part: Locator, option: str) -> None:
-    part.scroll_into_view_if_needed()  # it comes alive when it comes near
     expect(part.get_by_label(option)).to_be_checked()
 
 

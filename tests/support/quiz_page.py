@@ -31,10 +31,9 @@ def clean_page(context: BrowserContext, site: str) -> Iterator[Page]:
 
 
 def visit(page: Page, address: str) -> None:
-    """Load the page, and come near to its quiz."""
+    """Load the page; its quiz comes alive."""
     page.goto("about:blank")
     page.goto(address)
-    page.locator(".question").first.scroll_into_view_if_needed()
     expect(page.locator(".question.is-live")).to_have_count(QUESTIONS)
 
 

@@ -18,7 +18,6 @@ def question(page: Page, key: str) -> Locator:
 
 
 def choose(part: Locator, option: str) -> None:
-    part.scroll_into_view_if_needed()  # questions come alive when they come near
     part.get_by_label(option, exact=False).check()
     part.locator(".quiz-check").click()
 

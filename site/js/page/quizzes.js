@@ -1,11 +1,10 @@
 /**
- * Loads quizzes when they come near. Their script, `quiz.js`, is a classic one, since browsers load no modules from disk; its
- * functions are in the global `coursebuildQuizzes`. Until it is loaded, and if it cannot be, the answers are behind folds.
+ * Loads the script of quizzes, with the page: a quiz that came alive when a reader comes near would push what is below it away from
+ * the pointer. `quiz.js` is a classic script, since browsers load no modules from disk; its functions are in the global
+ * `coursebuildQuizzes`. Until it is loaded, and if it cannot be, the answers are behind folds.
  */
 
 import { selectAll } from './select.js'
-
-const NEAR = '800px 0px' // of the window's edge
 
 const pendingParts = new Set() // parts of the page, each with the function that mounts its quizzes
 let isLoading = false
@@ -16,20 +15,11 @@ let isLoading = false
  * @param {Record<string, any>} progress see progress/store.js
  */
 export function mountQuizzes(part, words, progress) {
-  const questions = selectAll(part, '.question[data-question]')
-  if (questions.length === 0) return
+  if (selectAll(part, '.question[data-question]').length === 0) return
   const mount = () => globalThis.coursebuildQuizzes.mountQuizzes(part, words, progress)
   if (globalThis.coursebuildQuizzes) return mount()
   pendingParts.add({ part, mount })
-  const observer = new IntersectionObserver(
-    (entries) => {
-      if (!entries.some((entry) => entry.isIntersecting)) return
-      observer.disconnect()
-      load()
-    },
-    { rootMargin: NEAR },
-  )
-  questions.forEach((question) => observer.observe(question))
+  load()
 }
 
 /** End the quizzes in a part that was removed from the page. */
