@@ -117,6 +117,8 @@ class Picture(Struct, frozen=True):
     height: int
     title: str
     anchor: str
+    film: str = ""
+    """The path of a moving picture of the same proportions."""
 
 
 class FenceKind(Struct, Generic[B], frozen=True, kw_only=True):

@@ -6,7 +6,7 @@ import io
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageSequence
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 
@@ -24,3 +24,13 @@ def read_png(data: bytes) -> NDArray[np.uint8]:
     with Image.open(io.BytesIO(data), formats=["PNG"]) as picture:
         assert picture.info == {}, "no time, no text"
         return np.asarray(picture.convert("RGBA"))
+
+
+def read_moving_png(data: bytes) -> tuple[list[NDArray[np.uint8]], set[int], int]:
+    """The frames of an animated PNG, how long they are shown, ms, and how often they go round."""
+    frames, durations = [], set()
+    with Image.open(io.BytesIO(data)) as film:
+        for frame in ImageSequence.Iterator(film):
+            durations.add(film.info["duration"])
+            frames.append(np.asarray(frame.convert("RGBA")))
+        return frames, durations, film.info["loop"]

@@ -141,6 +141,8 @@ class PictureLink(Struct, frozen=True):
     height: int
     title: str
     href: str
+    film: str = ""
+    """The address of a moving picture, relative to the page."""
 
 
 class LessonCard(Struct, frozen=True):
@@ -242,7 +244,9 @@ def _pictures_of(library: Library, place: urls.Place, owner: Owner) -> tuple[Pic
         if picture is not None:
             src = place.href(picture.path)
             href = place.href(urls.owner_path(owner), picture.anchor)
-            links.append(PictureLink(src, picture.width, picture.height, picture.title, href))
+            film = place.href(picture.film) if picture.film else ""
+            size = picture.width, picture.height
+            links.append(PictureLink(src, *size, picture.title, href, film))
     return tuple(links)
 
 

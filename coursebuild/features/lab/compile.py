@@ -162,7 +162,7 @@ def _control(functions: Mapping[Entry, str], i: int, control: schema.Control) ->
 
 _FIELDS = (
     *("title", "model", "key", "height", "camera", "toggles", "overlays", "forceScale"),
-    *("autoplay", "grab", "stopAt", "start", "still", "trail", "seed"),
+    *("autoplay", "grab", "stopAt", "start", "still", "film", "trail", "seed"),
 )
 """Fields of a lab that are passed on as written; only overlays become a list."""
 _PLOT = ("ylabel", "xlabel", "window", "ymin", "ymax", "height", "refLines")

@@ -182,7 +182,7 @@ def lab_picture(block: Lab, lab: Struct | None) -> Picture | None:
     if not isinstance(lab, PublishedLab) or lab.record is None:
         return None
     width, height = lab.record.size
-    return Picture(lab.picture, width, height, block.fields.title, lab.name)
+    return Picture(lab.picture, width, height, block.fields.title, lab.name, lab.film)
 
 
 def index_lab(reader: IndexReader, lab: Lab) -> None:

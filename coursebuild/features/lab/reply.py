@@ -121,6 +121,7 @@ class MainRun(TypedDict):
     pictures: Annotated[list[MainPicture], Meta(min_length=1)]
     plots: MainPlots
     scene: dict[str, Any]
+    film: list[Any]
     arrows: dict[str, Number | str] | None
     fallen: NotRequired[list[Fallen]]
     fill: Number | None
@@ -228,6 +229,8 @@ class LabOutput(Struct, frozen=True):
     record: LabRecord | None = None
     picture: bytes = b""
     """PNG on a transparent ground, if there is a record; SVG of a lab without an engine."""
+    film: bytes = b""
+    """Animated PNG, if the lab asks for one."""
     script: tuple[str, str] | None = None
     """Name and text of a Python script that does the same; `{{control:N}}` in it stands for the
     value of control N."""
@@ -247,6 +250,8 @@ class PublishedLab(Struct, frozen=True):
     record: LabRecord | None
     picture: str
     """Site path; empty if there is no record."""
+    film: str
+    """Site path; empty if there is none."""
     attempt_count: int
     parity: tuple[str, dict[str, str]]
     """The key of a text that says what agrees with another engine, and its values."""
@@ -305,10 +310,11 @@ def publish_labs(results: Results, assets: Assets) -> PublishedTrials:
             if lab.script is not None:
                 config["exportPython"] = dict(zip(("name", "text"), lab.script, strict=True))
         picture = publish(f"{name}.{ending}", lab.picture) if lab.record is not None else ""
+        film = publish(f"{name}-film.png", lab.film) if lab.film else ""
         data = json.dumps(config, ensure_ascii=False, separators=(",", ":")).encode()
         address = publish(f"{name}.json", data)
         labs[name] = PublishedLab(
-            name, address, script, lab.record, picture, line.tried, lab.parity
+            name, address, script, lab.record, picture, film, line.tried, lab.parity
         )
     return PublishedTrials(labs, tuple(files.values()))
 

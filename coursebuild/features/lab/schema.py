@@ -33,6 +33,8 @@ Overlay: TypeAlias = Literal[
 OVERLAYS: tuple[Overlay, ...] = get_args(Overlay)
 Scalar: TypeAlias = float | str
 Step: TypeAlias = Text | dict[str, Scalar]
+FILM_RATE = 10
+"""Pictures of a film in a second, as in `record.js`."""
 Height: TypeAlias = Annotated[int, Meta(ge=80, le=2000)]
 JAVASCRIPT_NAME = r"^[A-Za-z_$][A-Za-z0-9_$]*$"
 
@@ -274,6 +276,10 @@ class SimLab(CommonLab, frozen=True, forbid_unknown_fields=True):
         Text | None, Meta(description="the label of the button that Play presses at the start")
     ] = None
     still: Annotated[str, Meta(description="why nothing moves when a reader presses Play")] = ""
+    film: Annotated[
+        Annotated[float, Meta(ge=0.5, le=2.5)] | None,
+        Meta(description="seconds after Play that the card of a path shows in motion"),
+    ] = None
     setup: Annotated[str, Meta(description="statements run after load and every reset")] = ""
     controller: Annotated[str, Meta(description="statements run before every step")] = ""
     controls: Annotated[tuple[Control, ...], Meta(description="sliders, selects and buttons")] = ()

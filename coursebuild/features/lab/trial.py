@@ -379,14 +379,15 @@ class _LabTrial(Struct, frozen=True):
         output = LabOutput(module.code, config)
         if self.context.static and not failures and main is not None:
             # Draw the start of the main run
-            from coursebuild.features.lab.picture.static import draw_picture
+            from coursebuild.features.lab.picture.static import draw_film, draw_picture
 
             picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
             store = self.context.run_store.store
             picture = store.get_or_make(
                 "pictures", picture_key, lambda: draw_picture(self.lab, main)
             )
-            output = replace(output, record=lab_record(lab, main), picture=picture)
+            film = store.get_or_make("films", picture_key, lambda: draw_film(self.lab, main))
+            output = replace(output, record=lab_record(lab, main), picture=picture, film=film)
         return _Evaluation(reply, failures, remarks, output)
 
     def _check_code(self, mjb: bytes) -> list[Diagnostic]:

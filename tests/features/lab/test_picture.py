@@ -14,6 +14,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from coursebuild.features.lab.picture.draw import Floor, FreeCamera, Solid, draw
+from coursebuild.features.lab.picture.png import moving_png, png
 from coursebuild.features.lab.picture.raster import TextureMapping, texture_of
 from coursebuild.features.lab.picture.shapes import (
     Kind,
@@ -24,8 +25,7 @@ from coursebuild.features.lab.picture.shapes import (
     smooth_surface,
     surface,
 )
-from coursebuild.features.lab.picture.static import png
-from support.model_files import read_png
+from support.model_files import read_moving_png, read_png
 
 FRONT = FreeCamera(azimuth=90, elevation=0, distance=4, target=(0, 0, 0))
 """Looks along +y: x is to the right, z is up."""
@@ -207,6 +207,24 @@ def test_a_file_is_read_back_as_it_was() -> None:
         assert np.array_equal(read_png(png(pixels)), pixels)
         pixels[..., 3] = 255
         assert np.array_equal(read_png(png(pixels)), pixels)
+
+
+def test_a_moving_file_is_read_back_as_it_was() -> None:
+    random = np.random.default_rng(1)
+    frames = [random.integers(0, 255, (12, 20, 4), dtype=np.uint8)]
+    for part in ((3, 5, 7, 9), (0, 12, 0, 20), (4, 4, 4, 4), (11, 12, 19, 20)):
+        frame = frames[-1].copy()
+        top, bottom, left, right = part
+        frame[top:bottom, left:right] = random.integers(0, 255, frame[top:bottom, left:right].shape)
+        frames.append(frame)
+    for opaque in (False, True):
+        if opaque:
+            frames = [
+                np.dstack((frame[..., :3], np.full((12, 20), 255, np.uint8))) for frame in frames
+            ]
+        read, durations, rounds = read_moving_png(moving_png(frames, rate=25, rounds=3))
+        assert (len(read), durations, rounds) == (len(frames), {40}, 3)
+        assert all(map(np.array_equal, read, frames)), opaque
 
 
 def test_normals_of_an_ellipsoid_are_those_of_its_equation() -> None:

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 
 from coursebuild.api import Source
@@ -26,6 +27,7 @@ from coursebuild.features.lab.verdict import failure_diagnostics
 from support.fixture_cases import fixture_text
 from support.lab_lessons import RIGHT, course, fence, run_check
 from support.lab_values import BALL, lab_of, make_lab
+from support.model_files import read_moving_png
 from support.scratch_course import Folder
 
 RESETS = '{"model": "ball",\n"setup": "ctx.n = (ctx.n ?? 0) + 1; data.qvel[1] = ctx.n"}'
@@ -255,3 +257,24 @@ def test_what_only_the_browsers_engine_says_of_an_edited_model_is_told_at_its_li
     wording = "the browser's engine says: error opening file 'part.xml' in <include>"
     assert diagnostic.message == wording
     assert "beside which there are no files" in diagnostic.help
+
+
+@pytest.mark.engine
+def test_a_path_shows_the_film_of_its_lab_where_motion_is_welcome(
+    tmp_path: Path, stores: Path
+) -> None:
+    lab = fence('{"model": "ball", "height": 240, "film": 1.5, "verify": {"seconds": 1.5}}')
+    folder = course(tmp_path / "course", stores, "## A lab\n\n" + lab)
+    path = '[[path]]\ntitle = "Falling"\nlessons = ["1.2"]\n\n'
+    folder.replace("content/course.toml", "[[level]]", f"{path}[[level]]")
+    build = folder.main("build")
+    assert build.status == 0, build.out + build.err
+    (file,) = (tmp_path / "course/public").glob("assets/labs/1.2-lab-1-film.*.png")
+    home = (tmp_path / "course/public/index.html").read_text("utf-8")
+    media = "(prefers-reduced-motion: no-preference)"
+    assert f'<source srcset="assets/labs/{file.name}" media="{media}">' in home
+    frames, durations, rounds = read_moving_png(file.read_bytes())
+    assert (len(frames), durations, rounds) == (15, {100}, 2)
+    assert {frame.shape for frame in frames} == {(160, 320, 4)}
+    places = [np.flatnonzero((f[..., 3] == 255).any(axis=1)).mean() for f in frames]
+    assert places == sorted(places) and places[-1] > places[0] + 20, "the ball falls"

@@ -7,8 +7,6 @@ are classes that the style sheet defines for light and dark pages; text has the 
 from __future__ import annotations
 
 import math
-import struct
-import zlib
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 from typing import Any, TypeGuard
@@ -24,11 +22,12 @@ from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.lab.equations.reference import CurveRun
 from coursebuild.features.lab.model import ODE, Lab
 from coursebuild.features.lab.picture.draw import Floor, FreeCamera, draw, round_length
+from coursebuild.features.lab.picture.png import moving_png, png
 from coursebuild.features.lab.picture.raster import SKY, texture_of
 from coursebuild.features.lab.picture.scenery import ground_of, scene_solids
 from coursebuild.features.lab.picture.shapes import light_of
 from coursebuild.features.lab.reply import LabRecord, MainRun, unpack_arrays
-from coursebuild.features.lab.schema import Plot, TraceFields
+from coursebuild.features.lab.schema import FILM_RATE, Plot, TraceFields
 
 _WIDTH = 640
 _USUAL = 1.6
@@ -36,21 +35,39 @@ _USUAL = 1.6
 _FROM_AFAR = 1000.0
 _BAR = 0.2
 """The largest part of the picture's width that the scale bar takes."""
+_FILM_ROUNDS = 2
+"""A film ends within five seconds, so that it needs no button (WCAG 2.2, 2.2.2)."""
 _LARGE = 1e9
 """From here on numbers are written with powers of ten, as in the live lab."""
 
 
 def draw_picture(lab: Lab, main: MainRun) -> bytes:
     """Draw the start of the main run of a lab's trial, as PNG."""
-    scene = unpack_arrays(main["scene"])
     frame = unpack_arrays(main["pictures"][0]["frame"])
+    return png(_draw_frame(lab, unpack_arrays(main["scene"]), frame, _size(lab)))
+
+
+def draw_film(lab: Lab, main: MainRun) -> bytes:
+    """Draw the film of a lab's trial, as animated PNG of half the width; empty without one."""
+    width, height = _size(lab)
+    scene = unpack_arrays(main["scene"])
+    frames = unpack_arrays(main["film"])
+    if not frames:
+        return b""
+    drawn = [_draw_frame(lab, scene, frame, (width // 2, height // 2)) for frame in frames]
+    return moving_png(drawn, FILM_RATE, _FILM_ROUNDS)
+
+
+def _draw_frame(
+    lab: Lab, scene: dict[str, Any], frame: Any, size: tuple[int, int]
+) -> NDArray[np.uint8]:
     camera = _camera(lab, scene["camera"])
     light = light_of(scene, np.asarray(frame, dtype=float), camera.forward)
     skies = (texture_of(t) for t in scene["textures"] if t["type"] == SKY)
     solids = tuple(scene_solids(scene, frame))
     ground = ground_of(scene)
     floor = None if ground is None else Floor(ground, camera.distance, camera.target)
-    return png(draw(solids, camera, _size(lab), light, next(skies, None), floor))
+    return draw(solids, camera, size, light, next(skies, None), floor)
 
 
 def _camera(lab: Lab, record: dict[str, Any]) -> FreeCamera:
@@ -64,22 +81,6 @@ def _camera(lab: Lab, record: dict[str, Any]) -> FreeCamera:
         fovy = math.degrees(2 * math.atan(wider * math.tan(math.radians(fovy) / 2)))
     target = tuple(record["target"])
     return FreeCamera(record["azimuth"], record["elevation"], distance, target, fovy)
-
-
-def png(pixels: NDArray[np.uint8]) -> bytes:
-    """Write an RGBA picture as a PNG file, with the same bytes each time."""
-    opaque = bool((pixels[..., 3] == 255).all())
-    height, width = pixels.shape[:2]
-    rows = pixels[..., : 3 if opaque else 4].reshape(height, -1)
-    # Each row becomes its difference from the row above: PNG's filter 2.
-    differences = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
-    filtered_rows = np.column_stack((np.full(height, 2, np.uint8), differences))
-    header = struct.pack(">IIBBBBB", width, height, 8, 2 if opaque else 6, 0, 0, 0)
-    data = zlib.compress(filtered_rows.tobytes(), 8)  # 9 takes twice as long, for 4 % less
-    file = b"\x89PNG\r\n\x1a\n"
-    for chunk in (b"IHDR" + header, b"IDAT" + data, b"IEND"):
-        file += struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
-    return file
 
 
 def _size(lab: Lab) -> tuple[int, int]:

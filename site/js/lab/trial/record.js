@@ -1,5 +1,6 @@
 /** Records a trial's main run for the lab's static form: pictures, samples and readouts. */
 
+import { nameOf } from '../core/names.js'
 import { LabError } from '../core/piece.js'
 
 const POINTS = 1000 // of a recorded trace, at most
@@ -14,6 +15,27 @@ export function picture(lab) {
     if (!(error instanceof LabError) || error.kind === 'engine') throw error
   }
   return { time: lab.time, frame: lab.frame(null).slice(), readouts }
+}
+
+const FILM_RATE = 10 // pictures of a film in a second; schema.py has the same
+
+/** What is seen in the first seconds after Play, if a film is asked for. */
+export function film(trial, { arrows }) {
+  const { film: seconds, start, controls } = trial.config
+  if (!seconds) return []
+  return trial.fresh({ ...trial.config, arrows }, (lab) => {
+    if (start) lab.press(controls.findIndex(({ label }) => label === start))
+    const [frames, begin] = [[lab.frame(null).slice()], lab.time]
+    const advance = (i) => trial.advance(lab, begin + i / FILM_RATE, Infinity, ['stopAt', 'code'])
+    for (let i = 1; i < Math.round(seconds * FILM_RATE) && advance(i) === null; i++) frames.push(lab.frame(null).slice())
+    return frames
+  })
+}
+
+/** The bodies that have fallen out of the scene; `heights`: of their tops, m, by body. */
+export function fallenBodies(lab, engine, heights) {
+  const name = (body) => nameOf(engine, lab.model, engine.k.obj.BODY, body) || `body ${body}`
+  return [...heights].map(([body, height]) => ({ name: name(body), height, time: lab.time }))
 }
 
 /** The samples since the lab's start, at most POINTS of them: {times, plots: [[values of each trace]]}. */

@@ -32,6 +32,7 @@
  *     plots                      `{times, plots: [[values of each trace]]}`, at most 1000 times; a gap is `null`
  *     pictures                   `{time, frame, readouts}` at the start and at the end
  *     scene                      as the page gets it, with textures of at most 256 × 256 and faces of cubes of 64 × 64
+ *     film                       what is seen in the first `film` seconds after Play, ten times a second; without `film`, nothing
  *     fill                       the part of the picture that the motion fills which Play gives
  *     moved                      the part of it in which something is seen to move within 3 s after Play
  *     arrows                     metres for each unit of momentum, angular momentum and force: the middle arrow seen is 0.3 of the
@@ -49,13 +50,12 @@ import { OVERLAYS } from '../core/frame.js'
 import { Lab } from '../core/lab.js'
 import { LabError, call, current, numeric, plottable, readable } from '../core/piece.js'
 import { Framing } from '../core/framing.js'
-import { nameOf } from '../core/names.js'
 import { act, controlActs, describe } from './acts.js'
 import { packed } from './base64.js'
 import { deepContact } from './deep.js'
 import { Motion } from './motion.js'
 import { ParityRecorder } from './parity.js'
-import { picture, record, withSmallTextures } from './record.js'
+import { fallenBodies, film, picture, record, withSmallTextures } from './record.js'
 import { resetDiffers } from './reset.js'
 import { watchedCode } from './watched.js'
 
@@ -124,6 +124,7 @@ class Trial {
       this.claims()
       this.goal()
       if (reply.main !== null) this.frame(reply.main)
+      if (reply.main !== null) reply.main.film = packed(film(this, reply.main))
       // last: whether a short run took a millisecond of the clock may change nothing that is published
       if (reply.main !== null && this.took === 0) this.pace(reply.main)
     } catch (error) {
@@ -376,11 +377,7 @@ class Trial {
       pictures,
       plots: record(lab),
       parity,
-      fallen: [...this.framing.fallen].map(([body, height]) => ({
-        name: nameOf(this.engine, lab.model, this.engine.k.obj.BODY, body) || `body ${body}`,
-        height,
-        time: lab.time,
-      })),
+      fallen: fallenBodies(lab, this.engine, this.framing.fallen),
       fill: null, // see `frame`; likewise those below
       moved: null,
       arrows: null,
