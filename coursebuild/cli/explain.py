@@ -17,7 +17,6 @@ from typing import Literal
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.cli.explain_values import origins_text, value_origins
 from coursebuild.core.files.resources import rules_page
 from coursebuild.core.model import (
     Course,
@@ -29,25 +28,35 @@ from coursebuild.core.model import (
     Link,
     ModelTarget,
     NumberBinding,
+    Table,
     UrlTarget,
     block_inlines,
     document_blocks,
+    find_inlines,
     local_file,
     walk_inlines,
 )
+from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.model.report_files import BENCH, ENGINES
 from coursebuild.core.registry import feature_trials, installed_features
 from coursebuild.core.run.dependencies import Kind, describe, is_there, sought_files, state_changes
 from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.run.run_record import RunRecord
+from coursebuild.core.scripts.bindings import check_bindings
+from coursebuild.core.scripts.bound_places import BoundNumber, bound_values
+from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract, jobs
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.scripts.printed_text import describe_line
+from coursebuild.core.scripts.table_cells import table_rows
+from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.rules import RULES, Rule
 from coursebuild.output import CLEAN, write
 from coursebuild.pipeline.arguments import add_format, options_of, style_of
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
-from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, visible
+from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, location, visible
 from coursebuild.report.values import json_text, plain, plural
 
 State = Literal["remembered", "would run", "norun"]
@@ -341,3 +350,68 @@ def _describe_run(
     run = record.stored_run
     last = {"made": record.timestamp, "seconds": run.seconds, "outcome": run.outcome.value}
     return replace(explanation, depends=tuple(dict.fromkeys(depends)), **last)
+
+
+class ValueOrigin(Struct, frozen=True):
+    """Where a shown value comes from."""
+
+    text: str
+    script: str = ""
+    """Empty for one that its author gives."""
+    places: tuple[str, ...] = ()
+    """The printed line in words, and the place in it; several where the author chose none."""
+    recorded: tuple[str, ...] = ()
+    """Where these are recorded in the lesson."""
+    source: str = ""
+    """That of a given value."""
+
+
+def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ...]:
+    """The values that a line of a lesson or page shows."""
+    document = next((d for _, d in course.shown_texts if d.source.path == path), None)
+    if document is None:
+        raise UsageError(f"{path} is no lesson or page of this course, and binds no number")
+    if line > len(document.source.line_starts):
+        raise UsageError(f"{path} has no line {line}")
+    paths = [extraction.path for extraction in extract(course).value]
+    addresses = known_addresses(course.records)
+    outputs = PrintedOutputs(verify(course, (), addresses), (), paths)
+    check_bindings(document, outputs, addresses)
+
+    origins = [
+        (number.span, ValueOrigin(number.text, source=number.source or "no source"))
+        for number in find_inlines(document, NumberBinding)
+        if number.source is not None
+    ]
+    for binding, value in bound_values(document, outputs):
+        at = addresses.get(value, ())
+        bound = BoundNumber(binding, outputs, at)
+        places = [place for texts in bound.groups for place in bound.look_up(texts)]
+        spans = [place.span for place in places if place.span is not None]
+        texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
+        origin = ValueOrigin(binding.text, value.script, texts, tuple(map(location, spans)))
+        origins.append((binding.span, origin))
+    for verdict in outputs.of_document(document):
+        body, filters = verdict.recording.body, verdict.comparison.filters
+        rows = table_rows(body, filters) if isinstance(body, Table) else ()
+        for row, value in zip(rows, row_values(document, verdict.recording, filters), strict=True):
+            at = addresses.get(value, ())
+            texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
+            span = row[0].cell.span.to(row[-1].cell.span)
+            origins.append((span, ValueOrigin(value.text, value.script, texts)))
+    return tuple(origin for span, origin in origins if span.line <= line <= span.end_line)
+
+
+def origins_text(place: str, origins: tuple[ValueOrigin, ...]) -> str:
+    """What is known of the values on a line, as text for people."""
+    lines = [f"{visible(place)} shows {plural(len(origins), 'value') if origins else 'no value'}"]
+    for origin in origins:
+        if not origin.script:
+            answer = f"given: {origin.source}" if origin.source else "bound to no script"
+            lines.append(f"  `{visible(origin.text)}` is {answer}")
+            continue
+        places = origin.places or ("a line that is not known yet: run `coursebuild check`",)
+        lines.append(f"  `{visible(origin.text)}` is printed by {visible(origin.script)}")
+        lines += [f"    {visible(text)}" for text in places]
+        lines += [f"    recorded at {visible(at)}" for at in origin.recorded]
+    return "\n".join(lines) + "\n"

@@ -20,7 +20,7 @@ import resource
 import stat
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from coursebuild.core.files import trust
 from coursebuild.core.files.course_root import DECISIVE, FOLDERS, find_course_root, is_dropping
@@ -166,9 +166,17 @@ def _state(root: str, input_paths: list[str], began: int | None = None) -> str:
             changed after `began`, or so shortly before that its time proves nothing.
         OSError: something cannot be read.
     """
+    digest = hashlib.blake2b(digest_size=32)
+
+    def add(*parts: object) -> None:
+        digest.update("\0".join(map(str, (*parts, ""))).encode("utf-8", "surrogateescape") + b"\n")
+
+    add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
     course = (os.path.join(root, name) for name in FOLDERS)
-    variables = (os.environ.get(name, "") for name in _VARIABLES)
-    return _hash((sys.executable, *variables), (*course, *_tool(), *input_paths), began)
+    for path in (*course, *_tool(), *input_paths):
+        for row in _rows(path, began):
+            add(*row)
+    return digest.hexdigest()
 
 
 def _tool() -> list[str]:
@@ -178,19 +186,6 @@ def _tool() -> list[str]:
     if os.path.isdir(os.path.join(source, "site", "dist")):
         tool += (os.path.join(source, n) for n in ("mjcourse", "templates", "site/dist"))
     return tool
-
-
-def _hash(parts: tuple[str, ...], paths: Iterable[str], began: int | None) -> str:
-    digest = hashlib.blake2b(digest_size=32)
-
-    def add(*parts: object) -> None:
-        digest.update("\0".join(map(str, (*parts, ""))).encode("utf-8", "surrogateescape") + b"\n")
-
-    add(sys.version, *parts)
-    for path in paths:
-        for row in _rows(path, began):
-            add(*row)
-    return digest.hexdigest()
 
 
 def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:

@@ -128,7 +128,12 @@ class CheckedCourse(Struct, frozen=True):
         diagnostics = self.diagnostics
         if documents is not None:
             used_paths = _used_files(self.course, documents, verification.results)
-            diagnostics = _select_diagnostics(self.course, documents, diagnostics, used_paths)
+            own_paths = {*documents, self.course.map.path}
+            diagnostics = tuple(
+                d
+                for d in diagnostics
+                if d.span.path in own_paths or (d.is_error and d.span.path in used_paths)
+            )
         report = judge(
             self.course,
             (*diagnostics, *verification.run_diagnostics, *further),
@@ -242,21 +247,6 @@ def _used_files(course: Course, documents: Collection[str], results: Results) ->
 
 
 _INCLUDE = re.compile(r"""<include\s[^<>]*?\bfile\s*=\s*["']([^"'<>]+)""")
-
-
-def _select_diagnostics(
-    course: Course,
-    documents: Collection[str],
-    diagnostics: Iterable[Diagnostic],
-    used_paths: Collection[str],
-) -> tuple[Diagnostic, ...]:
-    """What is wrong in these documents and the map, and the errors in files that they use."""
-    own_paths = {*documents, course.map.path}
-    return tuple(
-        d
-        for d in diagnostics
-        if d.span.path in own_paths or (d.is_error and d.span.path in used_paths)
-    )
 
 
 def judge(

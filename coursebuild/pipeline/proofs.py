@@ -139,17 +139,12 @@ def remarks_on_proofs(
             verb = "was proved before and is not now"
             if losses[1:]:
                 verb = "were proved before and are not now"
-            counts = _describe_counts(proofs[path])
-            remarks.append(f"{owner.id}: {' and '.join(losses)} {verb} ({counts})")
+            counts = Counter(proof.kind for proof in proofs[path]).items()
+            rest = ", ".join(plural(count, kind) for kind, count in counts) or "nothing"
+            remarks.append(f"{owner.id}: {' and '.join(losses)} {verb} (proved: {rest})")
         if is_green and proofs[path] != before:
             store.put_value(KIND, key, proofs[path])
     return tuple(remarks)
-
-
-def _describe_counts(proofs: Sequence[Proof]) -> str:
-    counts = Counter(proof.kind for proof in proofs)
-    words = [plural(count, kind) for kind, count in counts.items()]
-    return f"proved: {', '.join(words) or 'nothing'}"
 
 
 def _identity(proof: Proof) -> tuple[Kind, str, str]:

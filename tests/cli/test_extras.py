@@ -87,3 +87,17 @@ def test_a_course_without_models_needs_neither_mujoco_nor_numpy(
     with serve_preview(folder, code=start) as preview:
         preview.wait_for_line("checked: ")
         assert b"<math" in preview.get("/lessons/1.1-one.html")[2]
+
+
+@pytest.mark.site
+def test_without_pygls_the_command_says_what_to_install(tmp_path: Path, stores: Path) -> None:
+    folder = Folder(tmp_path / "course")
+    folder.fill(["## One\n"], stores)
+    code = (
+        "import sys; sys.modules['pygls'] = None\n"
+        "from coursebuild.cli import main; sys.exit(main())"
+    )
+    process = folder.start("lsp", code=code, stderr=subprocess.PIPE)
+    message = b"coursebuild: the language server needs the package pygls\n"
+    message += b"  help: run `pip install 'coursebuild[lsp]'`\n"
+    assert (process.communicate()[1], process.returncode) == (message, 1)

@@ -17,6 +17,7 @@ import pytest
 from coursebuild.core.files.trust import store_key
 from coursebuild.core.run.environments import latest_version
 from coursebuild.core.run.script_environment import engine_version
+from support.fixture_cases import fixture_text
 from support.scratch_course import CommandResult, Folder, Make, block, kill_at_end, wait_until_alone
 from support.waiting import wait_for_file
 
@@ -25,28 +26,7 @@ pytestmark = pytest.mark.long
 VERSION = engine_version()
 NEW_VERSION = "9.1.0"
 REAL_NUMBER = int("{:d}{:03d}{:03d}".format(*map(int, VERSION.split("."))))
-ENGINE = """\
-import numpy
-__version__ = "{version}"
-mjVERSION_HEADER = {number}
-
-class MjModel:
-    nv = {number}
-    opt = None
-
-    @staticmethod
-    def from_xml_path(path, assets):
-        raise ValueError("XML Error: no such element\\nElement 'mesh', line 1")
-
-class FatalError(Exception):
-    pass
-
-def mj_forward(m, d):
-    \"\"\"mj_forward(m, d) -> None\n\nThis is deprecated, take another.\"\"\"
-
-def mj_printSchema(html, pad):
-    return "mujoco (!)       model"
-"""
+ENGINE = fixture_text("scripts/small_mujoco.txt")
 
 
 @pytest.fixture

@@ -281,7 +281,11 @@ def without_prose(document: Document) -> Document:
     for block, all_inlines in inlines_by_block(document):
         if id(block) in recorded_ids:  # a recorded table comes with its recording
             continue
-        inlines = _summary_inlines(all_inlines)
+        inlines = tuple(
+            replace(inline, children=()) if isinstance(inline, Link | Term) else inline
+            for inline in all_inlines
+            if type(inline) in _SUMMARY_INLINES
+        )
         match block:
             case Paragraph() if block.figure:
                 blocks.append(replace(block, children=inlines))
@@ -314,14 +318,6 @@ def without_prose(document: Document) -> Document:
 def _paragraph_of(span: Span, inlines: tuple[Inline, ...]) -> Iterator[Paragraph]:
     if inlines:
         yield Paragraph(span, inlines)
-
-
-def _summary_inlines(inlines: Iterable[Inline]) -> tuple[Inline, ...]:
-    return tuple(
-        replace(inline, children=()) if isinstance(inline, Link | Term) else inline
-        for inline in inlines
-        if type(inline) in _SUMMARY_INLINES
-    )
 
 
 def labelled_blocks(document: Document) -> Iterator[tuple[Block, Label]]:

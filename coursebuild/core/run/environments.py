@@ -206,15 +206,12 @@ def _install_command(python: str) -> list[str]:
         pip = gate.python_command("-m", "pip", "--python", python, "install")
         return [*pip, "--no-input", "--progress-bar", "off", *plain]
     if uv := gate.find_program("uv"):
-        return [uv, "pip", "install", *_uv_settings(), "--python", python, "--no-progress", *plain]
+        # It obeys the user's settings, or the machine's, and none in a folder that it works in.
+        file = next(_configuration(*_OF_UV), None)
+        settings = ["--no-config"] if file is None else ["--config-file", str(file)]
+        return [uv, "pip", "install", *settings, "--python", python, "--no-progress", *plain]
     message = "this Python has no pip, and there is no uv, so nothing can be installed"
     raise EffectError(message, help="run `python -m ensurepip`")
-
-
-def _uv_settings() -> tuple[str, ...]:
-    """Let uv obey the user's settings, or the machine's, and none in a folder that it works in."""
-    file = next(_configuration(*_OF_UV), None)
-    return ("--no-config",) if file is None else ("--config-file", str(file))
 
 
 def _configuration(name: str, variable: str, *places: str) -> Iterator[Path]:

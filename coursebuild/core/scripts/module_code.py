@@ -144,7 +144,8 @@ def global_names(node: ast.AST, hidden: frozenset[str] = frozenset()) -> Iterato
             inner: list[ast.AST] = [node.body] if isinstance(node, ast.Lambda) else [*node.body]
             if not isinstance(node, ast.Lambda):
                 outer += [*node.decorator_list, *([node.returns] if node.returns else [])]
-            shared = {name for n in inner for name in _declared_global(n)}
+            parts = (part for child in inner for part in ast.walk(child))
+            shared = {n for part in parts if isinstance(part, ast.Global) for n in part.names}
             local = {arg.arg for arg in _arguments(arguments)} | _scope_names(inner)
             inside = hidden | (local - shared)
         case ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp():
@@ -188,12 +189,6 @@ def _scope_names(nodes: Iterable[ast.AST]) -> frozenset[str]:
                 pass
         stack += ast.iter_child_nodes(node)
     return frozenset(names)
-
-
-def _declared_global(node: ast.AST) -> Iterator[str]:
-    for part in ast.walk(node):
-        if isinstance(part, ast.Global):
-            yield from part.names
 
 
 def _first_line(statement: ast.stmt) -> int:

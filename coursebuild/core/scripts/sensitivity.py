@@ -149,7 +149,8 @@ def sensitivity(
     reason_unhalved = _reason_unhalved(finer_runs)
     usable_runs = _RunsByKind(moved_runs)
     if not reason_unhalved:
-        usable_runs = _RunsByKind(moved_runs, finer_runs, _usable_shifted(shifted_runs))
+        are_usable = all(r.outcome is Outcome.OK and r.trace is not None for r in shifted_runs)
+        usable_runs = _RunsByKind(moved_runs, finer_runs, shifted_runs if are_usable else ())
     findings = [
         finding
         for recording, comparison in compared
@@ -189,11 +190,6 @@ class _RunsByKind(Struct, frozen=True):
     def timesteps(self) -> set[float]:
         """Those of the simulations that are shifted, s."""
         return {h for run in self.shifted if run.trace is not None for h in run.trace.timesteps}
-
-
-def _usable_shifted(runs: Sequence[ScriptRun]) -> Sequence[ScriptRun]:
-    is_usable = all(run.outcome is Outcome.OK and run.trace is not None for run in runs)
-    return runs if is_usable else ()
 
 
 def is_worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:

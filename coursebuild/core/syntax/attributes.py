@@ -129,7 +129,7 @@ def read_meaning(
     if value is not None and is_number and not {"out", "given"} <= {*values}:
         printed = values.get("out")
         origin_text = value_text(printed)
-        is_quoted = printed is not None and origin_text and _is_quoted(printed)
+        is_quoted = printed is not None and printed.source.text[printed.span().start - 1] == '"'
         script, words = (None, origin_text) if is_quoted else (origin_text or None, "")
         origin = None if "out" in values else source or ""
         unit = value_text(values.get("unit"))
@@ -156,11 +156,6 @@ def read_meaning(
     for diagnostic in check_unit(values["unit"]) if unit and values["unit"] is not None else ():
         report(diagnostic)
     return Meaning(braces.span(), meaning, unit), source, number
-
-
-def _is_quoted(value: Excerpt) -> bool:
-    start = value.span().start
-    return value.span().source.text[start - 1] == '"'
 
 
 def value_text(value: Excerpt | None) -> str:

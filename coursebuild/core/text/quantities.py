@@ -114,8 +114,15 @@ def is_same_unit(left: UnitText, right: UnitText) -> bool:
 
 
 def printed_unit(line: str, start: int, end: int) -> UnitText:
-    """The unit of the number at `line[start:end]` in what a program printed, in its own line."""
-    return unit_behind(line, end, has_names=line[:1].isalpha()) or _unit_of_label(line[:start])
+    """The unit of the number at `line[start:end]` in what a program printed, in its own line.
+
+    It stands behind the number, or in the label before it, or before the list that it stands in.
+    """
+    if unit := unit_behind(line, end, has_names=line[:1].isalpha()):
+        return unit
+    before = line[:start][-_REACH:]
+    gap = _TO_NUMBER.search(before)
+    return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
 
 
 def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
@@ -146,7 +153,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
                 return NO_UNIT
             unit = longer
         elif longer and (is_name(_without_closing(word)) or not is_certain):
-            if not _is_one_word(bare, longer):
+            one_word = UnitText("", find_units(bare.replace(" ", "")))  # `kWh` for `kW h`
+            if not one_word or are_different(one_word, longer):
                 unit = UnitText(unit.text, unit.readings + longer.readings)  # `m in`
                 break
             unit = longer
@@ -160,12 +168,6 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
     if is_attached and (len(unit.text) == 1 or is_name(unit.text)):
         return unit if "." in text[:at].split()[-1] else NO_UNIT  # `4A` and `2d`
     return unit
-
-
-def _is_one_word(product: str, unit: UnitText) -> bool:
-    """Whether a product may be written together, as `kW h` may."""
-    together = UnitText("", find_units(product.replace(" ", "")))
-    return bool(together) and not are_different(together, unit)
 
 
 def _has_maximum(text: str) -> bool:
@@ -216,26 +218,17 @@ def unit_of_header(text: str) -> UnitText:
     return unit if is_certain and not is_name(unit.text) else NO_UNIT
 
 
-def _unit_of_label(before: str) -> UnitText:
-    """The unit in the label that ends right before a number, or the list that it stands in."""
-    before = before[-_REACH:]
-    gap = _TO_NUMBER.search(before)
-    return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
-
-
 def unit_of_printed(line: str, number: Number, above: Sequence[str]) -> UnitText:
-    """The unit of a printed number: that in its own line, of its column, or in the heading."""
-    unit = printed_unit(line, number.start, number.end)
-    unit = unit or unit_of_column(line, number.start, above)
-    return unit or _unit_of_heading(line, number, above)
+    """The unit of a printed number: that in its own line, of its column, or in the heading.
 
-
-def _unit_of_heading(line: str, number: Number, above: Sequence[str]) -> UnitText:
-    """The unit in the heading above the rows that a line is one of: `error (mm):`, then `x 1.96`.
-
-    It is that of the number that ends its row, with no other number right before it. Rows are the
+    A heading stands above the rows that the line is one of: `error (mm):`, then `x 1.96`. Its unit
+    is that of the number that ends its row, with no other number right before it. Rows are the
     lines below, as far as they are indented, or all have the words of the first one.
     """
+    unit = printed_unit(line, number.start, number.end)
+    unit = unit or unit_of_column(line, number.start, above)
+    if unit:
+        return unit
     label = line[: number.start].split()
     if line[number.end :].strip() or (label and only_number(label[-1])):
         return NO_UNIT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
 from msgspec import Struct
 
@@ -83,24 +83,18 @@ def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]
         unique = {name: find_unit(min(all)) for name, all in units.items() if len(all) == 1}
         dimensions = {name: unit.dimension for name, unit in unique.items() if unit is not None}
         for tex, domain, place in document_summary.identities:
-            yield from _check_identity(tex, domain, place, dimensions)
-
-
-def _check_identity(
-    tex: Excerpt, domain: str, place: Span, dimensions: Mapping[str, Dimension]
-) -> Iterator[Diagnostic]:
-    try:
-        comparisons = _compare_at_points(tex.text, domain, frozenset(dimensions.items()))
-    except NotUnderstood as error:
-        message = f"this condition is not computed: {error.reason}"
-        help = 'write conditions on symbols, as in `check="x > 0, n \\ne 1"`'
-        yield diagnose("formula-identity", place, message, help=help)
-        return
-    for comparison in comparisons:
-        span, message = tex.span(comparison.start, comparison.end), comparison.message
-        if comparison.kind != "wrong":
-            message = f"this is not computed: {message}"
-        yield diagnose("formula-identity", span, message, help=comparison.help)
+            try:
+                comparisons = _compare_at_points(tex.text, domain, frozenset(dimensions.items()))
+            except NotUnderstood as error:
+                message = f"this condition is not computed: {error.reason}"
+                help = 'write conditions on symbols, as in `check="x > 0, n \\ne 1"`'
+                yield diagnose("formula-identity", place, message, help=help)
+                continue
+            for comparison in comparisons:
+                span, message = tex.span(comparison.start, comparison.end), comparison.message
+                if comparison.kind != "wrong":
+                    message = f"this is not computed: {message}"
+                yield diagnose("formula-identity", span, message, help=comparison.help)
 
 
 @functools.lru_cache(maxsize=256)

@@ -102,8 +102,9 @@ def _check_chain(
                 mistake = _find_mistake(*terms, relation)
                 if mistake is not None and (reason := _other_reading(left, right, relation)):
                     mistake = FormulaComparison("unread", left.start, right.end, reason)
-                letter = next((term.text for term in terms if _is_constant(term)), "")
-                if mistake is not None and letter:
+                letters = (t.text for t in terms if t.kind == "symbol" and t.text in CONSTANTS)
+                letter = next(letters, "")
+                if mistake is not None and letter:  # as in `\pi = 0.5`
                     reason = "it says what the letter stands for"
                     mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
             elif symbols and relation not in ("?", "≡"):
@@ -116,11 +117,6 @@ def _check_chain(
         except NotUnderstood as error:
             mistake = FormulaComparison(error.kind, error.start, error.end, error.reason)
         yield mistake or FormulaComparison("holds", left.start, right.end)
-
-
-def _is_constant(expression: Expression) -> bool:
-    r"""Whether it is a letter alone: `\pi = 0.5` is no mistake, but says what the letter is."""
-    return expression.kind == "symbol" and expression.text in CONSTANTS
 
 
 def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:

@@ -61,8 +61,29 @@ def parse_fence(fence: Fence, texts: TextParser) -> Parsed[Exercise | None]:
         diagnostics += [*decoding.diagnostics, *prose.diagnostics]
         if subject is not None:
             diagnostics += _check(node, decoding.structs, subject)
-        if isinstance(decoding.value, ExerciseFile) and subject is not None and not diagnostics:
-            exercise = _exercise(fence, subject, node, decoding.value, prose)
+        fields = decoding.value
+        if isinstance(fields, ExerciseFile) and subject is not None and not diagnostics:
+            mistakes = zip(node.objects("wrong"), fields.wrong, strict=True)
+            exercise = Exercise(
+                span=fence.span,
+                id=fields.id,
+                id_span=node.place("id"),
+                subject=subject,
+                title=fields.title,
+                names=fields.names,
+                start=_text(node, "start"),
+                solution=_text(node, "solution"),
+                wrong=tuple(
+                    Wrong(_text(n, "text"), w.fails, n.place("fails")) for n, w in mistakes
+                ),
+                trials=fields.trials,
+                trial_places=tuple(trial.place("name") for trial in node.objects("trials")),
+                setup=fields.setup,
+                lab=_lab(subject, node, fields),
+                task=prose.blocks(node.get("text")),
+                explain=prose.blocks(node.get("explain")),
+                numbers=prose.numbers,
+            )
     return Parsed(exercise, sort_diagnostics(diagnostics))
 
 
@@ -97,30 +118,6 @@ def _check(
             help = did_you_mean(fails.value, known_names)
             yield diagnose("field-value", fails.span, message, help=help)
     yield from check_axes(node, structs)
-
-
-def _exercise(
-    fence: Fence, subject: Subject, node: ObjectNode, fields: ExerciseFile, prose: Prose
-) -> Exercise:
-    mistakes = zip(node.objects("wrong"), fields.wrong, strict=True)
-    return Exercise(
-        span=fence.span,
-        id=fields.id,
-        id_span=node.place("id"),
-        subject=subject,
-        title=fields.title,
-        names=fields.names,
-        start=_text(node, "start"),
-        solution=_text(node, "solution"),
-        wrong=tuple(Wrong(_text(n, "text"), w.fails, n.place("fails")) for n, w in mistakes),
-        trials=fields.trials,
-        trial_places=tuple(trial.place("name") for trial in node.objects("trials")),
-        setup=fields.setup,
-        lab=_lab(subject, node, fields),
-        task=prose.blocks(node.get("text")),
-        explain=prose.blocks(node.get("explain")),
-        numbers=prose.numbers,
-    )
 
 
 def _lab(subject: Subject, node: ObjectNode, fields: ExerciseFile) -> Lab:

@@ -50,7 +50,11 @@ class Account:
     @property
     def leftovers(self) -> list[Leftover]:
         """What is left, in the order of files and places."""
-        return sorted(self._left, key=lambda leftover: (leftover.path, _numbers(leftover.place)))
+
+        def place(leftover: Leftover) -> tuple[str, list[int]]:
+            return leftover.path, [int(number) for number in re.findall(r"\d+", leftover.place)]
+
+        return sorted(self._left, key=place)
 
     def leave(self, leftover: Leftover) -> None:
         """Note that something is left; the same twice is one."""
@@ -116,7 +120,3 @@ class Account:
             if rest := positions[_MOST_PLACES:]:
                 lines.append(f"  - {len(rest)} more")
         return "\n".join(lines) + "\n"
-
-
-def _numbers(place: str) -> list[int]:
-    return [int(number) for number in re.findall(r"\d+", place)]

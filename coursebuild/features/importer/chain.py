@@ -189,7 +189,12 @@ class Chain:
 def _loaded_names(code: str) -> set[str]:
     """The names that a cell takes from those above it, without those that it imports itself."""
     nodes = [*ast.walk(ast.parse(code))]
-    imports = {alias.asname or alias.name for node in nodes for alias in _aliases(node)}
+    imports = {
+        alias.asname or alias.name
+        for node in nodes
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for alias in node.names
+    }
     names = (n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load))
     return {*names} - imports
 
@@ -208,7 +213,3 @@ def _bound_names(code: str) -> set[str]:
             case _:
                 continue
     return names
-
-
-def _aliases(node: ast.AST) -> Sequence[ast.alias]:
-    return node.names if isinstance(node, ast.Import | ast.ImportFrom) else ()

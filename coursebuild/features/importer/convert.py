@@ -151,13 +151,10 @@ def _group_by_folder(parts: Mapping[str, Sequence[str]]) -> Mapping[str, set[str
         for path, names in parts.items()
     }
     for path, folder in sorted(folders.items(), key=lambda item: item[1]):
-        root = next((root for root in groups if _holds(root, folder)), folder)
+        roots = (root for root in groups if posixpath.commonpath((root, folder)) == root)
+        root = next(roots, folder)
         groups.setdefault(root, set()).update((path, *parts[path]))
     return groups
-
-
-def _holds(root: str, folder: str) -> bool:
-    return posixpath.commonpath((root, folder)) == root
 
 
 def _place_models(root: str, names: set[str], models: dict[str, str]) -> None:

@@ -48,7 +48,21 @@ def read_outline(files: SourceFiles) -> Outline | None:
         files.account.changed["map", "content/course.toml"] += 1
         return _read_summary(path, str(settings.get("title") or ""), files, book is not None)
     config = next((p for p in files if re.fullmatch(r"docusaurus\.config\.[cm]?[jt]s", p)), "")
-    return _read_docusaurus(config, files) if config else None
+    if not config:
+        return None
+    title = re.search(r"^\s*title:\s*([\"'`])(.+?)\1", files.read_text(config), re.MULTILINE)
+    name = next((path for path in files if re.fullmatch(r"sidebars\.[cm]?[jt]s(?:on)?", path)), "")
+    parts: list[ImportedText | ImportedLevel] = []
+    if name:
+        files.account.changed["map", "content/course.toml"] += 1
+        sidebars = _read_literal(files.read_text(name))
+        if sidebars is None:
+            message = "a program: the order of lessons is that of `sidebar_position` and of names"
+            files.leave(name, message, "map")
+        for sidebar in sidebars.values() if sidebars else ():
+            parts += _read_sidebar(sidebar, name, files)
+    parts = parts or [*_read_folder("docs", files)]
+    return Outline(title=title[2] if title else "", parts=tuple(parts))
 
 
 def find_text(name: object, files: SourceFiles) -> str:
@@ -132,22 +146,6 @@ def _group_by_depth(entries: Iterable[_Entry]) -> Iterator[ImportedText | Import
 # --- Docusaurus
 
 
-def _read_docusaurus(config: str, files: SourceFiles) -> Outline:
-    title = re.search(r"^\s*title:\s*([\"'`])(.+?)\1", files.read_text(config), re.MULTILINE)
-    name = next((path for path in files if re.fullmatch(r"sidebars\.[cm]?[jt]s(?:on)?", path)), "")
-    parts: list[ImportedText | ImportedLevel] = []
-    if name:
-        files.account.changed["map", "content/course.toml"] += 1
-        sidebars = _read_literal(files.read_text(name))
-        if sidebars is None:
-            message = "a program: the order of lessons is that of `sidebar_position` and of names"
-            files.leave(name, message, "map")
-        for sidebar in sidebars.values() if sidebars else ():
-            parts += _read_sidebar(sidebar, name, files)
-    parts = parts or [*_read_folder("docs", files)]
-    return Outline(title=title[2] if title else "", parts=tuple(parts))
-
-
 def _read_literal(text: str) -> Mapping[str, object] | None:
     """Return the value of an object of JavaScript; `None` where it is not literal."""
     comments = r"/\*(?s:.*?)\*/|^[ \t]*//.*$|(?<=[,\[{\]}])[ \t]*//.*$"
@@ -187,7 +185,9 @@ def _read_sidebar(
             case "category":
                 link = items.get("link")
                 first = link.get("id") if isinstance(link, Mapping) else None
-                inside = [first, *_as_list(items.get("items"))] if first else items.get("items")
+                inside = items.get("items")
+                if first:
+                    inside = [first, *(inside if isinstance(inside, list) else [])]
                 yield from _level(str(items.get("label") or ""), _read_sidebar(inside, name, files))
             case None:
                 for label, inside in items.items():
@@ -195,10 +195,6 @@ def _read_sidebar(
             case kind:
                 words = items.get("label") or items.get("href") or kind
                 files.leave(name, f"`{words}` of the map, which is no text", "entry of the map")
-
-
-def _as_list(value: object) -> list[object]:
-    return value if isinstance(value, list) else []
 
 
 def _level(

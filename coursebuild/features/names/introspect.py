@@ -27,10 +27,13 @@ def main() -> None:
 
     print("ready", file=replies, flush=True)
     for _ in sys.stdin:
+        # Python has not all of the functions, and none of the macros.
+        headers = Path(mujoco.__file__).parent.glob("include/**/*.h")
+        texts = (header.read_text("utf-8", "replace") for header in headers)
         names = {
             **_engine(mujoco),
             "schema": mujoco.mj_printSchema(False, False),
-            "declared": sorted(set(_headers(Path(mujoco.__file__).parent / "include"))),
+            "declared": sorted({name for t in texts for name in re.findall(r"\bmj[a-z]?_\w+", t)}),
         }
         print(json.dumps(names), file=replies, flush=True)
 
@@ -93,12 +96,6 @@ def _members(cls: type, fields: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         first = text.split("\n")[0] if callable(value) else ""
         description = fields.get(name, {"text": first, "doc": doc})
         yield name, {**description, "type": types[-1] if types else ""}
-
-
-def _headers(folder: Path) -> Iterator[str]:
-    """The names of functions and macros in MuJoCo's headers, some of which Python has not."""
-    for header in sorted(folder.glob("**/*.h")):
-        yield from re.findall(r"\bmj[a-z]?_\w+", header.read_text("utf-8", "replace"))
 
 
 if __name__ == "__main__":

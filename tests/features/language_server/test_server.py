@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -134,7 +133,7 @@ def test_a_broken_map_is_reported_and_the_last_course_stays(editor: Editor) -> N
     assert editor.hover_text(SECOND_LESSON, "lesson:1.|1#fall").startswith("**Lesson 1.1: ")
 
 
-ODD_TEXTS = (
+ODD = (
     "",
     "\0",
     "\ud83d",
@@ -148,7 +147,7 @@ ODD_TEXTS = (
 
 
 def test_any_text_is_read(editor: Editor) -> None:
-    for text in ODD_TEXTS:
+    for text in ODD:
         for path in (FIRST_LESSON, MAP, "models/ball.xml"):
             editor.write(path, text)
             for ask in (editor.hover_text, editor.proposals, editor.actions):
@@ -195,11 +194,7 @@ HOVERS = [
     (FIRST_LESSON, '"tit|le"', "`title`: "),
     (FIRST_LESSON, 'model_path("ba|ll")', "A ball in the air."),
     (SECOND_LESSON, "model:ba|ll", "A ball in the air.\n\n1 bodies, 1 geoms; nq = 7, nv = 6"),
-    (
-        SECOND_LESSON,
-        "term:mom|ent",
-        "\n\nThe moment of inertia weighs mass by its distance.",
-    ),
+    (SECOND_LESSON, "term:mom|ent", "\n\nThe moment of inertia weighs mass by its distance."),
     (SECOND_LESSON, "lesson:1.1#fa|ll", "**Lesson 1.1: "),
     (SECOND_LESSON, "lesson:1.1#eq:en|ergy", "```tex\nE = m g h\n```"),
     (SECOND_LESSON, "examples/fa|ll.py", "`examples/fall.py`, a script of 1.1"),
@@ -453,16 +448,3 @@ def test_the_server_ends_with_its_client(tmp_path: Path, stores: Path) -> None:
     folder.fill(["## Wait\n\n" + block("long.py", script)], stores)
     assert Editor(folder).close() == 0
     wait_until_alone(folder)
-
-
-def test_without_pygls_the_command_says_what_to_install(tmp_path: Path, stores: Path) -> None:
-    folder = Folder(tmp_path / "course")
-    folder.fill(["## One\n"], stores)
-    code = (
-        "import sys; sys.modules['pygls'] = None\n"
-        "from coursebuild.cli import main; sys.exit(main())"
-    )
-    process = folder.start("lsp", code=code, stderr=subprocess.PIPE)
-    message = b"coursebuild: the language server needs the package pygls\n"
-    message += b"  help: run `pip install 'coursebuild[lsp]'`\n"
-    assert (process.communicate()[1], process.returncode) == (message, 1)

@@ -73,7 +73,10 @@ def run(arguments: argparse.Namespace) -> int:
     if not folder.is_dir():
         raise UsageError(f"there is no folder {arguments.root}")
     if arguments.install_engine:
-        return _install_engine(folder)
+        place = sys.executable
+        if engine_version() != LAB_ENGINE:
+            place = prepare_environment(folder, LAB_ENGINE, Progress().say, locked=True).python
+        return write(f"MuJoCo {LAB_ENGINE}, for labs, is installed for {visible(place)}\n", CLEAN)
     style, faults = style_of(sys.stdout), 0
     required = (_engines, _lab_engine, _fonts, _folder)
     for make_probes in (*required, _store, _locks, _disk, _rendering, _sandbox):
@@ -89,13 +92,6 @@ def run(arguments: argparse.Namespace) -> int:
     return write(
         f"\n{style.paint(verdict, RED if faults else GREEN)}\n", FAILURE if faults else CLEAN
     )
-
-
-def _install_engine(folder: Path) -> int:
-    place = sys.executable
-    if engine_version() != LAB_ENGINE:
-        place = prepare_environment(folder, LAB_ENGINE, Progress().say, locked=True).python
-    return write(f"MuJoCo {LAB_ENGINE}, for labs, is installed for {visible(place)}\n", CLEAN)
 
 
 def _engines(_: Path) -> Iterator[Probe]:

@@ -1,4 +1,4 @@
-"""`coursebuild bench`: speed against error of the course's models.
+"""`coursebuild bench`: speed against error of the course's models; `--engines`: in other engines.
 
 1. Each scenario's report is stored by all that it depends on, so that a run that was stopped goes
    on where it was. Times are true of this machine only, so reports are not shared.
@@ -14,15 +14,14 @@ from functools import partial
 from typing import Any
 
 import msgspec
-from msgspec import Raw
+from msgspec import Raw, Struct
 from msgspec.structs import replace
 
-from coursebuild.api import Diagnostic, Options
+from coursebuild.api import Diagnostic, Options, UsageError
 from coursebuild.core.files.errors import require
-from coursebuild.core.model.measurements import SceneReport
-from coursebuild.core.model.report_files import BENCH, ReportFailure
+from coursebuild.core.model.measurements import EngineReport, SceneReport
+from coursebuild.core.model.report_files import BENCH, ENGINES, ReportFailure
 from coursebuild.core.model.scenarios import DeclaredSweep, keyframe_scenarios
-from coursebuild.features.bench.commands.engines import run_engines
 from coursebuild.features.bench.commands.measurement import (
     Departure,
     Measurement,
@@ -37,7 +36,7 @@ from coursebuild.features.bench.commands.measurement import (
     run_measurement,
     task_of,
 )
-from coursebuild.features.bench.commands.measuring import Mjbench
+from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbench
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.pipeline.scenes import CourseScene, find_scenes, read_record
 
@@ -263,3 +262,91 @@ def _scenario_count(scene: CourseScene) -> int:
     scenarios = scene.declarations.scenarios
     usual = keyframe_scenarios(scene.facts.keyframes) if scene.facts.nv else ()
     return len(scenarios or usual)
+
+
+class EngineChoice(Struct, frozen=True):
+    """Engines by name, with the versions of their packages, and what is not installed."""
+
+    engines: tuple[tuple[str, tuple[tuple[str, str], ...]], ...]
+    remarks: tuple[str, ...]
+
+
+def run_engines(arguments: argparse.Namespace) -> int:
+    """Measure models in other engines."""
+    if arguments.check:
+        message = "--check takes no --engines: 32 bits do not repeat from one device to the next"
+        raise UsageError(message)
+    if arguments.executor is not None:
+        raise UsageError("--engines measures engines on this machine, not on others")
+
+    def measure(options: Options) -> Measurement[EngineReport]:
+        with Mjbench(options.root, "`coursebuild bench`") as mjbench:
+            measurement = bench_engines(
+                options,
+                mjbench,
+                tuple(arguments.scenes),
+                choose_engines(mjbench, arguments.engines),
+                quick=arguments.quick,
+                record=arguments.record,
+            )
+            return in_words(arguments, mjbench, "engines", measurement)
+
+    return run_measurement(
+        arguments,
+        measure,
+        lambda measurement: measurement_json({"engines": measurement.values}, measurement),
+        empty="there is no model to measure\n",
+    )
+
+
+def choose_engines(mjbench: Mjbench, text: str) -> EngineChoice:
+    """The engines that an option names; if it is empty, all that are installed."""
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    try:
+        return msgspec.json.decode(mjbench.do("choose-engines", names=names), type=EngineChoice)
+    except FailedJobError as error:
+        raise UsageError(str(error), help=error.failure.help) from None
+
+
+def bench_engines(
+    options: Options,
+    mjbench: Mjbench,
+    names: tuple[str, ...],
+    choice: EngineChoice,
+    *,
+    quick: bool = False,
+    record: bool = False,
+) -> Measurement[EngineReport]:
+    """Measure the models that the names mean in other engines; with `record` into the course."""
+    if record:
+        forbid_quick("--record", quick=quick)
+    scenes = find_scenes(options.root, names)
+    run = _EngineRun(options, mjbench, scenes.diagnostics)
+    run.choice, run.quick = choice, quick
+    run.remarks += choice.remarks
+    measurement = run.measure_each(scenes.value, run.measure)
+    if not record:
+        return measurement
+    outcome = record_reports(options.root, mjbench, ENGINES, "engines", measurement)
+    return replace(outcome, remarks=(*measurement.remarks, *outcome.remarks))
+
+
+class _EngineRun(MeasuringRun[EngineReport]):
+    """Measures scenes in engines, one after the other."""
+
+    report_type = EngineReport
+    choice: EngineChoice
+    quick = False
+
+    def measure(self, scene: CourseScene) -> bytes | None:
+        """Report on a scene; `None` if it cannot be measured."""
+        engines = self.choice.engines
+        parts = (scene.name, scene.digest, self.quick, self.code, self.facts.machine, engines)
+        names = [name for name, _ in engines]
+        return self.load_or_measure(
+            scene.name,
+            "bench-engines",
+            parts,
+            lambda: self.mjbench.do("engines", scene, names=names, quick=self.quick),
+            scene,
+        )
