@@ -41,13 +41,14 @@ from coursebuild.core.run.dependencies import Kind, describe, is_there, sought_f
 from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.extract import extract, jobs
+from coursebuild.core.text.characters import printable
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.rules import RULES, Rule
 from coursebuild.output import CLEAN, write
 from coursebuild.pipeline.arguments import add_format, options_of, style_of
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
-from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, visible
+from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style
 from coursebuild.report.values import json_text, plain, plural
 
 State = Literal["remembered", "would run", "norun"]
@@ -100,7 +101,7 @@ def rule_text(rule: Rule, page: str) -> str:
 def explanation_text(explanation: Explanation, style: Style) -> str:
     """Return an explanation as text for people."""
     e = explanation
-    is_run, heading = e.kind in ("script", "lab"), visible(e.path)
+    is_run, heading = e.kind in ("script", "lab"), printable(e.path)
     kinds = [run.kind for run in e.runs]
     if kinds and e.kind not in ("model", "file"):
         counts = [plural(kinds.count(kind), kind) for kind in ("script", "lab") if kind in kinds]
@@ -125,11 +126,11 @@ def explanation_text(explanation: Explanation, style: Style) -> str:
 
 
 def _block(head: str, lines: tuple[str, ...]) -> str:
-    return "\n".join([f"{head}:", *(f"  {visible(line)}" for line in lines)])
+    return "\n".join([f"{head}:", *(f"  {printable(line)}" for line in lines)])
 
 
 def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list[str]:
-    name = style.paint(visible(run.name), BOLD) if full else visible(run.name)
+    name = style.paint(printable(run.name), BOLD) if full else printable(run.name)
     verb = "run" if run.kind == "script" else "be tried"
     again = " again" if run.made is not None else ""
     verdicts = {
@@ -138,7 +139,7 @@ def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list
         "would run": style.paint(f"would {verb}{again}", YELLOW),
     }
     lines = [f"{name} {verdicts[run.state]}"]
-    lines += [f"  because {visible(reason)}" for reason in run.reasons]
+    lines += [f"  because {printable(reason)}" for reason in run.reasons]
     if not full:
         return lines
     last = "not run yet on this machine"
@@ -148,7 +149,7 @@ def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list
     lines.append(style.paint(f"  of {run.owner}, {last}", FAINT))
     if run.depends:
         lines += ["", "its last result depends on:"]
-        lines += [f"  {visible(line)}" for line in run.depends]
+        lines += [f"  {printable(line)}" for line in run.depends]
     return lines
 
 

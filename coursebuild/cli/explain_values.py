@@ -20,9 +20,10 @@ from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.printed_text import describe_line
 from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.scripts.tables import row_values
+from coursebuild.core.text.characters import printable
 from coursebuild.core.text.source import Span
 from coursebuild.pipeline.options import UsageError
-from coursebuild.report.text import location, visible
+from coursebuild.report.text import location
 from coursebuild.report.values import plural
 
 
@@ -84,14 +85,14 @@ def _given_values(document: Document) -> Iterator[tuple[Span, ValueOrigin]]:
 
 def origins_text(place: str, origins: tuple[ValueOrigin, ...]) -> str:
     """What is known of the values on a line, as text for people."""
-    lines = [f"{visible(place)} shows {plural(len(origins), 'value') if origins else 'no value'}"]
+    lines = [f"{printable(place)} shows {plural(len(origins), 'value') if origins else 'no value'}"]
     for origin in origins:
         if not origin.script:
             answer = f"given: {origin.source}" if origin.source else "bound to no script"
-            lines.append(f"  `{visible(origin.text)}` is {answer}")
+            lines.append(f"  `{printable(origin.text)}` is {answer}")
             continue
         places = origin.places or ("a line that is not known yet: run `coursebuild check`",)
-        lines.append(f"  `{visible(origin.text)}` is printed by {visible(origin.script)}")
-        lines += [f"    {visible(text)}" for text in places]
-        lines += [f"    recorded at {visible(at)}" for at in origin.recorded]
+        lines.append(f"  `{printable(origin.text)}` is printed by {printable(origin.script)}")
+        lines += [f"    {printable(text)}" for text in places]
+        lines += [f"    recorded at {printable(at)}" for at in origin.recorded]
     return "\n".join(lines) + "\n"

@@ -185,8 +185,8 @@ class _Reader:
             if mode is not None and stat.S_ISREG(mode):
                 yield path
             elif mode is not None:
-                contents, around = self._list(path, ancestors)
-                entries += ((name, is_linked or is_link, around) for name in reversed(contents))
+                contents, enclosing = self._list(path, ancestors)
+                entries += ((name, is_linked or is_link, enclosing) for name in reversed(contents))
 
     def _list(
         self, folder: str, ancestors: frozenset[tuple[int, int]]

@@ -59,7 +59,7 @@ class _SourceLoader(SourceFileLoader):
 def _read_sources_in(root: str) -> None:
     """From now on, import modules of the project from their sources, but not what is installed."""
     installed = sys.path_hooks[-1]
-    own = FileFinder.path_hook(
+    of_project = FileFinder.path_hook(
         (ExtensionFileLoader, EXTENSION_SUFFIXES),
         (_SourceLoader, SOURCE_SUFFIXES),
         (SourcelessFileLoader, BYTECODE_SUFFIXES),
@@ -67,8 +67,8 @@ def _read_sources_in(root: str) -> None:
 
     def find_in(folder: str) -> Any:
         path = f"{os.path.abspath(folder)}/"  # noqa: PTH100 (time counts)
-        is_own = path.startswith(f"{root}/") and "/site-packages/" not in path
-        return (own if is_own else installed)(folder)
+        is_project = path.startswith(f"{root}/") and "/site-packages/" not in path
+        return (of_project if is_project else installed)(folder)
 
     sys.path_hooks[-1] = find_in
     sys.path_importer_cache.clear()

@@ -20,6 +20,7 @@ from coursebuild.core.files.read import read_bytes, read_folder
 from coursebuild.core.files.write import FileChange
 from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.scripts.edit import edited_texts
+from coursebuild.core.text.characters import printable
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import (
     doubtful_places,
@@ -28,7 +29,7 @@ from coursebuild.features.authoring.course_map import (
 )
 from coursebuild.output import fail
 from coursebuild.pipeline.options import documents_by_name
-from coursebuild.report.text import location, visible
+from coursebuild.report.text import location
 from coursebuild.report.values import plural
 
 EXAMPLES = """\
@@ -83,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     if doubtful and not arguments.leave:
         lines = [f"{plural(len(doubtful), 'place')} may mean lesson {lesson.id}:"]
         for span in doubtful:
-            text = visible(span.source.line_text(span.line).strip())
+            text = printable(span.source.line_text(span.line).strip())
             lines.append(f"  {location(span)}: {text}")
         help = "edit them first, or leave them as they are with --leave; nothing was changed"
         return fail(FAILURE, "\n".join(lines), help)
