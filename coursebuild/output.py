@@ -18,10 +18,19 @@ def say(status: int, text: str) -> int:
     """Write a text to standard error; return the status."""
     if sys.stderr is not None:  # else `print` would write to standard output
         try:
-            print(_without_commands(text), file=sys.stderr, flush=True)
+            print(_harmless(text), file=sys.stderr, flush=True)
         except OSError:  # nobody reads it; the status says it too
             return status
     return status
+
+
+def _harmless(text: str) -> str:
+    """The text, such as one that names a file, which commands neither a terminal nor a service."""
+    if not text.replace("\n", "").isprintable():
+        from coursebuild.core.text.characters import printable_lines
+
+        text = printable_lines(text)
+    return _without_commands(text)
 
 
 def write(text: str, status: int, *, commands: bool = False) -> int:

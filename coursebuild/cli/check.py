@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from coursebuild.cli.unchanged import Watcher, identify_command
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.registry import package_paths
+from coursebuild.core.text.characters import printable_lines
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.output import CLEAN, write
 from coursebuild.pipeline import arguments as shared
@@ -21,7 +22,7 @@ from coursebuild.pipeline.fix import Answer, fix, proposals, propose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.shards import read_shard
 from coursebuild.report import Report, unchanged_report
-from coursebuild.report.text import diagnostic_text, visible_lines
+from coursebuild.report.text import diagnostic_text
 from coursebuild.report.values import plural, with_hints
 
 EXAMPLES = """\
@@ -124,7 +125,7 @@ def _mend(arguments: argparse.Namespace) -> int:
 def _ask(diagnostic: Diagnostic, change: str) -> Answer:
     """Show a proposal, and wait for an answer."""
     style = shared.style_of(sys.stdout)
-    sys.stdout.write(f"{diagnostic_text(diagnostic, style)}\n\n{visible_lines(change)}\n")
+    sys.stdout.write(f"{diagnostic_text(diagnostic, style)}\n\n{printable_lines(change)}\n")
     while True:
         try:
             word = input("make this change? [y/n/q] ").strip().lower()[:1]

@@ -50,13 +50,14 @@ from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.printed_text import describe_line
 from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.scripts.tables import row_values
+from coursebuild.core.text.characters import printable
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.rules import RULES, Rule
 from coursebuild.output import CLEAN, write
 from coursebuild.pipeline.arguments import add_format, options_of, style_of
 from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.options import Options, UsageError, documents_by_name, path_from_root
-from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, location, visible
+from coursebuild.report.text import BOLD, FAINT, GREEN, YELLOW, Style, location
 from coursebuild.report.values import json_text, plain, plural
 
 State = Literal["remembered", "would run", "norun"]
@@ -109,7 +110,7 @@ def rule_text(rule: Rule, page: str) -> str:
 def explanation_text(explanation: Explanation, style: Style) -> str:
     """Return an explanation as text for people."""
     e = explanation
-    is_run, heading = e.kind in ("script", "lab"), visible(e.path)
+    is_run, heading = e.kind in ("script", "lab"), printable(e.path)
     kinds = [run.kind for run in e.runs]
     if kinds and e.kind not in ("model", "file"):
         counts = [plural(kinds.count(kind), kind) for kind in ("script", "lab") if kind in kinds]
@@ -134,11 +135,11 @@ def explanation_text(explanation: Explanation, style: Style) -> str:
 
 
 def _block(head: str, lines: tuple[str, ...]) -> str:
-    return "\n".join([f"{head}:", *(f"  {visible(line)}" for line in lines)])
+    return "\n".join([f"{head}:", *(f"  {printable(line)}" for line in lines)])
 
 
 def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list[str]:
-    name = style.paint(visible(run.name), BOLD) if full else visible(run.name)
+    name = style.paint(printable(run.name), BOLD) if full else printable(run.name)
     verb = "run" if run.kind == "script" else "be tried"
     again = " again" if run.made is not None else ""
     verdicts = {
@@ -147,7 +148,7 @@ def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list
         "would run": style.paint(f"would {verb}{again}", YELLOW),
     }
     lines = [f"{name} {verdicts[run.state]}"]
-    lines += [f"  because {visible(reason)}" for reason in run.reasons]
+    lines += [f"  because {printable(reason)}" for reason in run.reasons]
     if not full:
         return lines
     last = "not run yet on this machine"
@@ -157,7 +158,7 @@ def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list
     lines.append(style.paint(f"  of {run.owner}, {last}", FAINT))
     if run.depends:
         lines += ["", "its last result depends on:"]
-        lines += [f"  {visible(line)}" for line in run.depends]
+        lines += [f"  {printable(line)}" for line in run.depends]
     return lines
 
 
@@ -404,14 +405,14 @@ def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ..
 
 def origins_text(place: str, origins: tuple[ValueOrigin, ...]) -> str:
     """What is known of the values on a line, as text for people."""
-    lines = [f"{visible(place)} shows {plural(len(origins), 'value') if origins else 'no value'}"]
+    lines = [f"{printable(place)} shows {plural(len(origins), 'value') if origins else 'no value'}"]
     for origin in origins:
         if not origin.script:
             answer = f"given: {origin.source}" if origin.source else "bound to no script"
-            lines.append(f"  `{visible(origin.text)}` is {answer}")
+            lines.append(f"  `{printable(origin.text)}` is {answer}")
             continue
         places = origin.places or ("a line that is not known yet: run `coursebuild check`",)
-        lines.append(f"  `{visible(origin.text)}` is printed by {visible(origin.script)}")
-        lines += [f"    {visible(text)}" for text in places]
-        lines += [f"    recorded at {visible(at)}" for at in origin.recorded]
+        lines.append(f"  `{printable(origin.text)}` is printed by {printable(origin.script)}")
+        lines += [f"    {printable(text)}" for text in places]
+        lines += [f"    recorded at {printable(at)}" for at in origin.recorded]
     return "\n".join(lines) + "\n"

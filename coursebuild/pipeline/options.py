@@ -29,6 +29,7 @@ from coursebuild.core.files.write import undo_changes
 from coursebuild.core.model import Course, Lesson, Owner
 from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.run.script_environment import course_environment
+from coursebuild.core.text.characters import printable, printable_lines
 from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.core.text.near import nearest
 from coursebuild.report.text import clip
@@ -101,7 +102,7 @@ class Progress:
             if not self.live:
                 is_long = last_seconds is not None and last_seconds >= _LONG
                 time_text = f" ({last_seconds:.0f} s the last time)" if is_long else ""
-                self._write(f"  {name}{time_text}\n")
+                self._write(f"  {printable(name)}{time_text}\n")
 
     def describe(self, name: str, activity: str) -> None:
         """Show what something that runs is doing; only on a terminal."""
@@ -120,12 +121,12 @@ class Progress:
             self._activities.pop(name, None)
             self._ended_count += 1
             if not self.live:
-                self._write(f"  {name}: {verdict} after {seconds:.2f} s\n")
+                self._write(f"  {printable(name)}: {verdict} after {seconds:.2f} s\n")
 
     def say(self, text: str) -> None:
         """Print a line, unless quiet."""
         with self._lock:
-            self._write(f"{_ERASE if self.live else ''}{text}\n")
+            self._write(f"{_ERASE if self.live else ''}{printable_lines(text)}\n")
 
     def _tick(self) -> None:
         while True:
@@ -151,7 +152,7 @@ class Progress:
             return f"{seconds:.0f} s ({left}{last:.0f} s the last time)"
 
         names = [
-            f"{name}{activities.get(name, '')} {times(name, now - since)}"
+            f"{printable(name)}{activities.get(name, '')} {times(name, now - since)}"
             for name, since in self._running_since.items()
         ]
         return f"{self._stage} {self._ended_count}/{self._total}  {', '.join(names)}"

@@ -10,18 +10,9 @@ from msgspec import Struct
 from coursebuild.core.model.results import Change, DriftKind
 from coursebuild.core.scripts.diff import shorten
 from coursebuild.core.scripts.findings import closeness
+from coursebuild.core.text.characters import printable, printable_lines
 from coursebuild.core.text.diagnostics import Diagnostic
-from coursebuild.report.text import (
-    BOLD,
-    FAINT,
-    GREEN,
-    RED,
-    YELLOW,
-    Style,
-    location,
-    visible,
-    visible_lines,
-)
+from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, location
 from coursebuild.report.values import json_text, plain, plural
 
 _STATUSES = {
@@ -106,18 +97,18 @@ def comparison_text(report: ComparisonReport, style: Style, *, quiet: bool = Fal
     differing = [s for s in report.scripts if s.changes or s.diff or s.failure is not None]
     parts = ["\n".join(_script(s, report.version, style)) + "\n" for s in differing]
     lines = [
-        f"{_verdict(s, style)} {visible(s.path)}{_because(s)}"
+        f"{_verdict(s, style)} {printable(s.path)}{_because(s)}"
         for s in report.scripts
         if s not in differing and not (quiet and s.status == "same")
     ]
     lost = [model for model in report.models if model.error]
     lines += [
-        f"{style.paint('fails     ', RED)} {visible(m.path)}:{m.line}"
-        f"  no longer compiles: {visible(m.error)}"
+        f"{style.paint('fails     ', RED)} {printable(m.path)}:{m.line}"
+        f"  no longer compiles: {printable(m.error)}"
         for m in lost
     ]
     lines += [
-        f"{style.paint('lost      ', RED)} {location(name.span)}  {visible(name.message)}"
+        f"{style.paint('lost      ', RED)} {location(name.span)}  {printable(name.message)}"
         for name in report.names
     ]
     if lines:
@@ -139,7 +130,7 @@ def comparison_text(report: ComparisonReport, style: Style, *, quiet: bool = Fal
 
 
 def _because(script: ScriptComparison) -> str:
-    return f"  ({visible(script.reason)})" if script.reason else ""
+    return f"  ({printable(script.reason)})" if script.reason else ""
 
 
 def _verdict(script: ScriptComparison, style: Style) -> str:
@@ -150,11 +141,11 @@ def _script(script: ScriptComparison, version: str, style: Style) -> list[str]:
     """A script that does something else there."""
     engine = f"MuJoCo {version}"
     cause = _because(script) or f"  by {engine}"
-    lines = [f"{_verdict(script, style)} {style.paint(visible(script.path), BOLD)}{cause}"]
+    lines = [f"{_verdict(script, style)} {style.paint(printable(script.path), BOLD)}{cause}"]
     if script.failure is not None:
         span, message = script.failure.span, script.failure.message
         label = f": {script.failure.label}" if script.failure.label else ""
-        lines.append(visible(f"  {span.path}:{span.line}: {message}{label}"))
+        lines.append(printable(f"  {span.path}:{span.line}: {message}{label}"))
     changes = sorted(script.changes, key=lambda change: (change.span.path, change.span.start))
     for change in changes[:_MOST_CHANGES]:
         first_lines = (text.strip().split("\n")[0] for text in (change.recorded, change.printed))
@@ -172,11 +163,11 @@ def _script(script: ScriptComparison, version: str, style: Style) -> list[str]:
             case DriftKind.EXTRA:
                 count = plural(change.printed.count("\n") + 1, "more line")
                 text = f"{engine} printed {count} here: `{printed}`"
-        lines.append(visible(f"  {location(change.span)}: {text}"))
+        lines.append(printable(f"  {location(change.span)}: {text}"))
     if len(changes) > _MOST_CHANGES:
         lines.append(f"  and {plural(len(changes) - _MOST_CHANGES, 'more difference')}")
     if script.diff:
-        diff = visible_lines(f"--- here\n+++ {engine}\n{script.diff}")
+        diff = printable_lines(f"--- here\n+++ {engine}\n{script.diff}")
         lines += [style.paint(f"  {line}", FAINT) for line in diff.split("\n")]
     return lines
 

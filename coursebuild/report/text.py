@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import textwrap
-import unicodedata
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import assert_never
@@ -17,7 +16,7 @@ from msgspec import Struct
 
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.scripts.sensitivity import PERTURBATION, Doubt, Flip, Sensitivity, Standing
-from coursebuild.core.text.characters import TAB, cells
+from coursebuild.core.text.characters import cells, printable, printable_lines
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Span
 from coursebuild.report.values import (
@@ -48,7 +47,7 @@ class Style(Struct, frozen=True):
     def wrap(self, text: str, indent: str = "", code: str = "") -> list[str]:
         """Return the lines of a paragraph, no wider than the terminal if its words allow."""
         lines = textwrap.wrap(
-            visible(text),
+            printable(text),
             max(self.width, _NARROWEST),
             initial_indent=indent,
             subsequent_indent=indent + "  ",
@@ -56,28 +55,6 @@ class Style(Struct, frozen=True):
             break_on_hyphens=False,
         )
         return [self.paint(line, code) for line in lines]
-
-
-def visible(text: str) -> str:
-    """Return a text with symbols for control characters, so that it cannot change the terminal."""
-    parts: list[str] = []
-    for char in text:
-        code = ord(char)
-        if char == "\t":
-            char = " " * TAB
-        elif code < 0x20:
-            char = chr(0x2400 + code)
-        elif code == 0x7F:
-            char = "\u2421"
-        elif unicodedata.category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp") and char != "\u200d":
-            char = "\ufffd"
-        parts.append(char)
-    return "".join(parts)
-
-
-def visible_lines(text: str) -> str:
-    """Do the same for a text of several lines."""
-    return "\n".join(visible(line) for line in text.split("\n"))
 
 
 def clip(text: str, room: int) -> str:
@@ -105,7 +82,7 @@ def table(columns: Sequence[Column]) -> list[str]:
     for column in columns:
         if not any(map(str.strip, column.cells)):
             continue
-        texts = [column.title, *map(visible, column.cells)]
+        texts = [column.title, *map(printable, column.cells)]
         width = max(map(cells, texts))
         pairs = [(text, " " * (width - cells(text))) for text in texts]
         padded_columns.append([text + pad if column.left else pad + text for text, pad in pairs])
@@ -130,7 +107,7 @@ def to_text(report: Report, style: Style, *, brief: bool = False) -> str:
     if report.sensitivity and not brief:
         parts.append(sensitivity_text(report.sensitivity, style))
     if report.remarks and not brief:
-        parts.append("".join(visible_lines(remark) + "\n" for remark in report.remarks))
+        parts.append("".join(printable_lines(remark) + "\n" for remark in report.remarks))
     parts.append(style.paint(summary_line(report), GREEN if report.ok else RED) + "\n")
     return "\n".join(parts)
 
@@ -144,7 +121,7 @@ def diagnostic_paragraphs(diagnostics: Sequence[Diagnostic], style: Style) -> It
         if counts[key] <= _MOST_OF_A_RULE:
             yield diagnostic_text(d, style) + "\n"
     rest = "".join(
-        f"{severity}[{rule}]: {count - _MOST_OF_A_RULE:,} more in {visible(path)}"
+        f"{severity}[{rule}]: {count - _MOST_OF_A_RULE:,} more in {printable(path)}"
         "; `coursebuild check --format json` lists all\n"
         for (severity, rule, path), count in counts.items()
         if count > _MOST_OF_A_RULE
@@ -189,13 +166,13 @@ def diagnostic_text(diagnostic: Diagnostic, style: Style) -> str:
     pad = " " * gutter
     bar = style.paint("|", BLUE)
     lines = [
-        f"{head}{style.paint(': ' + visible(diagnostic.message), BOLD)}",
+        f"{head}{style.paint(': ' + printable(diagnostic.message), BOLD)}",
         f"{pad[1:]}{style.paint('-->', BLUE)} {location(span)}",
     ]
     if span.source.text:
         text, at, width = _frame(span, max(style.width - gutter - 3, 40))
         marks = style.paint("^" * width, colour)
-        label = f" {style.paint(visible(diagnostic.label), colour)}" if diagnostic.label else ""
+        label = f" {style.paint(printable(diagnostic.label), colour)}" if diagnostic.label else ""
         lines += [
             f"{pad} {bar}",
             f"{style.paint(f'{span.line:>{gutter}}', BLUE)} {bar} {text}".rstrip(),
@@ -211,14 +188,14 @@ def diagnostic_text(diagnostic: Diagnostic, style: Style) -> str:
 
 def location(span: Span) -> str:
     """The place where a span begins: `content/lessons/4.2-x.md:210:26`."""
-    return f"{span.path}:{span.line}:{span.column}"
+    return f"{printable(span.path)}:{span.line}:{span.column}"
 
 
 def _remark(kind: str, message: str, pad: str, style: Style) -> list[str]:
     first, *rest = message.split("\n")
     lead = f"{pad} {style.paint('=', BLUE)} {style.paint(kind + ':', BOLD)} "
     indent = " " * (len(pad) + len(kind) + 5)
-    return [f"{lead}{visible(first)}", *(f"{indent}{visible(line)}".rstrip() for line in rest)]
+    return [f"{lead}{printable(first)}", *(f"{indent}{printable(line)}".rstrip() for line in rest)]
 
 
 def _frame(span: Span, room: int) -> tuple[str, int, int]:
@@ -239,7 +216,7 @@ def _frame(span: Span, room: int) -> tuple[str, int, int]:
     after = "…" if last < len(line) else ""
     at = len(before) + cells(line[first:start])
     width = max(1, cells(line[start : min(end, last)]))
-    return before + visible(line[first:last]) + after, at, width
+    return before + printable(line[first:last]) + after, at, width
 
 
 # --- sensitivity

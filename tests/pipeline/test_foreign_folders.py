@@ -173,6 +173,17 @@ def test_nothing_that_a_script_prints_commands_the_service_that_reads_the_log(ma
             assert "##[error]c\n##vso[task.d]e" in str(json.loads(result.out)).replace("\\n", "\n")
 
 
+def test_no_name_of_a_file_commands_the_terminal(make: Make) -> None:
+    course = make(GOOD)
+    order = "\x1b]0;x\x07"
+    course.write(f"content/lessons/1.2-{order}.md", "text")
+    course.write(f"models/{order}.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>")
+    for arguments in (("check",), ("bench",), ("diet", order), ("rename", "1.1", order)):
+        result = course.run(*arguments)
+        assert result.status != 0
+        assert "\x1b" not in result.out + result.err and "␛]0;x␇" in result.out + result.err
+
+
 TOUCH = "from pathlib import Path\nPath({!r}).touch()\n"
 
 

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from coursebuild import MANUAL
 from coursebuild.core.model.results import Outcome, TrialLine
+from coursebuild.core.text.characters import printable
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Source
 from coursebuild.report import (
@@ -22,7 +23,7 @@ from coursebuild.report import (
     diagnostic_text,
     render_report,
 )
-from coursebuild.report.text import clip, visible
+from coursebuild.report.text import clip
 from support.fixture_cases import check_text
 
 
@@ -62,9 +63,9 @@ def test_frame_label_help_and_notes() -> None:
 
 
 def test_only_what_could_change_the_terminal_is_hidden() -> None:
-    assert visible("a\0\x1b\x7f\x85\u202e\u2028\ufeffb") == "a␀␛␡\ufffd\ufffd\ufffd\ufffdb"
+    assert printable("a\0\x1b\x7f\x85\u202e\u2028\ufeffb") == "a␀␛␡\ufffd\ufffd\ufffd\ufffdb"
     family = "👩\u200d👧"  # joined to one picture
-    assert visible(family) == family
+    assert printable(family) == family
 
 
 def test_text_is_cut_where_its_room_ends() -> None:

@@ -21,6 +21,8 @@ DECISIVE = tuple(
     """.split()
 )
 """Environment variables that decide how scripts draw or compute something."""
+LARGEST = 1 << 30
+"""Bytes of a file that is read at once."""
 
 
 def is_dropping(name: str) -> bool:
@@ -33,7 +35,7 @@ def read_regular(path: str | os.PathLike[str]) -> bytes:
     """The bytes of a file, as `read_bytes` of a path; but a pipe or device is never waited for.
 
     Raises:
-        OSError: it cannot be read, or is no regular file.
+        OSError: it cannot be read, is no regular file, or is larger than `LARGEST`.
     """
     fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     try:
@@ -42,6 +44,8 @@ def read_regular(path: str | os.PathLike[str]) -> bytes:
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         if not stat.S_ISREG(status.st_mode):
             raise OSError("it is not a regular file")
+        if status.st_size > LARGEST:  # one of holes alone takes no room on the disk
+            raise OSError(f"it is larger than {LARGEST >> 20:,} MiB")
         parts = [os.read(fd, status.st_size + 1)]
         while parts[-1]:
             parts.append(os.read(fd, 1 << 20))

@@ -28,6 +28,8 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 """Byte order marks."""
 _MAX_NUL_SHARE = 0.1
 """The share of NUL bytes that a text may have: a stray one is shown as U+FFFD, as in CommonMark."""
+_MOST_LINKED = 10_000
+"""Links, and files and folders behind them: a few links among folders can make endless paths."""
 _OUTSIDE_REASON = "is reached through a link that leads out of the project"
 
 
@@ -120,10 +122,12 @@ def read_sources(
     return Parsed(reader.sources(paths), tuple(reader.diagnostics))
 
 
-def read_folder(root: Path, folder: str) -> Parsed[tuple[Source, ...]]:
-    """Read the text files below a folder of the course, sorted."""
+def read_folder(
+    root: Path, folder: str, endings: str | tuple[str, ...] = ""
+) -> Parsed[tuple[Source, ...]]:
+    """Read the text files below a folder of the course whose names end so, sorted."""
     reader = _Reader(root.resolve())
-    sources = reader.sources([*reader.walk(folder)])
+    sources = reader.sources([path for path in reader.walk(folder) if path.endswith(endings)])
     return Parsed(sources, tuple(reader.diagnostics))
 
 
@@ -162,48 +166,67 @@ class _Reader:
         elif not folder.is_dir():
             self._refuse(top, "is not a folder")
         else:
-            yield from self._walk(top, frozenset())
+            yield from self._walk(top)
 
-    def _walk(self, folder: str, ancestors: frozenset[tuple[int, int]]) -> Iterator[str]:
+    def _walk(self, top: str) -> Iterator[str]:
+        # Each entry with the folders around it, and whether a link is on the way to it.
+        entries: list[tuple[str, bool, frozenset[tuple[int, int]]]] = [(top, False, frozenset())]
+        linked_count = 0
+        while entries:
+            path, is_linked, ancestors = entries.pop()
+            is_link = os.path.islink(f"{self.root}/{path}")  # noqa: PTH114 (time counts)
+            linked_count += is_linked or is_link
+            if (is_linked or is_link) and linked_count > _MOST_LINKED:
+                if linked_count == _MOST_LINKED + 1:
+                    most = f"{_MOST_LINKED:,}"
+                    self._refuse(path, f"is one more than the {most} places that links may lead to")
+                continue
+            mode = self._mode(path, is_link)
+            if mode is not None and stat.S_ISREG(mode):
+                yield path
+            elif mode is not None:
+                contents, enclosing = self._list(path, ancestors)
+                entries += ((name, is_linked or is_link, enclosing) for name in reversed(contents))
+
+    def _list(
+        self, folder: str, ancestors: frozenset[tuple[int, int]]
+    ) -> tuple[list[str], frozenset[tuple[int, int]]]:
+        """The paths of what is in a folder, sorted, and the identities of all folders around it."""
         try:
-            status = (self.root / folder).stat()
-            with os.scandir(self.root / folder) as entries:
-                names = sorted((entry.name, entry.is_symlink()) for entry in entries)
+            status = os.stat(f"{self.root}/{folder}")  # noqa: PTH116
+            names = sorted(os.listdir(f"{self.root}/{folder}"))  # noqa: PTH208
         except OSError as error:
             self._refuse(folder, f"cannot be read: {reason(error)}")
-            return
+            return [], ancestors
         identity = (status.st_dev, status.st_ino)
         if identity in ancestors:  # a link to one of its own parents
-            return
-        for name, is_link in names:
-            if not is_dropping(name):
-                yield from self._walk_entry(f"{folder}/{name}", is_link, ancestors | {identity})
+            return [], ancestors
+        paths = [f"{folder}/{name}" for name in names if not is_dropping(name)]
+        return paths, ancestors | {identity}
 
-    def _walk_entry(
-        self, path: str, is_link: bool, ancestors: frozenset[tuple[int, int]]
-    ) -> Iterator[str]:
+    def _mode(self, path: str, is_link: bool) -> int | None:
+        """The mode of a file or folder that is to be read; `None` where it is not."""
         if not _is_text(path):
             self._refuse(path, "has a name that is not UTF-8")
-            return
+            return None
         full = f"{self.root}/{path}"
         if is_link and not Path(os.path.realpath(full)).is_relative_to(self.root):
             self._refuse(path, _OUTSIDE_REASON)
-            return
+            return None
         try:
             mode = os.stat(full).st_mode  # noqa: PTH116
         except FileNotFoundError:
             if is_link:
                 self._refuse(path, "is a link to a file that is not there")
-            return  # otherwise it was removed meanwhile
+            return None  # otherwise it was removed meanwhile
         except OSError as error:
             self._refuse(path, f"cannot be read: {reason(error)}")
-            return
-        if stat.S_ISDIR(mode) and not path.endswith((".md", ".xml", ".toml")):
-            yield from self._walk(path, ancestors)
-        elif stat.S_ISREG(mode):
-            yield path
-        else:
-            self._refuse(path, "is a folder" if stat.S_ISDIR(mode) else "is not a regular file")
+            return None
+        is_folder = stat.S_ISDIR(mode)
+        if stat.S_ISREG(mode) or (is_folder and not path.endswith((".md", ".xml", ".toml"))):
+            return mode
+        self._refuse(path, "is a folder" if is_folder else "is not a regular file")
+        return None
 
     def sources(self, paths: list[str]) -> tuple[Source, ...]:
         sources = []

@@ -1,8 +1,9 @@
 """Turn a process into a script that finds what a bare `python examples/x.py` finds, and is traced.
 
-Only three things differ from a bare Python: there is one more frame below the script's own, that of
+Only four things differ from a bare Python: there is one more frame below the script's own, that of
 `script_main`; `sys.modules` holds modules of the standard library that the script has not imported;
-and a few functions of `os` are wrapped (`stat_tracing`).
+modules of the project are compiled from their sources, whatever `__pycache__` holds; and a few
+functions of `os` are wrapped (`stat_tracing`).
 """
 
 from __future__ import annotations
@@ -20,7 +21,17 @@ import site
 import sys
 import traceback
 from collections.abc import Mapping, Sequence
-from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
+from importlib.machinery import (
+    BYTECODE_SUFFIXES,
+    EXTENSION_SUFFIXES,
+    SOURCE_SUFFIXES,
+    ExtensionFileLoader,
+    FileFinder,
+    ModuleSpec,
+    PathFinder,
+    SourceFileLoader,
+    SourcelessFileLoader,
+)
 from types import CodeType, ModuleType
 from typing import Any, TypedDict
 
@@ -31,6 +42,36 @@ from coursebuild.core.run.tracing import Tracer
 
 _IMPORTS = {"numpy": ("numpy", "numpy.random"), "mujoco": ("numpy", "mujoco")}
 """The modules that are imported for a package; importing them has no effect that a script sees."""
+
+
+class _SourceLoader(SourceFileLoader):
+    """Compiles a module's source, whatever `__pycache__` holds for it.
+
+    A stranger may have put other code there, and what was compiled before an edit within the same
+    second passes for up to date.
+    """
+
+    def path_stats(self, path: Any) -> Any:
+        """Give none, so that Python finds nothing compiled that fits, and keeps nothing."""
+        raise OSError
+
+
+def _read_sources_in(root: str) -> None:
+    """From now on, import modules of the project from their sources, but not what is installed."""
+    installed = sys.path_hooks[-1]
+    of_project = FileFinder.path_hook(
+        (ExtensionFileLoader, EXTENSION_SUFFIXES),
+        (_SourceLoader, SOURCE_SUFFIXES),
+        (SourcelessFileLoader, BYTECODE_SUFFIXES),
+    )
+
+    def find_in(folder: str) -> Any:
+        path = f"{os.path.abspath(folder)}/"  # noqa: PTH100 (time counts)
+        is_project = path.startswith(f"{root}/") and "/site-packages/" not in path
+        return (of_project if is_project else installed)(folder)
+
+    sys.path_hooks[-1] = find_in
+    sys.path_importer_cache.clear()
 
 
 class Job(TypedDict):
@@ -243,6 +284,7 @@ class ScriptProcess:
             text = file.read()
         if job["figures"]:
             redirect_figures(job, self._environment["TMPDIR"])
+        _read_sources_in(job["root"])
         tracer.install()
         tracer.begin(standard)
         if job["part_lines"] or job["keeps_going"]:

@@ -62,6 +62,28 @@ ISOLATING = re.compile("[\u202a-\u202e\u2066-\u2069]")
 TAB = 4
 
 
+def printable(text: str) -> str:
+    """Return a text with symbols for control characters, so that it cannot change the terminal."""
+    parts: list[str] = []
+    for char in text:
+        code = ord(char)
+        if char == "\t":
+            char = " " * TAB
+        elif code < 0x20:
+            char = chr(0x2400 + code)
+        elif code == 0x7F:
+            char = "\u2421"
+        elif unicodedata.category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp") and char != "\u200d":
+            char = "\ufffd"
+        parts.append(char)
+    return "".join(parts)
+
+
+def printable_lines(text: str) -> str:
+    """Do the same for a text of several lines."""
+    return "\n".join(printable(line) for line in text.split("\n"))
+
+
 def cells(text: str) -> int:
     """The number of columns that a text takes."""
     width = 0

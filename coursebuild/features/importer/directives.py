@@ -15,7 +15,7 @@ from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.context import LessonContext, label_anchor, to_anchor
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import display_formula, rewrite_prose
-from coursebuild.features.importer.source_files import read_yaml
+from coursebuild.features.importer.source_files import TOO_MUCH, read_yaml
 
 
 class Directive(Struct, frozen=True):
@@ -186,6 +186,9 @@ def _write_file(directive: Directive, context: LessonContext, kind: str) -> str:
         context.leave(kind, f"the file `{name}`, which is not in the folder")
         return ""
     text = lines_of(context.files.read_text(path), options)
+    if not context.files.may_include(text, context.path):
+        context.leave(kind, f"the file `{name}`: {TOO_MUCH}")
+        return ""
     if directive.name == "include":
         return directive.nested(text)
     language = options.get("language") or path.rpartition(".")[2]

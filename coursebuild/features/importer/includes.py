@@ -12,10 +12,12 @@ import re
 import textwrap
 from collections.abc import Mapping
 
-from coursebuild.features.importer.source_files import SourceFiles
+from coursebuild.features.importer.source_files import TOO_MUCH, SourceFiles
 
 _MAX_DEPTH = 10
 """Files that may include each other in a row."""
+_MOST_LINES = 100_000
+"""After so many lines of a file no more of it are chosen: some could be chosen again and again."""
 _MARK = re.compile(
     r"(?P<escape>\\)?\{\{[ ]*#(?P<command>include|rustdoc_include|playground|title)[ ]+"
     r"(?P<mdbook>[^{}]*?)[ ]*\}\}"
@@ -30,8 +32,13 @@ _SECTION = (
 )
 
 
-def expand_includes(text: str, path: str, files: SourceFiles, depth: int = 0) -> str:
-    """Return the text of a file with what it includes; what is not in the folder is left."""
+def expand_includes(
+    text: str, path: str, files: SourceFiles, depth: int = 0, *, lesson: str = ""
+) -> str:
+    """Return the text of a file with what it includes; what is not in the folder is left.
+
+    `lesson` is the file that includes this one, where another does.
+    """
 
     def expand(mark: re.Match[str]) -> str:
         if mark["escape"]:
@@ -52,8 +59,13 @@ def expand_includes(text: str, path: str, files: SourceFiles, depth: int = 0) ->
             message = f"`{name}`: the file has no such part"
             files.leave(path, message, "file that is included", line)
             return ""
+        if not files.may_include(part_text, lesson or path):
+            message = f"`{name}`: {TOO_MUCH}"
+            files.leave(path, message, "file that is included", line)
+            return ""
         files.account.changed["file that is included", "its lines stand in the text"] += 1
-        included = expand_includes(part_text, target, files, depth + 1).strip("\n")
+        expanded = expand_includes(part_text, target, files, depth + 1, lesson=lesson or path)
+        included = expanded.strip("\n")
         if mark["command"] == "playground":
             return f"```rust\n{included}\n```"
         return textwrap.indent(included, mark["indent"] or "")
@@ -116,7 +128,8 @@ def lines_of(text: str, options: Mapping[str, str]) -> str:
             if bounds := re.fullmatch(r"\s*(\d*)\s*(-?)\s*(\d*)\s*", part):
                 first = int(bounds[1] or 1)
                 last = int(bounds[3]) if bounds[3] else len(lines) if bounds[2] else first
-                numbers += range(first, min(last, len(lines)) + 1)
+                if len(numbers) < _MOST_LINES:
+                    numbers += range(first, min(last, len(lines)) + 1)
         lines = [lines[number - 1] for number in numbers if number <= len(lines)]
     text = "\n".join(lines)
     return textwrap.dedent(text) if "dedent" in options else text

@@ -12,6 +12,7 @@ import posixpath
 import re
 import stat
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, ValuesView
 from pathlib import Path
 from typing import Any, Literal
@@ -171,6 +172,13 @@ _SKIPPED = (
 """Names of folders that tools write."""
 _MAX_SIZE = 256 << 20
 """Bytes of a file."""
+_MAX_DEPTH = 100
+"""Folders around a folder."""
+_MAX_INCLUDED = 2_000_000
+"""Characters that a lesson may include: files that include each other could become endless."""
+_COST = 1_000
+"""Characters that an inclusion counts as, besides its own."""
+TOO_MUCH = "with it the lesson would include too much text"
 _BAD_NAME = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")
 _OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 _OPEN_FILE = os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -203,6 +211,8 @@ class SourceFiles:
         self.read_paths: set[str] = set()
         self._real_paths: dict[str, str] = {}
         """The path of each file without links, by its path."""
+        self._included = Counter[str]()
+        """Characters that each lesson has included, by its path."""
         if self.is_single:
             self._real_paths[place.name] = place.name
         else:
@@ -259,6 +269,11 @@ class SourceFiles:
             raise UsageError(f"{path} is not UTF-8") from None
         return text.replace("\r\n", "\n").replace("\r", "\n")
 
+    def may_include(self, text: str, lesson: str) -> bool:
+        """Whether a lesson may include this text as well; it counts from now on."""
+        self._included[lesson] += len(text) + _COST
+        return self._included[lesson] <= _MAX_INCLUDED
+
     def _list(self) -> None:
         links, folders = [], {"."}
         pending = [""]
@@ -285,6 +300,8 @@ class SourceFiles:
                     continue
                 if stat.S_ISLNK(status.st_mode):
                     links.append(path)
+                elif stat.S_ISDIR(status.st_mode) and path.count("/") == _MAX_DEPTH:
+                    self.leave(path, f"a folder in {_MAX_DEPTH} others, which is not read")
                 elif stat.S_ISDIR(status.st_mode):
                     pending.append(path)
                     folders.add(path)

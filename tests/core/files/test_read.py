@@ -169,6 +169,27 @@ def test_links_lead_nowhere_but_into_the_project(root: Path, tmp_path: Path) -> 
     assert [m.name for m in parsed_course.value.models] == ["m/a"]
 
 
+def test_few_links_that_make_endless_paths(root: Path) -> None:
+    for number in range(11):  # two ways from each folder to the next
+        folder = root / f"content/{number:02}"
+        folder.mkdir()
+        for way in ("a", "b") if number < 10 else ():
+            (folder / way).symlink_to(f"../{number + 1:02}")
+    fill(root, {f"content/10/{number}.png": "x" for number in range(30)} | {LESSON: "x"})
+    parsed_course = read_course(root)
+    course = parsed_course.value
+    assert [d.rule for d in parsed_course.diagnostics] == ["file-unreadable"]
+    assert [source.path for source in course.lessons] == [LESSON]
+    assert f"content/00/{'a/' * 10}7.png" in course.files
+    assert "content/10/29.png" in course.files  # no link leads there, as its own name does
+
+
+def test_folders_in_folders(root: Path) -> None:
+    path = f"content/{'a/' * 495}x.png"
+    fill(root, {path: "x"})
+    assert path in read_course(root).value.files
+
+
 def test_things_that_are_no_files(root: Path) -> None:
     fill(root, {f"{LESSON}/x": "", "content/lessons/z.md": "z"})
     os.mkfifo(root / "content/lessons/1.2-b.md")
@@ -182,6 +203,13 @@ def test_things_that_are_no_files(root: Path) -> None:
         "content/lessons/1.4-d.md": f"cannot be read: {os.strerror(errno.ELOOP).lower()}",
         "models": "is not a folder",
     }
+
+
+def test_files_of_holes(root: Path) -> None:
+    for path in (LESSON, "models/a.xml"):
+        fill(root, {path: ""})
+        os.truncate(root / path, 1 << 41)
+    assert set(unreadable(root).values()) == {"cannot be read: it is larger than 1,024 MiB"}
 
 
 def test_refused_by_the_system(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:

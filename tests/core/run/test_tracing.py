@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import mmap
 import os
+import py_compile
 import sys
 import tomllib
 from collections.abc import Callable
@@ -146,13 +147,19 @@ def test_modules_of_the_project_are_files(traced: RunTraced, root: Path) -> None
     assert (trace.folders, trace.modules) == ((), ())
 
 
-def test_a_cached_module_counts_as_its_source(traced: RunTraced, root: Path) -> None:
-    (root / "examples/sibling.py").write_text("value = 1")
-    code = "import py_compile\npy_compile.compile(__file__.replace('x.py', 'sibling.py'))"
-    assert traced(code).opaque == "it writes files of the project"
-    assert list(root.glob("examples/__pycache__/*.pyc"))
-    trace = traced("import sibling")
-    assert trace.files == ("examples/sibling.py", "examples/sibling/__init__.py")
+def test_modules_are_compiled_from_their_sources(traced: RunTraced, root: Path) -> None:
+    """What `__pycache__` holds may be another's, and fit all that Python compares."""
+    (root / "examples/pack").mkdir()
+    for name in ("sibling", "pack/__init__", "pack/inner"):
+        source = root / f"examples/{name}.py"
+        source.write_text("value = 'false'")
+        unchecked = py_compile.PycInvalidationMode.UNCHECKED_HASH
+        py_compile.compile(str(source), invalidation_mode=unchecked)
+        source.write_text("value = 'shown'")
+    code = "import sibling, pack, pack.inner\n"
+    trace = traced(f"{code}assert sibling.value + pack.value + pack.inner.value == 'shown' * 3")
+    assert {f"examples/{name}.py" for name in ("sibling", "pack/inner")} <= {*trace.files}
+    assert not any("__pycache__" in path for path in trace.files)
 
 
 def test_what_could_hide_a_module_and_what_is_not_installed(traced: RunTraced) -> None:

@@ -23,6 +23,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.registry import installed_features
 from coursebuild.core.scripts.edit import apply_edits
+from coursebuild.core.text.characters import printable
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.rules import GROUPS, RULES, Rule
 from coursebuild.core.text.source import Source
@@ -32,7 +33,6 @@ from coursebuild.pipeline.fix import choose_fixes
 from coursebuild.pipeline.outputs import update
 from coursebuild.pipeline.publication import build, export
 from coursebuild.report import Style, diagnostic_text
-from coursebuild.report.text import visible
 from coursebuild.report.values import with_hints
 from support.fixture_cases import Case, read_cases, rewrite
 from support.rule_cases import Layout, Workshop
@@ -162,7 +162,7 @@ def print_fixes(fixes: Sequence[Diagnostic]) -> Iterator[str]:
                 apply_edits(source.text, edits).splitlines(),
             )
             diff = list(difflib.unified_diff(lines, new_lines, n=0, lineterm=""))[2:]
-            changed = "".join(f"{visible(line)}\n" for line in diff if not line.startswith("@@"))
+            changed = "".join(f"{printable(line)}\n" for line in diff if not line.startswith("@@"))
             yield f"\n{option} writes {source.path}\n{changed}"
 
 

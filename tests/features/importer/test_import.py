@@ -278,3 +278,44 @@ def test_blocks_that_nest_too_deep_are_shown_as_they_were_written(
     main(["import", str(source), "--out", str(tmp_path / "new")])
     (lesson,) = (tmp_path / "new/content/lessons").iterdir()
     assert lesson.read_text().count(opening.split()[0]) > 1000
+
+
+@pytest.mark.parametrize(
+    ("name", "again"),
+    [("book.toml", "{{#include 1-a.md}}\n"), ("refs.bib", "```{include} 1-a.md\n```\n\n")],
+)
+def test_text_that_includes_itself_again_and_again_ends(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, again: str
+) -> None:
+    source = tmp_path / "source"
+    source.mkdir()
+    (source / name).write_text("")
+    (source / "1-a.md").write_text("# A\n\nwords\n\n" + again * 10)
+    main(["import", str(source), "--out", str(tmp_path / "new")])
+    assert "the lesson would include too much text" in capsys.readouterr().out
+    (lesson,) = (tmp_path / "new/content/lessons").iterdir()
+    assert 100 < lesson.read_text().count("words") < 4000
+
+
+def test_lines_that_are_included_again_and_again_end(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.mkdir()
+    lines = ",".join(["1-"] * 5000)
+    (source / "1-a.md").write_text(f"# A\n\n```{{literalinclude}} b.py\n:lines: {lines}\n```\n")
+    (source / "b.py").write_text("x = 1\n" * 20_000)
+    main(["import", str(source), "--out", str(tmp_path / "new")])
+    (lesson,) = (tmp_path / "new/content/lessons").iterdir()
+    assert 100_000 <= lesson.read_text().count("x = 1") < 120_001
+
+
+def test_folders_in_folders_are_left_with_a_word(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = tmp_path / "source"
+    deep = source / "docs" / "/".join("a" * 400)
+    deep.mkdir(parents=True)
+    (source / "docusaurus.config.js").write_text("module.exports = {title: 'T'}")
+    (deep / "x.md").write_text("# X\n\nWords.\n")
+    (source / "docs/y.md").write_text("# Y\n\nWords.\n")
+    assert main(["import", str(source), "--out", str(tmp_path / "new")]) == 0
+    assert "a folder in 100 others, which is not read" in capsys.readouterr().out

@@ -24,11 +24,12 @@ from coursebuild.core.files.trust import FOLDER, find_store, store_key
 from coursebuild.core.run.environments import find_environment, prepare_environment
 from coursebuild.core.run.sandbox import examine_sandbox
 from coursebuild.core.run.script_environment import engine_version, python_version
+from coursebuild.core.text.characters import printable
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.pipeline.arguments import style_of
 from coursebuild.pipeline.options import Progress
-from coursebuild.report.text import GREEN, RED, YELLOW, visible
+from coursebuild.report.text import GREEN, RED, YELLOW
 from coursebuild.report.values import plural
 
 EXAMPLES = """\
@@ -76,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
         place = sys.executable
         if engine_version() != LAB_ENGINE:
             place = prepare_environment(folder, LAB_ENGINE, Progress().say, locked=True).python
-        return write(f"MuJoCo {LAB_ENGINE}, for labs, is installed for {visible(place)}\n", CLEAN)
+        return write(f"MuJoCo {LAB_ENGINE}, for labs, is installed for {printable(place)}\n", CLEAN)
     style, faults = style_of(sys.stdout), 0
     required = (_engines, _lab_engine, _fonts, _folder)
     for make_probes in (*required, _store, _locks, _disk, _rendering, _sandbox):
@@ -84,8 +85,8 @@ def run(arguments: argparse.Namespace) -> int:
             word, colour = ("broken", RED) if probe.is_required else ("-", YELLOW)
             if probe.ok:
                 word, colour = "ok", GREEN
-            line = f"{style.paint(f'{word:<8}', colour)} {visible(probe.text)}\n"
-            write(line if probe.ok else f"{line}         help: {visible(probe.cure)}\n", CLEAN)
+            line = f"{style.paint(f'{word:<8}', colour)} {printable(probe.text)}\n"
+            write(line if probe.ok else f"{line}         help: {printable(probe.cure)}\n", CLEAN)
             faults += probe.is_required and not probe.ok
     verdict = f"broken: {plural(faults, 'thing')} that every course needs" if faults else ""
     verdict = verdict or "all that every course needs works"

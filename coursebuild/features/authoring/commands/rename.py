@@ -16,10 +16,11 @@ from coursebuild.api import (
     options_of,
 )
 from coursebuild.core.files.course_root import FOLDERS
-from coursebuild.core.files.read import read_bytes, read_sources
+from coursebuild.core.files.read import read_bytes, read_folder
 from coursebuild.core.files.write import FileChange
 from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.scripts.edit import edited_texts
+from coursebuild.core.text.characters import printable
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import (
     doubtful_places,
@@ -28,7 +29,7 @@ from coursebuild.features.authoring.course_map import (
 )
 from coursebuild.output import fail
 from coursebuild.pipeline.options import documents_by_name
-from coursebuild.report.text import location, visible
+from coursebuild.report.text import location
 from coursebuild.report.values import plural
 
 EXAMPLES = """\
@@ -77,14 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
         changes.append(FileChange(replace(lesson, id=new).path, None, lesson_change.new))
         changes.append(FileChange(lesson.path, lesson_change.old, None))
         changes += _move_record(root, lesson.path, replace(lesson, id=new).path)
-    files = (path for top in (*FOLDERS, "src") for path in (root / top).rglob("*.*"))
-    code = [path for path in files if path.suffix in (".py", ".js") and path.is_file()]
-    sources = read_sources(root, sorted(path.relative_to(root).as_posix() for path in code)).value
+    folders = sorted((*FOLDERS, "src"))
+    sources = [s for top in folders for s in read_folder(root, top, (".py", ".js")).value]
     doubtful = doubtful_places(course, lesson, new, edits, sources)
     if doubtful and not arguments.leave:
         lines = [f"{plural(len(doubtful), 'place')} may mean lesson {lesson.id}:"]
         for span in doubtful:
-            text = visible(span.source.line_text(span.line).strip())
+            text = printable(span.source.line_text(span.line).strip())
             lines.append(f"  {location(span)}: {text}")
         help = "edit them first, or leave them as they are with --leave; nothing was changed"
         return fail(FAILURE, "\n".join(lines), help)

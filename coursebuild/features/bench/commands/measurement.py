@@ -34,6 +34,7 @@ from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import write_atomic
 from coursebuild.core.model.report_files import ReportFailure, ReportKind
 from coursebuild.core.model.results import Machine
+from coursebuild.core.text.characters import printable
 from coursebuild.core.text.diagnostics import sort_diagnostics
 from coursebuild.core.values import decode, encode, fingerprint
 from coursebuild.features.bench.commands.measuring import (
@@ -54,7 +55,6 @@ from coursebuild.report.text import (
     Style,
     diagnostic_paragraphs,
     table,
-    visible,
 )
 from coursebuild.report.values import json_text, plural
 
@@ -129,12 +129,12 @@ def format_checks(checks: Sequence[RecordCheck], style: Style) -> str:
     texts = []
     names = ("setting", "figure", "recorded", "measured", "band")
     for check in checks:
-        verdict = style.paint(f"as recorded in {visible(check.path)}", GREEN)
+        verdict = style.paint(f"as recorded in {printable(check.path)}", GREEN)
         if check.departures:
             figures = plural(len(check.departures), "figure")
-            verdict = style.paint(f"{figures} not as recorded in {visible(check.path)}", RED)
-        lines = [f"{style.paint(visible(check.name), BOLD)}  {verdict}"]
-        lines += ["  " + style.paint(visible(remark), YELLOW) for remark in check.remarks]
+            verdict = style.paint(f"{figures} not as recorded in {printable(check.path)}", RED)
+        lines = [f"{style.paint(printable(check.name), BOLD)}  {verdict}"]
+        lines += ["  " + style.paint(printable(remark), YELLOW) for remark in check.remarks]
         for place in dict.fromkeys(departure.where for departure in check.departures):
             departures = [d for d in check.departures if d.where == place]
             columns = [
@@ -146,7 +146,7 @@ def format_checks(checks: Sequence[RecordCheck], style: Style) -> str:
                 for name in names
             ]
             head, *rows = table(columns)
-            lines += ["", "  " + style.paint(visible(place), BOLD)]
+            lines += ["", "  " + style.paint(printable(place), BOLD)]
             lines += ["    " + style.paint(head, FAINT), *(f"    {row}" for row in rows)]
         texts.append("\n".join(lines) + "\n")
     return "\n".join(texts)
@@ -187,15 +187,15 @@ def run_measurement(
     style = style_of(sys.stdout)
     failures = ""
     for failure in measurement.failures:
-        message = style.paint(f": {visible(failure.message)}", BOLD)
+        message = style.paint(f": {printable(failure.message)}", BOLD)
         failures += f"{style.paint('error', RED)}{message}\n"
-        failures += f"  help: {visible(failure.help)}\n" if failure.help else ""
+        failures += f"  help: {printable(failure.help)}\n" if failure.help else ""
     parts = [
         *diagnostic_paragraphs(measurement.diagnostics, style),
         failures,
         measurement.text,
         format_checks(measurement.checked, style),
-        "".join(f"{visible(remark)}\n" for remark in measurement.remarks),
+        "".join(f"{printable(remark)}\n" for remark in measurement.remarks),
         f"{style.paint(measurement.faults, RED)}\n" if measurement.faults else "",
     ]
     return write("\n".join(part for part in parts if part) or empty, status)
