@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 
 import mujoco
@@ -132,3 +133,13 @@ def test_a_text_of_another_tool_keeps_all_that_readers_see(
 ) -> None:
     course = convert_files(tmp_path, {"one.md": f"# One\n\n{source}"})
     assert course.files["content/lessons/1.1-one.md"].decode() == lesson
+
+
+def test_a_long_text_is_within_the_limit_of_its_new_course(tmp_path: Path) -> None:
+    texts = {
+        "long.md": "# Long\n\n" + "A force is a push.\n" * 16_000,
+        "short.md": "# Short\n\nText.\n",
+    }
+    course = convert_files(tmp_path, texts)
+    limits = tomllib.loads(course.files["content/course.toml"].decode())["limits"]
+    assert max(map(len, course.files.values())) < limits["text"] <= 500_000
