@@ -432,6 +432,8 @@ class _Loader:
 
 
 def _check_unlisted_files(course: Course) -> Iterator[Diagnostic]:
+    if not course.is_whole:
+        return
     folders = ("content/lessons/", "content/pages/")  # files in these have rules of their own
     paths = [path for path in course.files if path.startswith("content/") and path.endswith(".md")]
     paths = [path for path in paths if not path.startswith(folders)]

@@ -9,7 +9,6 @@ import posixpath
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from pathlib import Path
-from textwrap import shorten
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -83,7 +82,9 @@ def convert(files: SourceFiles) -> ConvertedCourse:
         out[BIBLIOGRAPHY] = _encode(_cited_works(files, context.cited))
     unused = {*files} - files.read_paths - {*models}
     out |= packages | {path: files.read(source) for source, path in models.items()}
-    lines = map_lines(course, ids, context.callouts, ("src",) if packages else ())
+    texts_and_models = (data for path, data in out.items() if path.endswith((".md", ".xml")))
+    longest = max(map(len, texts_and_models), default=0)
+    lines = map_lines(course, ids, context.callouts, ("src",) if packages else (), longest)
     out["content/course.toml"] = _encode("".join(f"{line}\n" for line in lines))
     out[".gitignore"] = _GITIGNORE
     for kind, paths in (
@@ -290,12 +291,11 @@ def _convert_texts(
             text_context.leave("link", f"a link to `#{anchor}`, which no text sets")
         return address
 
-    def leave_tag(link: str, tag: str) -> None:
-        message = f"`{shorten(tag, 120, placeholder='…')}`, which a page cannot hold"
-        files.leave(files_of[link], message, "tag of HTML")
+    def leave(link: str, kind: str, message: str) -> None:
+        files.leave(files_of[link], message, kind)
 
     callouts = frozenset((*CALLOUTS, *context.callouts))
-    completed = complete_texts(new, resolve_label, leave_tag, callouts)
+    completed = complete_texts(new, resolve_label, leave, callouts)
     out = {text.path: _encode(new_text) for text, new_text in zip(texts, completed, strict=True)}
     return {**out, **context.copies}, context
 

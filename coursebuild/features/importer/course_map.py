@@ -15,7 +15,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from coursebuild.api import UsageError
+from coursebuild.api import UsageError, model
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
@@ -296,13 +296,20 @@ def map_lines(
     ids: Mapping[str, str],
     callouts: Mapping[str, str],
     packages: tuple[str, ...],
+    longest: int,
 ) -> Iterator[str]:
-    """Yield the lines of `course.toml`; `ids` are the new ids of lessons, by the old ones."""
+    """Yield the lines of `course.toml`.
+
+    `ids` are the new ids of lessons, by the old ones; `longest` is the size of the longest text.
+    """
     yield "[course]"
     yield from _field_lines(
         title=course.title, summary=course.summary, language=course.language, packages=packages
     )
     yield from ("", "[verify]", 'compare = "digits"')
+    usual = model.Limits().text
+    if longest > usual:
+        yield from ("", "[limits]", f"text = {(longest // usual + 1) * usual:_}")
     if callouts:
         yield from ("", "[callouts]")
         yield from (f"{toml_string(k)} = {toml_string(label)}" for k, label in callouts.items())

@@ -27,15 +27,17 @@ _ATTRIBUTES = (
 )
 _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
 """Attributes of Pandoc or of Python's Markdown, which follow what they belong to."""
+_PLACE = r"(?:[^()\s]|\([^()\s]*\))+"
+_LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
 # A formula holds no beginning of another: so each character is looked at a few times, not once for
 # each beginning before it.
 _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`))"
-    r"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>[^()\s]+)(?:[ \t]+\"[^\"\n]*\")?\)"
+    rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?:{_LINK_TITLE})?\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
-    r"\((?P<address>(?:[^()\s]|\([^()\s]*\))+)(?P<title>[ \t]+\"[^\"\n]*\")?\))"
+    rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
@@ -47,7 +49,7 @@ _LINE = re.compile(
     r"|(?P<substitution>\{\{[^{}\n]*\}\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
-    r"|(?P<tail>\]\((?P<rest>[^()\s]+)(?=\)))"  # of a link whose text began a line above
+    rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?\)))"  # its text began a line above
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:)"
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>[a-z][a-z0-9-]*(?:\+[a-z0-9-]+)*)\+\+(?![\w+]))"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
+from textwrap import shorten
 from unicodedata import normalize
 from urllib.parse import unquote
 
@@ -44,16 +45,16 @@ class _Text(Struct, frozen=True):
 def complete_texts(
     texts: Mapping[str, tuple[str, str]],
     resolve_label: Callable[[str, str], str],
-    leave_tag: Callable[[str, str], None],
+    leave: Callable[[str, str, str], None],
     callouts: frozenset[str],
 ) -> Iterator[str]:
     """Yield the new texts of lessons and pages, each by its link and with its title, completed.
 
     `resolve_label` gives the address of an anchor for a link in a text; empty if no text sets it.
-    `leave_tag` is told of the HTML in a text that a page cannot hold, and that is dropped.
+    `leave` is told of what a page cannot hold, and is changed: the link, the kind, a message.
     """
     read = {
-        link: _read(link, title, text, leave_tag, callouts) for link, (title, text) in texts.items()
+        link: _read(link, title, text, leave, callouts) for link, (title, text) in texts.items()
     }
     for link, text in read.items():
         edits = {edit.span.start: edit for edit in _edit_links(link, read, resolve_label)}
@@ -67,6 +68,7 @@ _MEDIA = re.compile(
     r"<(?:img\b[^<>]*>|(?P<name>video|audio)\b[^<>]*(?:/>|>(?:.*?</(?P=name)\s*>)?))",
     re.DOTALL | re.IGNORECASE,
 )
+_ELSEWHERE = re.compile("https?://|//")
 _WITH_CONTENT = re.compile(r"<(script|style)\b.*?(?:</\1\s*>|\Z)", re.DOTALL | re.IGNORECASE)
 
 
@@ -74,7 +76,7 @@ def _read(
     link: str,
     title: str,
     text: str,
-    leave_tag: Callable[[str, str], None],
+    leave: Callable[[str, str, str], None],
     callouts: frozenset[str],
 ) -> _Text:
     for _ in range(_PASSES):
@@ -90,11 +92,20 @@ def _read(
             end = whole.end() if whole is not None else span.end
             if span.start not in edits:
                 edits[span.start] = Edit(Span(source, span.start, end), "")
-                leave_tag(link, text[span.start : end])
+                leave(link, *_left_tag(text[span.start : end]))
         for html in _raw_html(document):
             for media in html.media:
-                if re.match("https?://|//", media.url):
-                    edits |= _link_to_picture(source, media.span, link, leave_tag)
+                if _ELSEWHERE.match(media.url):
+                    edits |= _link_to_picture(source, media.span, link, leave)
+        links = [linked.span for linked in model.find_inlines(document, model.Link)]
+        for image in model.find_inlines(document, model.Image):
+            if _ELSEWHERE.match(image.url):
+                place, name = image.span, image.url.rpartition("/")[2]
+                is_in_link = any(at.start < place.start and place.end < at.end for at in links)
+                new = f"[{'' if image.alt else name}{place.text.removeprefix('![')}"
+                edits[place.start] = Edit(place, (image.alt or name) if is_in_link else new)
+                message = f"a picture from another host, `{image.url}`; it is a link now"
+                leave(link, "picture", message)
         if not edits:
             break
         text = apply_edits(text, _without_overlaps(edits))
@@ -111,7 +122,7 @@ def _read(
 
 
 def _link_to_picture(
-    source: Source, address: Span, link: str, leave_tag: Callable[[str, str], None]
+    source: Source, address: Span, link: str, leave: Callable[[str, str, str], None]
 ) -> dict[int, Edit]:
     """Return the edit that makes a picture or film from another host in HTML a link."""
     start = source.text.rfind("<", 0, address.start)
@@ -119,10 +130,14 @@ def _link_to_picture(
     if element is None:
         return {}
     end, tag = element.end(), element[0]
-    leave_tag(link, tag)
+    leave(link, *_left_tag(tag))
     alt = re.search(r"\salt=[\"']([^\"']+)", tag)
     words = alt[1] if alt else address.text.rpartition("/")[2]
     return {start: Edit(Span(source, start, end), f'<a href="{address.text}">{words}</a>')}
+
+
+def _left_tag(tag: str) -> tuple[str, str]:
+    return "tag of HTML", f"`{shorten(tag, 120, placeholder='…')}`, which a page cannot hold"
 
 
 def _raw_html(document: model.Document) -> Iterator[model.HtmlBlock | model.RawInline]:

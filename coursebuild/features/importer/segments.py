@@ -12,6 +12,7 @@ from typing import Any
 
 from markdown_it import MarkdownIt
 from markdown_it.rules_block import StateBlock
+from mdit_py_plugins.footnote import footnote_plugin
 from msgspec import Struct
 from msgspec.structs import replace
 
@@ -256,7 +257,7 @@ def _parse_titled(state: StateBlock, start: int, end: int, silent: bool) -> bool
 
 _QUOTE = re.compile(r"^ {0,3}> ?")
 _BLOCKS = ("fence", "marked", "titled")
-_PARSER = MarkdownIt("commonmark")
+_PARSER = MarkdownIt("commonmark").use(footnote_plugin).disable("footnote_tail")  # in its order
 for _name, _parse in (("marked", _parse_marked), ("titled", _parse_titled)):
     _PARSER.block.ruler.before("fence", _name, _parse, {"alt": ["paragraph", "list", "blockquote"]})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 
 import mujoco
@@ -132,3 +133,30 @@ def test_a_text_of_another_tool_keeps_all_that_readers_see(
 ) -> None:
     course = convert_files(tmp_path, {"one.md": f"# One\n\n{source}"})
     assert course.files["content/lessons/1.1-one.md"].decode() == lesson
+
+
+def test_a_long_text_is_within_the_limit_of_its_new_course(tmp_path: Path) -> None:
+    texts = {
+        "long.md": "# Long\n\n" + "A force is a push.\n" * 16_000,
+        "short.md": "# Short\n\nText.\n",
+    }
+    course = convert_files(tmp_path, texts)
+    limits = tomllib.loads(course.files["content/course.toml"].decode())["limits"]
+    assert max(map(len, course.files.values())) < limits["text"] <= 500_000
+
+
+def test_titles_in_either_quotes_and_brackets_in_names_are_read(tmp_path: Path) -> None:
+    lines = """# One
+
+![A spring](springs(2).svg ':size=550'), ![two](two.svg "both"), [below](two.md 'The next'),
+[over
+lines](two.md 'The next') and ![](far.svg 'gone').
+"""
+    drawing = '<svg xmlns="http://www.w3.org/2000/svg"/>'
+    texts = {"one.md": lines, "two.md": "# Two\n\nText.\n"}
+    course = convert_files(tmp_path, {**texts, "springs(2).svg": drawing, "two.svg": drawing})
+    text = course.files["content/lessons/1.1-one.md"].decode()
+    pictures = "![A spring](../files/springs(2).svg), ![two](../files/two.svg)"
+    link = "(lesson:1.2 'The next')"
+    assert text == f"{pictures}, [below]{link},\n[over\nlines]{link} and .\n"
+    assert "the picture `far.svg`, which is not in the folder" in account_of(course)
