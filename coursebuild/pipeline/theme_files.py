@@ -14,13 +14,14 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild import __version__
+from coursebuild.core.drawing.picture_size import picture_size
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes, read_folder
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Course
 from coursebuild.core.model.course import PICTURES, TEMPLATES, Theme, ThemeFile
 from coursebuild.core.pages.renderer import TemplateFailure, find_template_error
-from coursebuild.core.pages.theme import course_face, picture_size
+from coursebuild.core.pages.theme import course_face
 from coursebuild.core.scripts.figures import prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.source import Source
@@ -76,7 +77,7 @@ def _check_files(theme: Theme) -> Iterator[Diagnostic]:
         if isinstance(picture, str):
             yield diagnose("theme-file", file.span, f"`{file.path}` {picture}")
         elif file in (theme.icon, theme.touch_icon):
-            width, height = picture_size(file) or (1, 1)
+            width, height = picture_size(file.data) or (1, 1)
             if width != height:
                 message = f"`{file.path}` is not square: {width:g} × {height:g}"
                 yield diagnose("theme-file", file.span, message)

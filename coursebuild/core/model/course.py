@@ -326,6 +326,8 @@ class Course(Struct, frozen=True):
     files: tuple[str, ...] = ()
     """Other files in `content/` that a page may show or link to (pictures, data), by path relative
     to the root."""
+    pictures: Mapping[str, tuple[int, int]] = {}
+    """Width and height of those that documents show, in CSS pixels, by path; not where unknown."""
     declarations: tuple[Declarations, ...] = ()
     """The contents of the files `models/NAME.toml`, of existing models only."""
     bound_numbers: tuple[NumberBinding, ...] = ()

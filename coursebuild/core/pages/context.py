@@ -116,6 +116,8 @@ class DocumentInputs(Struct, frozen=True):
     """The values that features show with their blocks (`FenceKind.values`)."""
     code_links: Mapping[int, str] = field(default_factory=dict)
     citations: Citations = Citations()
+    pictures: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    """See `Course.pictures`: those that the document shows."""
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""
     address: str = ""
@@ -255,6 +257,11 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
     def url(self, url: str) -> str:
         """An address as written; that of a file of the course becomes its place in the site."""
         return urls.file_address(self.place, self.document.source.path, url)
+
+    def sides(self, url: str) -> Markup:
+        """The attributes that keep the place of an image until it has arrived."""
+        size = self.inputs.pictures.get(model.local_file(url, self.document.source.path))
+        return Markup(' width="{}" height="{}"').format(*size) if size is not None else Markup()
 
     def math(self, tex: str) -> Markup:
         """A formula in a line of text."""

@@ -68,6 +68,8 @@ def document_inputs(
     verdicts = ((block.span.start, library.verdict(block)) for block in recordings)
     trials = ((block.span.start, library.trial_value(block)) for block in feature_blocks)
     values = ((block, kind_of_block(block).values) for block in feature_blocks)
+    pictures = library.course.pictures
+    files = [model.local_file(i.url, path) for i in model.find_inlines(document, model.Image)]
     return DocumentInputs(
         engine=library.results.engine,
         hrefs={target: address(library, place, path, target) for target in targets},
@@ -92,6 +94,7 @@ def document_inputs(
         blocks={b.span.start: make(library, place, b) for b, make in values if make is not None},
         citations=citations(library, place, document),
         code_links=code_links(library, place, document),
+        pictures={file: pictures[file] for file in files if file in pictures},
         keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
         address=urls.absolute(library.course.base_url, place.path),
     )

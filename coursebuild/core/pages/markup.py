@@ -83,6 +83,10 @@ class HtmlWriter:
         """The address of an image that is written as `url`."""
         return url
 
+    def sides(self, url: str) -> Markup:
+        """The attributes that keep the place of an image until it has arrived."""
+        return Markup()
+
     def number(self, label: model.Label | None) -> str:
         """The name that a label gives, such as "Figure 4.2.3"; empty without one."""
         return ""
@@ -333,7 +337,7 @@ class HtmlWriter:
     def _image(self, image: model.Image) -> str:
         title = f' title="{escape(image.title)}"' if image.title else ""
         url = escape(self.url(image.url))
-        return f'<img src="{url}" alt="{escape(image.alt)}"{title}>'
+        return f'<img src="{url}" alt="{escape(image.alt)}"{title}{self.sides(image.url)}>'
 
     # -- footnotes
 

@@ -74,6 +74,7 @@ class PageWriter(PageContext, frozen=True):
             label=block.label,
             number=self.number(block.label),
             href=self.url(image.url),
+            sides=self.sides(image.url),
             figure=recorded,
             dark=recorded and recorded.has_dark and self.place.href(urls.dark_path(recorded.path)),
             anchor=recorded and model.listing_anchor(recorded.script),

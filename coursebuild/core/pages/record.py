@@ -19,6 +19,7 @@ from html import escape, unescape
 
 from msgspec import Struct
 
+from coursebuild.core.drawing.picture_size import picture_size
 from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import typography
@@ -37,7 +38,6 @@ from coursebuild.core.pages.theme import (
     FontJob,
     face_rules,
     font_jobs,
-    picture_size,
     read_faces,
     theme_faces,
     theme_style,
@@ -246,7 +246,7 @@ def common_files(
     icon, touch_icon = shared.add_icons(theme)
     sheet = rules.encode() + assets.file("css/site.css") + style.encode()
     logo = theme.logo or theme.logo_dark
-    size = picture_size(logo) if logo is not None else None
+    size = picture_size(logo.data) if logo is not None else None
     licences = [
         (path.removeprefix("licences/").removesuffix(".txt"), data.decode())
         for path, data in assets.files("licences")

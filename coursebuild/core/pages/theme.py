@@ -27,8 +27,7 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
-from coursebuild.core.drawing.safe_svg import read_svg
-from coursebuild.core.model.course import Theme, ThemeFile
+from coursebuild.core.model.course import Theme
 
 TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"
 """Families, by their names in the bundle."""
@@ -229,6 +228,7 @@ FALLBACKS = (
         ("Times New Roman Italic", "Liberation Serif Italic", "Tinos Italic"),
         0.39993,
     ),
+    Fallback(CODE, "normal", ("DejaVu Sans Mono",), 0.60205),
     Fallback(CODE, "normal", ("Courier New", "Liberation Mono", "Cousine"), 0.60010),
 )
 """If several exist on a machine for one face, the last is used: browsers try later rules first.
@@ -318,7 +318,6 @@ def measure_font(font: Any) -> tuple[float, float, float, float] | None:
 
 _ACCENT = "#17487a", "#9fc6ef"
 _BOLD = 600
-_SIDE = re.compile(r"\s*+(\d+(?:\.\d*)?|\.\d+)")
 
 
 def theme_faces(theme: Theme) -> list[tuple[Face, bytes]]:
@@ -350,22 +349,6 @@ def accents(theme: Theme) -> tuple[str, str]:
         return _ACCENT
     light = theme.accent or _ACCENT[0]
     return light, theme.accent_dark or legible(light, GROUNDS_DARK, RECOMMENDED_CONTRAST)
-
-
-def picture_size(file: ThemeFile) -> tuple[float, float] | None:
-    """Width and height of a picture, of which only the ratio counts; `None` if not given."""
-    if file.ending == "png":
-        width, height = (int.from_bytes(file.data[at : at + 4], "big") for at in (16, 20))
-        return width, height
-    root = read_svg(file.data)
-    if isinstance(root, str):
-        return None
-    box = root.get("viewBox", "").replace(",", " ").split()
-    sides = box[2:] if len(box) == 4 else [root.get("width", ""), root.get("height", "")]
-    numbers = [float(match[1]) for side in sides if (match := _SIDE.match(side))]
-    if len(numbers) < 2 or not 1e-6 < min(numbers) <= max(numbers) < 1e6:
-        return None
-    return numbers[0], numbers[1]
 
 
 _PAIR = re.compile(r"light-dark\((#[0-9a-f]{6}), ?(#[0-9a-f]{6})\)")

@@ -24,11 +24,11 @@ from coursebuild.api import (
     urls,
 )
 from coursebuild.core.drawing.contrast import GROUNDS_LIGHT
+from coursebuild.core.drawing.picture_size import picture_size
 from coursebuild.core.model.course import ThemeFile
 from coursebuild.core.model.results import FileFacts
 from coursebuild.core.pages.assets import hashed_name, page_script
 from coursebuild.core.pages.renderer import direction
-from coursebuild.core.pages.theme import picture_size
 
 PAPER = GROUNDS_LIGHT[0]
 """The background of a page in light colours."""
@@ -90,7 +90,7 @@ def offline_files(site: SiteContext) -> Iterator[OutputFile | FileList]:
 def _entry(path: str, file: ThemeFile | None) -> dict[str, str]:
     if file is None or file.ending == "svg":
         return {"src": path, "type": "image/svg+xml", "sizes": "any"}
-    width, height = picture_size(file) or (0, 0)
+    width, height = picture_size(file.data) or (0, 0)
     return _png(path, f"{width}x{height}")
 
 

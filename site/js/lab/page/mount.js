@@ -22,7 +22,10 @@ export async function mount(element, texts, missing, make) {
     const response = await fetch(base)
     if (!response.ok) throw new Error(words('lab.live.not_found', { status: response.status }))
     const config = await response.json()
-    const instrument = await make(config, base, words)
+    const keepPlace = holdPlace(element)
+    const made = make(config, base, words)
+    keepPlace()
+    const instrument = await made
     moveFocus(element)
     const link = await readLink(window.location.hash)
     if (link?.id === config.id && link.state !== null) instrument.restore?.(link.state)
@@ -31,6 +34,23 @@ export async function mount(element, texts, missing, make) {
     element.querySelector('.lab-title').after(h('p', { class: 'lab-message lab-is-wrong', role: 'alert' }, error.message))
     return null
   }
+}
+
+/**
+ * Notes where in the window something below a lab is: what the reader points at, has focused, or has in the middle.
+ *
+ * @returns {() => void} scrolls it back there after the lab has changed its height: not every browser does, and none for a pointer
+ */
+function holdPlace(lab) {
+  const { scrollY, innerWidth, innerHeight } = window
+  const middle = scrollY > 0 ? document.elementFromPoint(innerWidth / 2, innerHeight / 2) : null
+  const place = (element) => element.getBoundingClientRect()
+  const isSeen = (element) => element && !element.contains(lab) && place(element).bottom > 0 && place(element).top < innerHeight
+  const held = [[...document.querySelectorAll(':hover')].at(-1), document.activeElement, middle].find(isSeen)
+  const isBelow = held && !lab.contains(held) && lab.compareDocumentPosition(held) & Node.DOCUMENT_POSITION_FOLLOWING
+  if (!isBelow) return () => {}
+  const { top } = place(held)
+  return () => window.scrollBy({ top: place(held).top - top, behavior: 'instant' })
 }
 
 /** Move the keyboard focus from the static form, which is now hidden, into the instrument. */
