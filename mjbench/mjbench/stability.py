@@ -6,10 +6,9 @@
    in the first steps and then decays is a transient of the method and no loss. *Near* is what stays
    near the motion that small steps keep, as long as that can be predicted. *Through* is what comes
    out on the other side of something, or stays inside it: how deep it goes is no loss by itself.
-2. One limit has several answers, which need not agree: theory at rest and along a periodic motion;
-   runs from the own start over the span, and over twice the span; runs from starts nearby. All are
-   kept, and only digits on which they agree are shown. Theory at rest is asked only where the
-   scenario comes near to that rest.
+2. One limit has several answers, which need not agree: theory at rest; runs from the own start over
+   the span, and over twice the span; runs from starts nearby. Only digits on which they agree are
+   shown. Theory is asked only where the scenario comes near to that rest.
 3. Stability need not be monotone. A grid, even in the logarithm, is tried down to a tenth of the
    shortest timestep that is lost, and about it from all starts; a bisection follows.
 4. Where nothing drives a scene, its energy cannot rise. The first timestep at which it does is a
@@ -129,7 +128,7 @@ def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
     model = compile_model(problem.mjcf, Integrator.EULER, min(problem.timesteps or (1e-3,)))
     integrators = Integrator if np.any(model.dof_damping) else STANDARD
     problem = with_energy_bound(problem)
-    theory = find_theory(model, problem.scenario, problem.limit, smooth=problem.smooth)
+    theory = find_theory(model, problem.scenario, problem.limit)
     return tuple(boundary(problem, integrator, theory) for integrator in integrators)
 
 
@@ -212,7 +211,7 @@ def search_row(
     if by_start:
         estimates.append(estimate(min(by_start, key=lambda n: by_start[n]), resolution))
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
-    limit, orbital = theory.limit(integrator, search), theory.orbital(integrator)
+    limit = theory.limit(integrator, search)
     gain = _first_gain(laboratory, grid, setup)
     near_limit = _limit_of(laboratory, grid, resolution, "astray")
     through_limit = _limit_of(laboratory, grid, resolution, "through")
@@ -238,7 +237,6 @@ def search_row(
         bracket=None if min(largest, *estimates) == math.inf else (min(bounds), max(bounds)),
         theory=None if limit is None else reach(limit.timestep),
         formula="" if limit is None else limit.source,
-        orbital=orbital,
         gain=gain,
         tries=_tries(laboratory),
     )
@@ -382,7 +380,6 @@ def stable_rows(
                 model,
                 scene.scenario,
                 declared_limit if limits else None,
-                smooth=pilot.smooth and not quick,  # an orbit takes longer than all the rest
                 visits=partial(_comes_near, motion, model),
             )
         ),

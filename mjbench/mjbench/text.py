@@ -161,7 +161,6 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("near small steps", [reach_text(row.near, row.searched) for row in rows]),
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
         ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
-        ("of the orbit", [reach_text(row.orbital, row.searched) for row in rows]),
         ("gains energy from", ["" if r.gain is None else seconds_text(r.gain[0], 2) for r in rows]),
         ("stable again", [_again(row) for row in rows]),
     ]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from itertools import pairwise
 
 from mjbench.reports import Reach, reach_bound
@@ -29,7 +28,7 @@ def limit_text(row: StableRow) -> str:
         return reach_text(row.largest, row.searched)
     low, high = row.bracket
     if row.islands is not None:
-        low = min(low, high / max(1.0, widest_gaps([row])[0]))
+        low = min(low, high / _widest_gap(row))
     if isinstance(row.theory, float) and row.theory < high * (1 + _TOGETHER):
         low, high = min(low, row.theory), max(high, row.theory)
     if low <= 0:
@@ -63,18 +62,11 @@ def reach_text(limit: Reach | None, searched: tuple[float, float], digits: int =
     return seconds_text(limit, digits)
 
 
-def widest_gaps(rows: Iterable[StableRow]) -> tuple[float, float]:
-    """The largest ratios of timesteps that were tried next to each other: above half, and in all.
-
-    They count up to the largest stable one; 0 without any.
-    """
-    near, far = [0.0], [0.0]
-    for row in rows:
-        top = min(reach_bound(row.largest), row.searched[1])
-        steps = [step for step, _, _ in row.tries if step <= top * (1 + 1e-9)]
-        for step, following in pairwise(steps):
-            (near if step >= top / 2 else far).append(following / step)
-    return max(near), max(*near, *far)
+def _widest_gap(row: StableRow) -> float:
+    """The largest ratio of timesteps tried next to each other, from half the largest stable one."""
+    top = min(reach_bound(row.largest), row.searched[1])
+    steps = [step for step, _, _ in row.tries if top / 2 <= step <= top * (1 + 1e-9)]
+    return max((following / step for step, following in pairwise(steps)), default=1.0)
 
 
 def map_text(row: StableRow) -> str:
