@@ -26,9 +26,7 @@ import numpy as np
 from msgspec import Struct, field
 from msgspec.structs import asdict, replace
 
-from mjbench.detector import (
-    driving_force,
-)
+from mjbench.detector import Passages, driving_force
 from mjbench.linearization import Theory, find_theory
 from mjbench.parts import Parts
 from mjbench.pilot import (
@@ -91,8 +89,9 @@ class Laboratory(Struct, frozen=True, eq=False):
     span: float
     """s."""
     starts: int = 1
-    watched: bool = False
-    """Whether runs are compared with the motion of small steps, and watched for passing through."""
+    asked: tuple[str, ...] = ()
+    """What else is asked: whether runs go `astray` from the motion of small steps, and whether
+    anything goes `through` anything, where it can touch."""
     shortest: float = math.inf
     """The shortest timestep at which that is asked, s."""
     trials: dict[tuple[int, float], dict[int, StabilityTrial]] = field(default_factory=dict)
@@ -251,7 +250,7 @@ def _limit_of(
     `None` where that is not asked. It is not looked for below the shortest that was tried to see
     what is bounded, or that the scene is measured at.
     """
-    if not laboratory.watched:
+    if kind not in laboratory.asked:
         return None, ""
     steps_tried = laboratory.own_steps()
     low = min(steps_tried[0], laboratory.shortest)
@@ -366,6 +365,7 @@ def stable_rows(
     limits = scene.declaration.limits
     setup_over = cache(partial(longer_setup, model, pilot))
     motion = kept_motion(model, pilot, reference)
+    asked = ("astray", "through") if Passages(model).needed else ("astray",)
 
     def declared_limit(integrator: Integrator) -> Limit | None:
         step = limits.get(integrator.value)  # type: ignore[call-overload]
@@ -401,7 +401,7 @@ def stable_rows(
         if search[1] <= search[0]:
             return None
         starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
-        laboratory = Laboratory(run, span, starts, watched=True, shortest=shortest)
+        laboratory = Laboratory(run, span, starts, asked, shortest)
         return search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
 
     rows = (

@@ -53,7 +53,8 @@ def scene_text(report: SceneReport, style: Style = _PLAIN) -> str:
     if not report.scenarios and not report.failures:
         lines.append("  nothing in it can move, so nothing was measured")
     for scenario in report.scenarios:
-        lines += [f"  {style.strong(scenario.name)}: {scenario.title}"]
+        title = "" if scenario.title == scenario.name else f": {scenario.title}"
+        lines += [f"  {style.strong(scenario.name)}{title}"]
         for line in scenario.verdict.lines:
             lines += style.wrap(line, "    ")
     for failure in report.failures:

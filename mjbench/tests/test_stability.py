@@ -341,6 +341,14 @@ def test_what_stays_bounded_may_leave_the_motion_of_small_steps() -> None:
     discrete = rows["discrete"]
     assert discrete.largest == "all" and discrete.theory is None
     assert discrete.near == "none" and discrete.near_reason.startswith("off by 0.1 rad")
+    assert {row.through for row in rows.values()} == {None}, "nothing can touch"
+
+
+def test_a_motion_that_dies_is_not_near_however_small_it_was() -> None:
+    """The pivot moves by 0.012 m, less than a tenth of the extent: `discrete` stops it."""
+    discrete = rows_of(TOPPLING.format("1e8"), qpos=(0.005, 0.0), search=(2e-4, 1e-2))["discrete"]
+    assert discrete.largest == "all"
+    assert discrete.near == "none" and "/ 0.00299 m at " in discrete.near_reason
 
 
 def test_energy_that_cannot_be_is_instability() -> None:
