@@ -105,8 +105,9 @@ def _measure(model: Path, report: Path, minutes: int, *, full: bool) -> bool:
     failures = []
     if done.output:
         report.write_bytes(done.output)
-        failures = json.loads(done.output)["failures"]
-        for line in _lines(json.loads(done.output)):
+        scene = json.loads(done.output)["scene"]
+        failures = scene["failures"]
+        for line in _lines(scene):
             print(f"  {line}", flush=True)
     if done.status:
         print(f"  not measured: {done.last_line()}", flush=True)

@@ -37,6 +37,7 @@ from mjbench.reports.records import (
     DIET,
     ENGINES,
     STABILITY,
+    Departure,
     RecordError,
     case_departures,
     scene_departures,
@@ -229,8 +230,8 @@ def _bench(arguments: argparse.Namespace) -> int:
         names = [name.strip() for name in arguments.engines.split(",") if name.strip()]
         engines, remarks = chosen_engines(names)
         report = measure_engines(subject, engines, host, quick=quick)
-        _print(arguments, report, text.engines_text(report, _style()), remarks)
-        return _record(arguments, ENGINES.encode(report))
+        _print(arguments, ENGINES.encode(report), text.engines_text(report, _style()), remarks)
+        return 0
     timed = arguments.check is None
     recorded = None if timed else BENCH.decode(arguments.check.read_bytes())
     compiled_model = bench.compile_subject(
@@ -241,20 +242,20 @@ def _bench(arguments: argparse.Namespace) -> int:
     )
     if recorded is not None:
         departures = scene_departures(recorded, scene, compiled_model.declarations.bench)
-        _print(arguments, departures, text.departures_text(departures))
+        _print(arguments, _list(departures), text.departures_text(departures))
         return 1 if departures else 0
     parts = Parts()
     words = parts.run("the text", partial(text.scene_text, scene, _style()), "")
     page = None if arguments.html is None else parts.run("the page", partial(scene_page, scene), "")
-    _print(arguments, scene, words, [f"{f.part} was not made: {f.reason}" for f in parts.failures])
+    unmade = [f"{f.part} was not made: {f.reason}" for f in parts.failures]
+    is_measured = not is_stopped and bool(scene.scenarios or not scene.failures)
+    _print(arguments, BENCH.encode(scene), words, unmade, record=is_measured)
     if page:
         arguments.html.write_text(page, "utf-8")
     if is_stopped:
         print("mjbench: stopped; this is what is known", file=sys.stderr)
         return _STOPPED
-    if not scene.scenarios and scene.failures:
-        return 1
-    return _record(arguments, BENCH.encode(scene)) or int(bool(parts.failures))
+    return int(not is_measured or bool(parts.failures))
 
 
 def _measure_scene(
@@ -338,13 +339,12 @@ def _stability(arguments: argparse.Namespace) -> int:
     if recorded is not None:
         names = {report.name for report in reports}
         departures = case_departures([c for c in recorded if c.name in names], reports)
-        _print(arguments, departures, text.departures_text(departures), failures)
+        _print(arguments, _list(departures), text.departures_text(departures), failures)
         return 1 if departures or failures else 0
     words = "\n".join(text.case_text(r, _style()) for r in reports)
-    _print(arguments, reports, words, failures)
-    if failures:
-        return _STOPPED if parts.stopped else 1
-    return _record(arguments, STABILITY.encode(tuple(reports)))
+    data = STABILITY.encode(tuple(reports))
+    _print(arguments, data, words, failures, record=not failures)
+    return _STOPPED if parts.stopped else int(bool(failures))
 
 
 def _diet(arguments: argparse.Namespace) -> int:
@@ -376,8 +376,8 @@ def _diet(arguments: argparse.Namespace) -> int:
     report: DietReport = result.report
     command = f"mjbench diet {arguments.model}"
     table = arguments.model.with_suffix(".toml").name
-    _print(arguments, report, diet_text(report, command, table, _style()))
-    return _record(arguments, DIET.encode(report)) or (0 if report.ok else 1)
+    _print(arguments, DIET.encode(report), diet_text(report, command, table, _style()))
+    return 0 if report.ok else 1
 
 
 def _keeps(subject: Subject) -> Iterable[Keep]:
@@ -402,18 +402,22 @@ def _jobs(_: argparse.Namespace) -> int:
 
 
 def _print(
-    arguments: argparse.Namespace, report: object, words: str, remarks: Sequence[str] = ()
+    arguments: argparse.Namespace,
+    data: bytes,
+    words: str,
+    remarks: Sequence[str] = (),
+    *,
+    record: bool = True,
 ) -> None:
+    """Print a report, which is `data` as a file, and write that file if asked and `record`."""
     if sys.stderr.isatty():
         print("\r\x1b[K", end="", file=sys.stderr)
-    if arguments.format == "json":
-        words = msgspec.json.format(msgspec.json.encode(report), indent=1).decode() + "\n"
-    sys.stdout.write(words)
+    sys.stdout.write(data.decode() if arguments.format == "json" else words)
     for remark in remarks:
         print(remark, file=sys.stderr)
-
-
-def _record(arguments: argparse.Namespace, data: bytes) -> int:
-    if arguments.record is not None:
+    if arguments.record is not None and record:
         arguments.record.write_bytes(data)
-    return 0
+
+
+def _list(departures: Sequence[Departure]) -> bytes:
+    return msgspec.json.format(msgspec.json.encode(departures), indent=1) + b"\n"

@@ -118,7 +118,7 @@ class Spread(Struct, frozen=True):
         """
         if self.column[0] == LOST:
             return "it is lost"
-        least = "at least " if self.column in unresolved else ""
+        least = "at least " if self.is_worse and self.column in unresolved else ""
         times = f"{least}{times_text(self.low, self.low if least else self.high)}"
         return f"{self.label(figure)} is {times} as large {self.column[1]}"
 
@@ -180,9 +180,7 @@ def mark_dominated(report: ScenarioReport) -> Rows:
         if any(change > 1 + ERROR_SLACK for change in changes):
             return False
         is_nearer = any(change * (1 + ERROR_SLACK) < 1 for change in changes)
-        return prices[0].is_cheaper(prices[1]) or (
-            is_nearer and not prices[1].is_cheaper(prices[0])
-        )
+        return prices[0].is_cheaper(prices[1]) or (is_nearer and prices[0].is_no_dearer(prices[1]))
 
     return mark_front(rows, {n: worth(n) for n in sorted(present)}, beats)
 

@@ -39,7 +39,7 @@ from mjbench.reports.case_report import (
     ReferenceLine,
     StepCost,
 )
-from mjbench.reports.limits import limit_text, map_text, widest_gaps
+from mjbench.reports.limits import limit_text, map_text
 from mjbench.reports.model_report import SceneReport
 from mjbench.reports.profile_table import profile_text
 from mjbench.reports.scene_report import (
@@ -48,7 +48,6 @@ from mjbench.reports.scene_report import (
     MeasuredSetting,
     PhaseProfile,
     ScenarioReport,
-    StableRow,
     SweepReport,
 )
 from mjbench.reports.shown_errors import (
@@ -99,7 +98,6 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
             ErrorQuantity(q.name, q.label, q.least, q.is_resolved(rows)) for q in present
         ),
         main="" if main is None else main.name,
-        missed=_missed(stable),
         cut_short=_is_cut_short(report),
     )
     if main is not None and report.own_row is not None:
@@ -181,11 +179,6 @@ def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) ->
     )
 
 
-def _missed(rows: tuple[StableRow, ...]) -> tuple[float, float] | None:
-    near, far = widest_gaps(rows)
-    return (near - 1, far - 1) if near > 1 else None
-
-
 def _is_cut_short(report: ScenarioReport) -> bool:
     longest = report.duration / FEWEST_STEPS
     return any(math.isclose(row.searched[1], longest, rel_tol=1e-9) for row in report.stable)
@@ -203,7 +196,6 @@ def derive_case(report: CaseReport) -> CaseReport:
         main="" if main is None else main.name,
         least=0.0 if main is None else main.least,
         reached=tuple((name, cost) for name, cost in costs if cost is not None),
-        missed=_missed(lines),
     )
 
 

@@ -27,8 +27,10 @@ BAD_STATES = {
     int(mujoco.mjtWarning.mjWARN_BADQPOS): "positions",
     int(mujoco.mjtWarning.mjWARN_BADQVEL): "velocities",
     int(mujoco.mjtWarning.mjWARN_BADQACC): "accelerations",
+    int(mujoco.mjtWarning.mjWARN_BADCTRL): "commands",
 }
-"""The warnings of a simulation that is lost."""
+"""The warnings of a simulation that is lost. Where one command is no number, MuJoCo takes all as 0.
+"""
 
 
 def has_bad_state(data: Any) -> bool:
@@ -168,10 +170,9 @@ def judge(
     ):
         if peaks.finite and not size <= bound:
             times = "a little more than" if size < 1.005 * bound else f"{size / bound:.3g} times"
-            text = f"{subject} reached {times} what can be"
-            symptoms.append((RunStatus.SLOW_GROWTH, text))
+            symptoms.append((RunStatus.SLOW_GROWTH, f"{subject} reached {times} their bound"))
     if peaks.finite and not peaks.energy <= setup.energy_bound:
-        text = f"energy reached {peaks.energy:.3g} J, where {setup.energy_bound:.3g} J can be"
+        text = f"energy reached {peaks.energy:.3g} J, and its bound is {setup.energy_bound:.3g} J"
         symptoms.append((RunStatus.SLOW_GROWTH, text))
     symptoms += [(RunStatus.THROUGH, text) for text in passages]
     worst = max((status for status, _ in symptoms), key=list(RunStatus).index, default=RunStatus.OK)
@@ -200,7 +201,8 @@ class Passages:
         self.inside: dict[tuple[int, int], Array] = {}
         """Pairs that are deep in each other now, with the normal of their contact before."""
         self._normals: dict[tuple[int, int], Array] = {}
-        may_touch = np.any(model.geom_contype | model.geom_conaffinity) and model.ngeom > 1
+        kinds, partners = model.geom_contype, model.geom_conaffinity
+        may_touch = np.bitwise_or.reduce(kinds) & np.bitwise_or.reduce(partners) and model.ngeom > 1
         is_off = model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         self.needed = bool((may_touch or model.npair) and not is_off)
         """Whether anything can touch: then every step is looked at, as what is thin is passed

@@ -40,6 +40,7 @@ from mjbench.reports.scene_report import (
     WorkPrecisionRow,
 )
 from mjbench.reports.shown_errors import (
+    COST_SLACK,
     ERROR_SLACK,
     FrontPoint,
     Quantity,
@@ -169,9 +170,9 @@ def _judge_rival(
     resolved = [c for c in own_ratios if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
     if not resolved and (baseline.seen is None or report.least_seen >= 1):
         return f"{_UNRESOLVED}{rival.name}, or of the scene's own setting", False, ()
-    cost = rival.cost.value / baseline.cost.value if rival.cost and baseline.cost else 1.0
-    claim = f"{rival.name} {_advantage(cost, _gain([own_ratios]), figure)}"
-    if cost > 1 - _WORTH_SAYING and min(own_ratios.values()) > 1 - _WORTH_SAYING:
+    price, is_cheap = _price(rival), _is_cheap(rival)
+    claim = f"{rival.name} {price} and {_gain_text([own_ratios], figure)}"
+    if not is_cheap and min(own_ratios.values()) > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, which is within what such runs differ by", False, ()
     nearby, elsewhere = starts(number), "from starts nearby"
     elsewhere += " or with drawn parameters" if report.drawn else ""
@@ -184,9 +185,9 @@ def _judge_rival(
         unresolved = unresolved_columns(pair[0], leasts)
         texts = tuple(part.text(figure, unresolved) for part in worse)
         return f"{none}{claim} here, but {elsewhere} {texts[0]}", False, texts
-    if cost > 1 - _WORTH_SAYING and gain.high > 1 - _WORTH_SAYING:
+    if not is_cheap and gain.high > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, but is no better {elsewhere}", False, ()
-    text = f"{rival.name} is better: it {_advantage(cost, gain, figure)}"
+    text = f"{rival.name} is better: it {price} and {_gain_text(everywhere, figure)}"
     quantity = quantity_of(report)
     if not resolved:
         text += ", as far as the reference resolves"
@@ -202,17 +203,30 @@ def _gain(starts: Sequence[Mapping[Column, float]]) -> Spread:
     return min(matches, key=lambda part: (part.high, part.column[1] != WHOLE), default=none)
 
 
-def _advantage(cost: float, gain: Spread, figure: str) -> str:
-    """What a setting costs, and how much less it errs where it errs least."""
-    cheap = "takes no more time" if cost <= 1.005 else "takes about as long"
-    if cost < 1 / 1.005:
-        cheap = f"takes {cost:.2g} of the time"
+def _gain_text(starts: Sequence[Mapping[Column, float]], figure: str) -> str:
+    """How much less a setting errs in the column where it errs least, from all starts."""
+    gain = _gain(starts)
     if gain.high >= 1 / (1 + ERROR_SLACK):
-        return f"{cheap} and errs no more in any column"
+        return "errs no more in any column"
     if gain.high < 1e-4:
-        return f"{cheap} and errs far less"
+        return "errs far less"
     less = times_text(1 / gain.high, 1 / max(gain.low, 1e-300))
-    return f"{cheap} and errs {less} less ({gain.label(figure)} {gain.column[1]})"
+    return f"errs {less} less ({gain.label(figure)} {gain.column[1]})"
+
+
+def _price(row: WorkPrecisionRow) -> str:
+    """What a setting costs beside the scene's own, as far as timing can tell."""
+    cost = row.cost
+    if cost is None or cost.low <= 1 <= cost.high or abs(cost.value - 1) <= COST_SLACK:
+        return "takes about as long"
+    if cost.value < 1:
+        return f"takes {cost.value:.2g} of the time"
+    return f"takes {number_text(cost.value)} times as long"
+
+
+def _is_cheap(row: WorkPrecisionRow) -> bool:
+    """Whether it costs so much less that it is worth saying."""
+    return row.cost is not None and row.cost.value <= 1 - _WORTH_SAYING and row.cost.high < 1
 
 
 def _describe_rival(
@@ -221,19 +235,18 @@ def _describe_rival(
     """The cheapest setting that would be better by one number, and why it is not; empty if none."""
     row = _cheapest_rival(report, own_place, quantity)
     baseline = report.own_row
-    if row is None or row.cost is None or baseline is None:
+    if row is None or baseline is None:
         return "", ()
-    share = row.cost.value / own_place.cost.value
     pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
     leasts = leasts_of(report)
     own_ratios, unresolved = ratios(pair[0], pair[1], leasts), unresolved_columns(pair[0], leasts)
     worse = worse_columns(spreads([own_ratios]))
     texts = tuple(part.text(report.figure, unresolved) for part in worse)
     if row.lucky or not texts:
-        gain = _advantage(share, _gain([own_ratios]), report.figure)
+        gain = f"{_price(row)} and {_gain_text([own_ratios], report.figure)}"
         reason = row.lucky or "that is within what such runs differ by"
         return f"no difference that holds: {row.name} {gain} here, but {reason}", ()
-    return f"no setting is better: {row.name} takes {share:.2g} of the time, but {texts[0]}", texts
+    return f"no setting is better: {row.name} {_price(row)}, but {texts[0]}", texts
 
 
 def _cheapest_rival(
@@ -319,10 +332,8 @@ def _describe_error(report: ScenarioReport, own_row: WorkPrecisionRow) -> str:
     unseen = _cheapest_unseen(rows)
     if own_row.cost is None:
         return text
-    if unseen is not None and unseen.cost is not None:
-        times = unseen.cost.value / own_row.cost.value
-        share = f"{number_text(times)} times" if abs(times - 1) > ERROR_SLACK else "about"
-        text += f"; the cheapest without one that is seen is {unseen.name}, at {share} its cost"
+    if unseen is not None:
+        text += f"; the cheapest without one that is seen is {unseen.name}, which {_price(unseen)}"
     elif all(r.seen >= 1 for r in rows if r.seen is not None):
         text += ", and that of every other setting too"
     return text
@@ -353,7 +364,7 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     speed += "not timed" if row.realtime is None else f"{_rounded(row.realtime)} times real time"
     error = "its error is not known"
     if row.status != "ok":
-        error = f"it is lost: {'; '.join(row.reasons)}"
+        error = "it is lost"
     elif row.parted is not None:
         off = horizon_error_text(report.horizon_error)
         error = f"it is chaotic: off by {off} at {row.parted:.3g} s"
@@ -406,13 +417,13 @@ def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
     row = _mending_row(report, baseline, name)
     if row is None or baseline.seen is None:
         return ""
-    less = number_text(baseline.seen / row.seen) if row.seen else "far"
-    price = ""
-    if row.cost is not None and baseline.cost is not None:
-        times = row.cost.value / baseline.cost.value
-        is_same = abs(times - 1) <= ERROR_SLACK
-        price = " for as much time" if is_same else f" for {number_text(times)} times the time"
-    return f"{row.name} errs {less} times less in all{price}"
+    text = (
+        f"{row.name} errs {number_text(baseline.seen / row.seen) if row.seen else 'far'} times less"
+    )
+    text += " in all" + ("" if row.cost is None else f" and {_price(row)}")
+    pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
+    worse = next(worse_columns(spreads([ratios(pair[0], pair[1], leasts_of(report))])), None)
+    return text if worse is None else f"{text}, but {worse.text(report.figure)}"
 
 
 def _mending_row(

@@ -1,4 +1,4 @@
-"""Theory of stability: the one-step map, linearized at rest and along a periodic motion.
+"""Theory of stability: the one-step map, linearized at rest.
 
 1. A step maps a state (`qpos`, `qvel`, `act`) to the next one. Its derivative is taken by central
    differences of fourth order, in the tangent space, so that quaternions and activations need no
@@ -7,14 +7,9 @@
    linear theory. A rest that is unstable by itself (an inverted pendulum) says nothing of a
    timestep, nor does one to which nothing pulls back, or about which forces have another law on
    either side (a muscle at no activation); there is no theory then.
-3. Along a periodic motion the product of these derivatives grows as the largest Floquet multiplier
-   to the power of the periods. Where that is one, a difference may still grow in proportion to
-   time, since another amplitude has another period. So the limit is passed where it grows to more
-   than four times the size over twice the periods. Where over longer times it grows below the limit
-   too, there is none.
 
 Source: J. Guckenheimer, P. Holmes, Nonlinear Oscillations, Dynamical Systems, and Bifurcations of
-Vector Fields, 1.4 and 1.5.
+Vector Fields, 1.4.
 """
 
 from __future__ import annotations
@@ -29,7 +24,6 @@ from msgspec import Struct
 
 from mjbench.pilot import scales
 from mjbench.problem import Array, Integrator, Limit, Scenario
-from mjbench.reports import Reach
 from mjbench.simulation import (
     advance,
     initial_data,
@@ -48,7 +42,7 @@ _SHORTER, _LONGER = 10.0, 100.0
 """How much farther than runs theory looks for a limit: to timesteps of several whole scenarios."""
 AT_REST = "spectral radius of the step, linearized at rest"
 """The source of the theory of a scene."""
-MOST_STATES, _MOST_ORBIT_STATES = 120, 24
+MOST_STATES = 120
 """Numbers in a state up to which there is theory."""
 _RELAXING, _POLISHING, _GRID = 20_000, 30, 24
 """Steps and iterations to look for a rest, and timesteps tried in a decade."""
@@ -59,14 +53,6 @@ _STILL = 1e-9
 """The part of the strongest acceleration below which Newton's method goes on."""
 _DRIFT = 1e-3
 """The acceleration, relative to gravity's, beyond which a state is no rest of a step."""
-_LONGEST_ORBIT, _ORBIT_GRID = 200, 16
-"""Steps in a period at the shortest timestep that is tried along it, and how many are tried."""
-_PERIODS, _ORBIT_STEPS, _ORBIT_STEP = 8, 1000, 1e-6
-"""Periods and steps, at least, after which growth is compared, and the step of differences."""
-_BELOW, _LONG, _SLOW_GROWTH = 0.8, 4, 16.0
-"""The part of a limit at which, over so many times the time, nothing grows by as much."""
-_ASTRAY = 1e6
-"""How far from its beginning, in units, a motion is lost: rounding hides the differences there."""
 
 
 class FixedState(Struct, frozen=True, eq=False):
@@ -78,8 +64,6 @@ class FixedState(Struct, frozen=True, eq=False):
     ctrl: Array
     touches: bool = False
     """Whether contacts, limits or dry friction act in it."""
-    period: float = 0.0
-    """s; 0 for a rest."""
 
 
 def _converged(model: Any, integrator: Integrator, timestep: float) -> Any:
@@ -87,9 +71,9 @@ def _converged(model: Any, integrator: Integrator, timestep: float) -> Any:
     return with_converged_solver(without_sleep(with_integrator(model, integrator, timestep)))
 
 
-def _state_of(data: Any, *, period: float = 0.0) -> FixedState:
+def _state_of(data: Any) -> FixedState:
     qpos, qvel, act, ctrl = (part.copy() for part in (data.qpos, data.qvel, data.act, data.ctrl))
-    return FixedState(qpos, qvel, act, ctrl, bool(data.nefc > data.ne), period)
+    return FixedState(qpos, qvel, act, ctrl, bool(data.nefc > data.ne))
 
 
 def _set(model: Any, data: Any, state: FixedState, change: Array) -> None:
@@ -127,8 +111,8 @@ def _units(model: Any) -> Array:
     return np.concatenate([lengths, lengths, np.ones(int(model.na))])
 
 
-def _step_derivative(model: Any, data: Any, state: FixedState) -> tuple[Array, FixedState]:
-    """The derivative of a step of a model at a state, and the next state."""
+def _step_derivative(model: Any, data: Any, state: FixedState) -> Array:
+    """The derivative of a step of a model at a state."""
 
     def after(change: Array) -> Array:
         _set(model, data, state, change)
@@ -138,15 +122,8 @@ def _step_derivative(model: Any, data: Any, state: FixedState) -> tuple[Array, F
     units = _units(model)
     _set(model, data, state, np.zeros(len(units)))
     advance(model, data)
-    following = _state_of(data, period=state.period)
-    return _derivative(after, units, _NEAR_STEP if state.touches else _STEP), following
-
-
-def _has_theory(model: Any, most: int) -> bool:
-    """Whether a step is a function of the state alone, which differences can show."""
-    history = getattr(model, "actuator_history", np.zeros((1, 1)))
-    is_known = not (model.nplugin or np.any(history[:, 0] > 0))
-    return is_known and 2 * model.nv + model.na <= most
+    following = _state_of(data)
+    return _derivative(after, units, _NEAR_STEP if state.touches else _STEP)
 
 
 def find_rest(model: Any, scenario: Scenario) -> FixedState | None:
@@ -155,7 +132,9 @@ def find_rest(model: Any, scenario: Scenario) -> FixedState | None:
     A run is stopped wherever its kinetic energy is largest, until it lies still; Newton's method
     does the rest.
     """
-    if not _has_theory(model, MOST_STATES):
+    # A step has to be a function of the state alone, which differences can show.
+    has_memory = model.nplugin or np.any(model.actuator_history[:, 0] > 0)
+    if has_memory or 2 * model.nv + model.na > MOST_STATES:
         return None
     variant = _converged(model, Integrator.IMPLICITFAST, float(model.opt.timestep) / 2)
     variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
@@ -246,7 +225,7 @@ def step_excess(model: Any, rest: FixedState, integrator: Integrator, timestep: 
     two of these meet.
     """
     variant = _converged(model, integrator, timestep)
-    matrix, _ = _step_derivative(variant, mujoco.MjData(variant), rest)
+    matrix = _step_derivative(variant, mujoco.MjData(variant), rest)
     trace, determinant = float(np.trace(matrix)), float(np.linalg.det(matrix))
     return max(determinant - 1, abs(trace) - 1 - determinant)
 
@@ -272,7 +251,7 @@ def rest_limit(
 
     def is_lost(timestep: float) -> bool:
         variant.opt.timestep = timestep
-        matrix, _ = _step_derivative(variant, data, rest)
+        matrix = _step_derivative(variant, data, rest)
         if not np.isfinite(matrix).all():
             return True
         return not float(np.abs(np.linalg.eigvals(matrix)).max(initial=0.0)) <= unit
@@ -293,108 +272,6 @@ def rest_limit(
     return before
 
 
-def find_orbit(model: Any, scenario: Scenario) -> FixedState | None:
-    """The beginning of a scenario whose motion comes back to it, with its period."""
-    if not _has_theory(model, _MOST_ORBIT_STATES) or len(scenario.holds()) > 1:
-        return None
-    step = min(float(model.opt.timestep), scenario.duration / 2000)
-    variant = _converged(model, Integrator.RK4, step)
-    data, begin = initial_data(scenario, variant), initial_data(scenario, variant)
-    advance(variant, data)
-    away, largest = _difference(variant, begin, data), 0.0
-    weights = 1 / np.maximum(_units(variant), 1e-300)
-    course = away * weights / max(float(np.linalg.norm(away * weights)), 1e-300)
-    side = distance = 0.0
-    for number in range(2, round(scenario.duration / step) + 1):
-        previous = _state_of(data)
-        advance(variant, data)
-        if data.nefc > data.ne or not np.isfinite(data.qpos).all():
-            return None
-        gap = _difference(variant, begin, data) * weights
-        before, side, distance = side, float(gap @ course), float(np.linalg.norm(gap))
-        largest = max(largest, distance)
-        if before < 0 <= side and distance < 0.05 * largest:
-            period = _return_time(variant, begin, previous, course * weights, step)
-            advanced = (number - 1) * step + period[0]
-            if period[1] < 1e-5 * largest:
-                return _state_of(begin, period=advanced)
-    return None
-
-
-def _return_time(
-    model: Any, begin: Any, previous: FixedState, course: Array, step: float
-) -> tuple[float, float]:
-    """The part of a step (s) after which a motion is beside its beginning, and how far from it."""
-    data, low, high = mujoco.MjData(model), 0.0, step
-    for _ in range(50):
-        middle = (low + high) / 2
-        model.opt.timestep = middle
-        _set(model, data, previous, np.zeros(2 * model.nv + model.na))
-        advance(model, data)
-        is_before = float(_difference(model, begin, data) @ course) < 0
-        low, high = (middle, high) if is_before else (low, middle)
-    model.opt.timestep = step
-    gap = _difference(model, begin, data) / np.maximum(_units(model), 1e-300)
-    return middle, float(np.linalg.norm(gap))
-
-
-def orbit_limit(model: Any, orbit: FixedState, integrator: Integrator) -> Reach | None:
-    """The largest timestep at which a periodic motion is stable; `None` if it is not by itself."""
-    steps = np.geomspace(orbit.period / _LONGEST_ORBIT, orbit.period / 2, _ORBIT_GRID).tolist()
-    if _grows(model, orbit, Integrator.RK4, steps[0]):
-        return None
-    growing = next((n for n, h in enumerate(steps) if _grows(model, orbit, integrator, h)), None)
-    if growing is None:
-        return "all"
-    if growing == 0:
-        return "none"
-    before, step = steps[growing - 1], steps[growing]
-    while step / before > 1 + 1e-2:
-        middle = math.sqrt(before * step)
-        before, step = (
-            (before, middle) if _grows(model, orbit, integrator, middle) else (middle, step)
-        )
-    # What grows exponentially, if slowly, at every timestep seems to have a limit that is the
-    # shorter the longer one looks.
-    below = _BELOW * before
-    return "none" if _grows(model, orbit, integrator, below, _SLOW_GROWTH, _LONG) else before
-
-
-def _grows(
-    model: Any,
-    orbit: FixedState,
-    integrator: Integrator,
-    timestep: float,
-    most: float = 4.0,
-    times: int = 1,
-) -> bool:
-    """Whether a small difference grows more than in proportion to time along a motion."""
-    variant = _converged(model, integrator, timestep)
-    data, units = mujoco.MjData(variant), _units(variant)
-    units[variant.nv : 2 * variant.nv] /= orbit.period
-    in_period = math.ceil(orbit.period / timestep)
-    half = in_period * max(_PERIODS, _ORBIT_STEPS // in_period) * times
-    way = np.random.default_rng(1).normal(size=len(units)) * units
-    state, size, sizes = orbit, 0.0, np.empty(2 * half)
-    for index in range(2 * half):
-        ends = []
-        for side in (1.0, -1.0, 0.0):
-            _set(variant, data, state, side * _ORBIT_STEP * way)
-            advance(variant, data)
-            ends.append(_state_of(data, period=orbit.period))
-        way = _difference(variant, ends[1], ends[0]) / (2 * _ORBIT_STEP)
-        state, length = ends[2], float(np.linalg.norm(way / units))
-        if not np.linalg.norm(_difference(variant, orbit, state) / units) < _ASTRAY:
-            return True
-        if not 0 < length < math.inf:
-            return length != 0
-        size += math.log(length)
-        sizes[index] = size
-        way = way / length
-    gain = sizes[-in_period:].max() - sizes[half - in_period : half].max()
-    return bool(gain > math.log(most))
-
-
 class Theory(Struct, frozen=True, eq=False):
     """What theory says of a scene's largest stable timesteps."""
 
@@ -402,7 +279,6 @@ class Theory(Struct, frozen=True, eq=False):
     """Of a hard case; it comes before linearization."""
     model: Any = None
     rest: FixedState | None = None
-    orbit: FixedState | None = None
 
     def limit(self, integrator: Integrator, search: tuple[float, float]) -> Limit | None:
         """The largest stable timestep at rest; `None` where there is no such theory."""
@@ -413,26 +289,18 @@ class Theory(Struct, frozen=True, eq=False):
             limit = None if timestep is None else Limit(timestep, AT_REST)
         return limit
 
-    def orbital(self, integrator: Integrator) -> Reach | None:
-        """The same along a periodic motion."""
-        if self.orbit is None:
-            return None
-        return orbit_limit(self.model, self.orbit, integrator)
-
 
 def find_theory(
     model: Any,
     scenario: Scenario,
     formula: Callable[[Integrator], Limit | None] | None,
-    *,
-    smooth: bool,
     visits: Callable[[Array], bool] = lambda _: True,
 ) -> Theory:
-    """What theory says of a scene: at its rest, and along its motion where this is periodic.
+    """What theory says of a scene at its rest.
 
     `visits`: whether the motion comes near to positions; of a rest that it never sees theory would
     answer another question.
     """
     rest = find_rest(model, scenario)
     rest = None if rest is None or not visits(rest.qpos) else rest
-    return Theory(formula, model, rest, find_orbit(model, scenario) if smooth else None)
+    return Theory(formula, model, rest)

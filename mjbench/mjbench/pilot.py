@@ -1,7 +1,7 @@
 """A first run of a scene in small steps: what acts in it, its bounds, and the settings to measure.
 
 1. Every step is observed: a contact, a limit that is reached or dry friction makes accelerations
-   jump, so that errors follow no power of the timestep and no smooth integration applies.
+   jump, so that errors need not follow a power of the timestep and no smooth integration applies.
 2. Eight twins begin 1e-10 away, in four directions, to both sides. Where the first of them is off
    by what the scenario states, or a tenth, errors of trajectories mean nothing any more: that is
    the horizon. The growth until there gives about the largest Lyapunov exponent.
@@ -27,6 +27,7 @@ from mjbench import simulation
 from mjbench.detector import Passages, Peaks, driving_force, pair_names, thickness, update_peaks
 from mjbench.problem import STANDARD, Array, Integrator, Setup
 from mjbench.reports.scene_report import MeasuredSetting
+from mjbench.reports.shown_errors import seconds_text
 from mjbench.scene import Scene, SceneError
 
 NUDGE = 1e-10
@@ -111,7 +112,12 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
                 peaks = update_peaks(data, peaks, half_thickness)
                 passages.look(data)
         if not peaks.finite:
-            raise SceneError(f"it diverges within {times[index]:.6g} s even at {step:g} s a step")
+            setting = f"{simulation.integrator_of(model).value} at {seconds_text(step)}"
+            message = f"it diverges within {seconds_text(times[index])} even under {setting}"
+            raise SceneError(message, help="measure shorter `timesteps`, or another integrator")
+        if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:
+            message = f"a command is no number, or huge, before {seconds_text(times[index])}"
+            raise SceneError(f"{message}: MuJoCo takes all of them as 0 then")
         for twin, gap in zip(twins, gaps, strict=True):
             if index == 0 or gap[index - 1] < 1:
                 simulation.advance(variant, twin, steps_per_sample)
@@ -151,8 +157,8 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
     )
 
 
-_OVERLAP = 0.5
-"""The share of half a thickness from which something is said to begin inside something else."""
+_OVERLAP = 0.25
+"""The share of half a thickness beyond which something is said to begin inside something else."""
 _MOST_OVERLAPS = 3
 
 

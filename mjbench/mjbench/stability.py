@@ -6,10 +6,9 @@
    in the first steps and then decays is a transient of the method and no loss. *Near* is what stays
    near the motion that small steps keep, as long as that can be predicted. *Through* is what comes
    out on the other side of something, or stays inside it: how deep it goes is no loss by itself.
-2. One limit has several answers, which need not agree: theory at rest and along a periodic motion;
-   runs from the own start over the span, and over twice the span; runs from starts nearby. All are
-   kept, and only digits on which they agree are shown. Theory at rest is asked only where the
-   scenario comes near to that rest.
+2. One limit has several answers, which need not agree: theory at rest; runs from the own start over
+   the span, and over twice the span; runs from starts nearby. Only digits on which they agree are
+   shown. Theory is asked only where the scenario comes near to that rest.
 3. Stability need not be monotone. A grid, even in the logarithm, is tried down to a tenth of the
    shortest timestep that is lost, and about it from all starts; a bisection follows.
 4. Where nothing drives a scene, its energy cannot rise. The first timestep at which it does is a
@@ -27,9 +26,7 @@ import numpy as np
 from msgspec import Struct, field
 from msgspec.structs import asdict, replace
 
-from mjbench.detector import (
-    driving_force,
-)
+from mjbench.detector import Passages, driving_force
 from mjbench.linearization import Theory, find_theory
 from mjbench.parts import Parts
 from mjbench.pilot import (
@@ -92,8 +89,9 @@ class Laboratory(Struct, frozen=True, eq=False):
     span: float
     """s."""
     starts: int = 1
-    watched: bool = False
-    """Whether runs are compared with the motion of small steps, and watched for passing through."""
+    asked: tuple[str, ...] = ()
+    """What else is asked: whether runs go `astray` from the motion of small steps, and whether
+    anything goes `through` anything, where it can touch."""
     shortest: float = math.inf
     """The shortest timestep at which that is asked, s."""
     trials: dict[tuple[int, float], dict[int, StabilityTrial]] = field(default_factory=dict)
@@ -129,7 +127,7 @@ def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
     model = compile_model(problem.mjcf, Integrator.EULER, min(problem.timesteps or (1e-3,)))
     integrators = Integrator if np.any(model.dof_damping) else STANDARD
     problem = with_energy_bound(problem)
-    theory = find_theory(model, problem.scenario, problem.limit, smooth=problem.smooth)
+    theory = find_theory(model, problem.scenario, problem.limit)
     return tuple(boundary(problem, integrator, theory) for integrator in integrators)
 
 
@@ -212,7 +210,7 @@ def search_row(
     if by_start:
         estimates.append(estimate(min(by_start, key=lambda n: by_start[n]), resolution))
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
-    limit, orbital = theory.limit(integrator, search), theory.orbital(integrator)
+    limit = theory.limit(integrator, search)
     gain = _first_gain(laboratory, grid, setup)
     near_limit = _limit_of(laboratory, grid, resolution, "astray")
     through_limit = _limit_of(laboratory, grid, resolution, "through")
@@ -238,7 +236,6 @@ def search_row(
         bracket=None if min(largest, *estimates) == math.inf else (min(bounds), max(bounds)),
         theory=None if limit is None else reach(limit.timestep),
         formula="" if limit is None else limit.source,
-        orbital=orbital,
         gain=gain,
         tries=_tries(laboratory),
     )
@@ -253,7 +250,7 @@ def _limit_of(
     `None` where that is not asked. It is not looked for below the shortest that was tried to see
     what is bounded, or that the scene is measured at.
     """
-    if not laboratory.watched:
+    if kind not in laboratory.asked:
         return None, ""
     steps_tried = laboratory.own_steps()
     low = min(steps_tried[0], laboratory.shortest)
@@ -368,6 +365,7 @@ def stable_rows(
     limits = scene.declaration.limits
     setup_over = cache(partial(longer_setup, model, pilot))
     motion = kept_motion(model, pilot, reference)
+    asked = ("astray", "through") if Passages(model).needed else ("astray",)
 
     def declared_limit(integrator: Integrator) -> Limit | None:
         step = limits.get(integrator.value)  # type: ignore[call-overload]
@@ -382,7 +380,6 @@ def stable_rows(
                 model,
                 scene.scenario,
                 declared_limit if limits else None,
-                smooth=pilot.smooth and not quick,  # an orbit takes longer than all the rest
                 visits=partial(_comes_near, motion, model),
             )
         ),
@@ -404,7 +401,7 @@ def stable_rows(
         if search[1] <= search[0]:
             return None
         starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
-        laboratory = Laboratory(run, span, starts, watched=True, shortest=shortest)
+        laboratory = Laboratory(run, span, starts, asked, shortest)
         return search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
 
     rows = (

@@ -11,8 +11,9 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench.detector import Passages, Peaks, RunStatus, has_bad_state, judge, update_peaks
-from mjbench.pilot import Pilot, horizon_error, horizon_errors, nudges, position_distance
+from mjbench.pilot import Pilot, horizon_error, nudges, position_distance, scales
 from mjbench.problem import Array, Setup
+from mjbench.reports.limits import IS_LOST
 from mjbench.reports.shown_errors import horizon_error_text
 from mjbench.simulation import EngineStates, initial_data, watch_steps
 
@@ -24,6 +25,8 @@ _LOOKS = 500
 _TRANSIENT, _DECAY = 8, 0.75
 """What shoots up in so many first steps is a transient, if it has decayed after that part of
 a run."""
+_PART = 0.25
+"""The part of the way that a motion goes by which what is off is not near to it."""
 _AT_REST = 1e-100
 """The part of its largest speed below which nothing begins to move: subnormal numbers are slow."""
 
@@ -69,10 +72,27 @@ class KeptMotion(Struct, frozen=True, eq=False):
 
 
 def kept_motion(model: Any, pilot: Pilot, reference: EngineStates) -> KeptMotion:
-    """The reference of a scene as the motion that runs are compared with."""
-    far = horizon_error_text(horizon_error(model, pilot.scene))
+    """The reference of a scene as the motion that runs are compared with.
+
+    Unless the scenario states an error, far is a part of the way that the motion goes, if it can be
+    seen, and no more than where predictions end: small motions would always be near else.
+    """
+    scene, far = pilot.scene, horizon_error(model, pilot.scene)
     states = reference.head(int(np.sum(reference.times <= pilot.horizon * (1 + 1e-9))))
-    return KeptMotion(states, horizon_errors(model, pilot.scene), far)
+    if not scene.declaration.horizon_error:
+        changes = np.zeros((len(states.times), int(model.nv)))
+        for change, qpos in zip(changes, states.qpos, strict=True):
+            mujoco.mj_differentiatePos(model, change, 1.0, states.qpos[0], qpos)
+        ways = np.ptp(changes, axis=0)
+        is_length = scales(model, 0.0, 1.0) > 0
+        for unit, dofs, visible in (
+            ("rad", ~is_length, math.radians(scene.bench.visible_angle)),
+            ("m", is_length, scene.bench.visible * float(model.stat.extent)),
+        ):
+            if unit in far:
+                far[unit] = min(far[unit], max(_PART * float(ways[dofs].max()), visible))
+    units = scales(model, far.get("rad", math.inf), far.get("m", math.inf))
+    return KeptMotion(states, units, horizon_error_text(far))
 
 
 def step_count(span: float, timestep: float) -> int:
@@ -144,7 +164,7 @@ def run_trial(
     if is_lost and status is RunStatus.OK:
         status, reason = RunStatus.SLOW_GROWTH, "what shot up in the first steps did not come down"
     through = "; ".join(passages.texts())
-    astray = astray or ("it is lost" if is_lost else "")
+    astray = astray or (IS_LOST if is_lost else "")
     return StabilityTrial(timestep, status, _growth(sizes), energy, reason, astray, through)
 
 

@@ -53,7 +53,8 @@ def scene_text(report: SceneReport, style: Style = _PLAIN) -> str:
     if not report.scenarios and not report.failures:
         lines.append("  nothing in it can move, so nothing was measured")
     for scenario in report.scenarios:
-        lines += [f"  {style.strong(scenario.name)}: {scenario.title}"]
+        title = "" if scenario.title == scenario.name else f": {scenario.title}"
+        lines += [f"  {style.strong(scenario.name)}{title}"]
         for line in scenario.verdict.lines:
             lines += style.wrap(line, "    ")
     for failure in report.failures:
@@ -161,7 +162,6 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("near small steps", [reach_text(row.near, row.searched) for row in rows]),
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
         ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
-        ("of the orbit", [reach_text(row.orbital, row.searched) for row in rows]),
         ("gains energy from", ["" if r.gain is None else seconds_text(r.gain[0], 2) for r in rows]),
         ("stable again", [_again(row) for row in rows]),
     ]

@@ -390,7 +390,7 @@ def _notes(
         notes.append(f"the same motion to the bit, and no time saved, with {'; '.join(idle)}")
     if pilot.jumps:
         reasons = ", ".join(pilot.jumps)
-        notes.append(f"errors follow no power of the timestep, because of {reasons}")
+        notes.append(f"no orders are given, as accelerations may jump: {reasons}")
     slip = next((row.slip for row in rows if row.own), None) or 0.0
     cone = basis.cones[basis.baseline.cone]
     if cone.is_held and slip > scene_report.FLOORS * reference.floor.position:

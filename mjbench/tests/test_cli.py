@@ -40,7 +40,7 @@ def test_a_model_is_measured_recorded_and_checked(model: Path, capsys: Capture) 
     record = str(model.with_name("arm.bench.json"))
     assert main([str(model), "--record", record]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("arm\n  swing: swing\n    Euler at 2 ms: "), "the verdict comes first"
+    assert out.startswith("arm\n  swing\n    Euler at 2 ms: "), "the verdict comes first"
     for text in (" times real time\n", "stays bounded at", ">", "error: ", "largest timestep"):
         assert text in out, text
     report = BENCH.decode(Path(record).read_bytes())
@@ -65,6 +65,8 @@ def test_what_a_model_does_not_need_is_taken_out_and_its_interface_stays(
     assert main(["diet", str(model), "--quick"]) == 1
     out = capsys.readouterr().out
     assert '    - <flag energy="enable"/>\n' in out
+    assert main(["diet", str(model), "--quick", "--json"]) == 1
+    assert not DIET.decode(capsys.readouterr().out.encode()).ok, "the same as a file of a report"
     assert f"shown by `mjbench diet {model} --only energy-flag`" in " ".join(out.split())
     assert "interface: nothing reads the sensor time" in out
     assert main(["diet", str(model), "--quick", "--only", "sensor-unread"]) == 0

@@ -278,7 +278,7 @@ def test_theory_ends_where_longer_steps_have_another_rest() -> None:
     limits = []
     for world in (servo, servo + block):
         model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{world}</worldbody></mujoco>")
-        theory = find_theory(model, Scenario(1.0, 0.05), None, smooth=False)
+        theory = find_theory(model, Scenario(1.0, 0.05), None)
         limits.append(
             [theory.limit(name, (1e-3, 0.05)) for name in (Integrator.RK4, Integrator.EULER)]
         )

@@ -87,7 +87,7 @@ ERROR_SEEN = "the scene's own error can be seen: it is 2.5 times what an eye can
             ((1, 2.5), (0.94, 2.5e-6)),
             1,
             f"RK4 at 10 ms is better: it takes 0.94 of the time and errs far less; {ERROR_SEEN}; "
-            "the cheapest without one that is seen is RK4 at 10 ms, at 0.94 times its cost",
+            "the cheapest without one that is seen is RK4 at 10 ms, which takes 0.94 of the time",
         ),
         (
             ((1, 2.5), (2, 2.4)),
@@ -139,6 +139,9 @@ def test_a_factor_over_an_error_that_is_not_resolved_is_the_least() -> None:
     rows[0] = replace(rows[0], position=(0.005, 0.005))
     text = judged(rows, contact_model=CONES, floor=5e-4).verdict.text
     assert "but the error of position is at least 2 times as large over the whole run; " in text
+    rows = masked(position=(0.004, 0.004))
+    text = judged(rows, [{("position", "over the whole run"): 1.4}], floor=5e-4).verdict.text
+    assert "the error of position is 1 to 1.4 times as large" in text, "not at least once"
 
 
 def test_halves_count_as_much_as_the_whole() -> None:
@@ -213,7 +216,7 @@ def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
     parts = ErrorParts(0.1, 0.01, 8.17, 1e-9, 0.001)
     report = judged([*masked(), cone], contact_model=CONES, parts=parts)
     assert report.parts is not None and report.parts.dominant == "contact_model"
-    mend = "Euler at 2 ms, elliptic cone errs 83 times less in all for 1.2 times the time"
+    mend = "Euler at 2 ms, elliptic cone errs 83 times less in all and takes 1.2 times as long"
     assert report.parts.mend == mend
     assert report.verdict.lines[1].endswith(
         "and by 8.3 with the model of contacts; most of what is seen is the model of contacts': "
@@ -232,10 +235,19 @@ def test_five_lines_say_speed_error_verdict_and_limits() -> None:
     assert len(lines) == 5
     assert lines[0] == "Euler at 2 ms: 100 times real time"
     assert lines[3] == (
-        "Euler stays bounded at steps to 18.1 ms, near the motion of small steps at steps to 7 ms "
-        "(off by 0.1 rad at 0.8 s), with nothing going through at all to 100 ms"
+        "Euler stays bounded at steps to 18.1 ms; near the motion of small steps at steps to 7 ms "
+        "(off by 0.1 rad at 0.8 s); with nothing going through at every step tried, to 100 ms"
     )
     assert lines[4] == "not known: the error was not taken apart"
+    all_stay = replace(limit, bracket=None, largest="all", near="all", near_reason="")
+    lines = judged(rows_of((1, 0.5)), stable=(all_stay,)).verdict.lines
+    assert lines[3] == (
+        "Euler stays bounded, near the motion of small steps and with nothing going through at "
+        "every step tried, to 100 ms"
+    )
+    lost = replace(limit, near=0.0181, near_reason="it is lost", through=None)
+    lines = judged(rows_of((1, 0.5)), stable=(lost,)).verdict.lines
+    assert lines[3] == "Euler stays bounded at steps to 18.1 ms", "near says no more"
 
 
 def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:
@@ -274,6 +286,25 @@ def test_fewer_iterations_that_err_less_are_luck() -> None:
         "no difference that holds: Euler at 2 ms, 1 iteration takes 0.8 of the time and errs 1.4 "
         "times less (what is seen over the whole run) here, but its error rises with more "
         "iterations"
+    )
+
+
+def test_what_timing_cannot_tell_is_no_advantage() -> None:
+    """An interval that holds 1 is no saving, and a setting that seems dearer is not as cheap."""
+    rows = rows_of((1, 2.5), (0.9, 0.5))
+    rows[1] = replace(rows[1], cost=Interval(0.9, 0.7, 1.3))
+    assert "better: it takes about as long and errs 5 times less" in judged(rows).verdict.text
+    rows[1] = replace(rows[1], cost=Interval(1.3, 0.7, 1.9))
+    assert judged(rows).verdict.better is None
+
+
+def test_what_mends_an_error_says_what_it_makes_worse() -> None:
+    rows = rows_of((1, 2.5), (0.5, 1.0))
+    rows = [replace(r, velocity=(v, v)) for r, v in zip(rows, (0.1, 0.3), strict=True)]
+    report = judged(rows, parts=ErrorParts(2.5, None, None, 1e-9, 0.001))
+    assert report.parts is not None and report.parts.mend == (
+        "RK4 at 10 ms errs 2.5 times less in all and takes 0.5 of the time, but the error of "
+        "velocity is 3 times as large over the whole run"
     )
 
 

@@ -169,6 +169,11 @@ def growth(period: float, late: int) -> float:
         (POLICY, ["--task", "shake"], "the sensor `shake` reads what commands do"),
         ("def control(m, d): return [0, 0]", ["--period", "1"], "gives 2 commands, and the model"),
         ("def control(m, d): d.body('z')", ["--period", "1"], "fails at 0 s: KeyError"),
+        (
+            "def control(m, d): return float('nan') if d.time else 0",
+            ["--period", "1"],
+            "a command is no number, or huge, before",
+        ),
     ],
 )
 def test_mistakes_in_a_loop_are_told(

@@ -58,7 +58,7 @@ def test_what_is_written_is_read() -> None:
 
 def test_a_row_is_a_line_and_keys_are_sorted() -> None:
     lines = GOOD.decode().splitlines()
-    assert lines[:2] == ["{", ' "holds": "mjbench bench",'] and lines[-2] == ' "version": 4'
+    assert lines[:2] == ["{", ' "holds": "mjbench bench",'] and lines[-2] == ' "version": 5'
     assert sum('"timestep"' in line for line in lines) == len(swing().rows)
     assert GOOD.endswith(b"}\n")
 
@@ -79,8 +79,8 @@ def test_a_row_is_a_line_and_keys_are_sorted() -> None:
         (b"\xff", "is damaged: JSON is malformed: invalid character (byte 0)"),
         (b"[" * 100_000, "is damaged: "),
         (b"[]", "holds no report of `mjbench bench`"),
-        (HEAD + b', "version": 3}', "has version 3 of its format, and this one is 4"),
-        (HEAD + b', "version": 4}', "is damaged: Object missing required field `scene`"),
+        (HEAD + b', "version": 3}', "has version 3 of its format, and this one is 5"),
+        (HEAD + b', "version": 5}', "is damaged: Object missing required field `scene`"),
         (GOOD.replace(b'"value": 0.1}', b'"value": 1e999}', 1), "is damaged: Number out of range"),
         (
             GOOD.replace(b'"name": "swing"', b'"name": 7'),

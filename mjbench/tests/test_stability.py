@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from mjbench.declarations import Declarations, DeclaredScenario, Place
 from mjbench.detector import RunStatus
-from mjbench.linearization import Theory, find_orbit, find_rest, find_theory, orbit_limit
+from mjbench.linearization import Theory, find_rest, find_theory
 from mjbench.parts import Parts
 from mjbench.pilot import run_pilot
 from mjbench.problem import STANDARD, Integrator, Scenario, Setup
@@ -284,7 +284,7 @@ def test_theory_at_rest_is_that_of_formulas() -> None:
     mismatches = []
     for problem in (p for p in all_problems().values() if p.limit is not None and p.case != 3):
         model = compile_model(problem.mjcf, Integrator.RK4, min(problem.timesteps))
-        theory = find_theory(model, problem.scenario, None, smooth=False)
+        theory = find_theory(model, problem.scenario, None)
         for integrator in STANDARD:
             computed, exact = theory.limit(integrator, (1e-4, 10.0)), problem.limit(integrator)
             assert computed is not None and exact is not None, problem.name
@@ -313,7 +313,7 @@ def test_theory_of_models_that_sleep_or_lie_exactly_still() -> None:
     for sleep in ("disable", "enable"):
         model = mujoco.MjModel.from_xml_string(discs.format(sleep, bodies, tendons))
         scenario = Scenario(2.0, 0.04, qpos=(0.2, 0.0, 0.0, 0.0, -0.1))
-        theory = find_theory(model, scenario, None, smooth=True)
+        theory = find_theory(model, scenario, None)
         for integrator, limit in ((Integrator.EULER, exact), (Integrator.RK4, exact * 2**0.5)):
             computed = theory.limit(integrator, (1e-3, 1.0))
             assert computed is not None and computed.timestep == pytest.approx(limit, rel=1e-5)
@@ -321,59 +321,12 @@ def test_theory_of_models_that_sleep_or_lie_exactly_still() -> None:
         assert computed is not None and computed.timestep == math.inf
 
 
-def test_theory_along_a_period_is_where_a_pendulum_is_lost() -> None:
-    """From 179° it goes round beyond 0.168 s; hanging at rest it would be stable to 0.64 s."""
+def test_what_is_unstable_by_itself_has_no_theory_at_rest() -> None:
     problem = all_problems()["pendulum-hinge-179"]
     model = compile_model(problem.mjcf, Integrator.RK4, min(problem.timesteps))
-    scenario = replace(problem.scenario, duration=10.0)
-    theory = find_theory(model, scenario, None, smooth=True)
-    limit = theory.limit(Integrator.EULER, (1e-3, 1.0))
-    assert limit is not None and limit.timestep == pytest.approx(0.6417, rel=1e-3)
-    assert theory.orbit is not None and theory.orbit.period == pytest.approx(7.86483, rel=1e-4)
-    assert theory.orbital(Integrator.EULER) == pytest.approx(0.168, rel=0.1)
-    falling = find_rest(model, replace(scenario, qpos=(math.pi,)))
-    assert falling is None, "upright it is unstable by itself"
-
-
-def test_theory_along_a_period_of_a_spring_is_that_at_rest() -> None:
-    """What diverges so far that no difference is left of two runs is unstable all the same."""
-    spring = mujoco.MjModel.from_xml_string(
-        '<mujoco><option gravity="0 0 0"/><worldbody><body><joint type="slide" stiffness="400"/>'
-        '<geom size="0.1" mass="1"/></body></worldbody></mujoco>'
-    )
-    theory = find_theory(spring, Scenario(2.0, 0.1, (0.1,), (0.0,)), None, smooth=True)
-    for integrator, limit in ((Integrator.EULER, 0.1), (Integrator.RK4, 0.1 * 2**0.5)):
-        assert theory.orbital(integrator) == pytest.approx(limit, rel=0.01), integrator
-        at_rest = theory.limit(integrator, (1e-4, 0.005))  # far beyond what runs are tried with
-        assert at_rest is not None and at_rest.timestep == pytest.approx(limit, rel=1e-5)
-
-
-def test_a_motion_that_is_lost_at_every_timestep_if_slowly_has_no_limit_along_its_period() -> None:
-    """Under Euler's method what circles spirals away, at a rate in proportion to the timestep."""
-    mjcf = """<mujoco><worldbody><body><joint type="ball"/>
-    <inertial pos="0 0 -1" mass="1" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"""
-    model, tilt = mujoco.MjModel.from_xml_string(mjcf), math.pi / 6
-    rate = math.sqrt(9.81 / math.cos(tilt))
-    qpos = (math.cos(tilt / 2), math.sin(tilt / 2), 0.0, 0.0)
-    qvel = (0.0, rate * math.sin(tilt), rate * math.cos(tilt))
-    theory = find_theory(model, Scenario(4.0, 0.02, qpos, qvel), None, smooth=True)
-    assert theory.orbit is not None
-    assert theory.orbit.period == pytest.approx(2 * math.pi / rate, rel=1e-6)
-    assert theory.orbital(Integrator.EULER) == "none"
-    assert theory.orbital(Integrator.RK4) == pytest.approx(0.7, rel=0.05)
-
-
-def test_an_orbit_that_is_lost_at_the_shortest_timestep_has_none_as_its_limit() -> None:
-    """`discrete` damps the drive: an upright pendulum on a heavy, shaken pivot topples."""
-    mjcf = """<mujoco><option timestep="0.001"/><worldbody><body>
-      <joint type="slide" axis="0 0 1" stiffness="1e8"/><geom size=".1" mass="1e4" contype="0"/>
-      <body><joint axis="0 1 0"/><geom size=".02" pos="0 0 .2" mass=".1" contype="0"/></body>
-    </body></worldbody></mujoco>"""
-    model = mujoco.MjModel.from_xml_string(mjcf)
-    scenario = Scenario(0.5, 0.01, (0.05, 0.0), (0.0, 0.0))
-    orbit = find_orbit(model, scenario)
-    assert orbit is not None and orbit.period == pytest.approx(0.0628, rel=0.01)
-    assert orbit_limit(model, orbit, Integrator.DISCRETE) == "none"
+    hanging = find_theory(model, problem.scenario, None).limit(Integrator.EULER, (1e-3, 1.0))
+    assert hanging is not None and hanging.timestep == pytest.approx(0.6417, rel=1e-3)
+    assert find_rest(model, replace(problem.scenario, qpos=(math.pi,))) is None, "upright"
 
 
 TOPPLING = """<mujoco><option timestep="0.002"/><worldbody><body>
@@ -388,6 +341,14 @@ def test_what_stays_bounded_may_leave_the_motion_of_small_steps() -> None:
     discrete = rows["discrete"]
     assert discrete.largest == "all" and discrete.theory is None
     assert discrete.near == "none" and discrete.near_reason.startswith("off by 0.1 rad")
+    assert {row.through for row in rows.values()} == {None}, "nothing can touch"
+
+
+def test_a_motion_that_dies_is_not_near_however_small_it_was() -> None:
+    """The pivot moves by 0.012 m, less than a tenth of the extent: `discrete` stops it."""
+    discrete = rows_of(TOPPLING.format("1e8"), qpos=(0.005, 0.0), search=(2e-4, 1e-2))["discrete"]
+    assert discrete.largest == "all"
+    assert discrete.near == "none" and "/ 0.00299 m at " in discrete.near_reason
 
 
 def test_energy_that_cannot_be_is_instability() -> None:

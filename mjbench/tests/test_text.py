@@ -44,7 +44,7 @@ def test_a_report_that_is_hard_to_show_and_one_without_anything() -> None:
     text = scene_text(
         scene(derive_charts(derive_scenario(awkward(), lambda _: ())), quick=True), Style(100)
     )
-    assert "quick: fewer settings" in text and "velocities reached 12 times what can be" in text
+    assert "quick: fewer settings" in text and "velocities reached 12 times their bound" in text
     empty = replace(scene(), scenarios=())
     assert "nothing in it can move, so nothing was measured" in scene_text(empty)
 

@@ -105,7 +105,7 @@ def test_a_scene_that_blows_up_under_its_own_setting() -> None:
 
 
 def test_a_scene_that_diverges_at_every_timestep_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"it diverges within .* s even at 0\.25 s a step"):
+    with pytest.raises(SceneError, match=r"it diverges within .* s even under Euler at 250 ms"):
         measure(stiff(1.0, 0.01), quick=True)
 
 
@@ -258,7 +258,7 @@ def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
     assert (report.reference, report.smooth, report.orders) == ("self", False, ())
     assert report.notes == (
         "the same motion to the bit, and no time saved, with 4 iterations",
-        "errors follow no power of the timestep, because of contact",
+        "no orders are given, as accelerations may jump: contact",
         "what sticks creeps by 0.000511 m under the scene's own setting, though friction stays "
         "below its limit: in the engine it is soft",
         "beyond 0.01 s refsafe softens constraints: stable, but another model",
@@ -330,7 +330,7 @@ def test_what_hangs_on_where_in_a_step_a_hit_falls_is_luck() -> None:
     (scene,) = scenes(model, parse_declared(FALL.format(0.116)), quick=True)
     ticks = itertools.count(step=2_000_000)
     text = measure_scenario(model, scene, quick=True, clock=ticks.__next__).verdict.text
-    assert text.startswith("no difference that holds: RK4 at 4 ms takes no more time and errs ")
+    assert text.startswith("no difference that holds: RK4 at 4 ms takes about as long and errs ")
     assert "here, but " in text and "from starts nearby" in text
 
 

@@ -167,7 +167,6 @@ class StableRow(Struct, frozen=True):
     energy: float | None
     theory: Reach | None = None
     formula: str = ""
-    orbital: Reach | None = None
     gain: tuple[float, float] | None = None
     near: Reach | None = None
     through: Reach | None = None
@@ -286,7 +285,6 @@ class ScenarioReport(Struct, frozen=True):
     horizon_error: Mapping[str, float] = {}
     quantities: tuple[ErrorQuantity, ...] = ()
     charts: tuple[Chart, ...] = ()
-    missed: tuple[float, float] | None = None
     cut_short: bool = False
 
     @property
@@ -347,7 +345,6 @@ class CaseReport(Struct, frozen=True):
     charts: tuple[Chart, ...] = ()
     main: str = ""
     reached: tuple[tuple[str, float], ...] = ()
-    missed: tuple[float, float] | None = None
 
 
 class SceneReport(Struct, frozen=True):

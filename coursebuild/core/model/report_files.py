@@ -14,7 +14,7 @@ from coursebuild.core.model.diet_findings import DietReport
 from coursebuild.core.model.measurements import CaseReport, EngineReport, SceneReport
 
 FOLDER = "content/reports"
-VERSION = 4
+VERSION = 5
 """Of the format that is read here; that of the file stands in it."""
 
 _T = TypeVar("_T")

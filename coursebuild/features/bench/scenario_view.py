@@ -99,7 +99,6 @@ def scenario_view(
         if row.largest == "all" and report.cut_short:
             remark = words("measured.stable_short", steps=_FEWEST_STEPS)
         rows.append((row.integrator, (*stable_cells(words, row), remark)))
-    notes += missed_islands(words, report.missed)
     label = stable_title(words, report.stable) if rows else ""
     return ScenarioView(
         anchor=anchor,
@@ -246,7 +245,6 @@ STABLE = (
     "measured.near",
     "measured.through",
     "measured.theory",
-    "measured.orbital",
     "measured.gain",
     "measured.map",
     "measured.steps",
@@ -280,7 +278,6 @@ def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
         _reach(words, row.near, row),
         _reach(words, row.through, row),
         _theory(words, row.theory),
-        _theory(words, row.orbital, digits=2),
         gain,
         row.map,
         str(row.steps),
@@ -302,10 +299,10 @@ def _reach(words: Strings, limit: Reach | None, row: StableRow) -> str:
             return seconds_text(limit, 2)
 
 
-def _theory(words: Strings, limit: Reach | None, digits: int = 5) -> str:
+def _theory(words: Strings, limit: Reach | None) -> str:
     if isinstance(limit, str):
         return words(f"numerics.{limit}")
-    return "" if limit is None else seconds_text(limit, digits)
+    return "" if limit is None else seconds_text(limit, 5)
 
 
 def stable_again(words: Strings, row: StableRow) -> str:
@@ -316,14 +313,6 @@ def stable_again(words: Strings, row: StableRow) -> str:
     if first == last:
         return words("measured.island", time=first)
     return words("measured.islands", first=first, last=last)
-
-
-def missed_islands(words: Strings, missed: tuple[float, float] | None) -> list[str]:
-    """Say what the search for largest stable timesteps cannot see; nothing without a search."""
-    if missed is None:
-        return []
-    near, far = (f"{100 * gap:.2g}" for gap in missed)
-    return [words("measured.gaps", near=near, far=far)]
 
 
 class EngineView(Struct, frozen=True):

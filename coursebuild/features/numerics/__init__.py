@@ -198,7 +198,6 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
     formulas = dict.fromkeys(line.formula for line in report.boundaries if line.formula)
     if formulas:
         notes.append(words("numerics.theory", sources="; ".join(formulas)))
-    notes += scenario_view.missed_islands(words, report.missed)
     softened_steps = sorted({line.timestep for line in report.errors if line.refsafe})
     if softened_steps:
         times = ", ".join(seconds_text(step) for step in softened_steps)

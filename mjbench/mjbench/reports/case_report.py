@@ -77,5 +77,3 @@ class CaseReport(Record, frozen=True):
     reached: tuple[tuple[str, float], ...] = ()
     """Processor time for a simulated second, s, by integrator, with the timestep that errs by
     `RIGHT`; those that do not come so near are left out."""
-    missed: tuple[float, float] | None = None
-    """As of a `ScenarioReport`."""

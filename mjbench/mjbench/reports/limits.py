@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from itertools import pairwise
 
 from mjbench.reports import Reach, reach_bound
@@ -12,6 +12,8 @@ from mjbench.reports.shown_errors import seconds_text
 
 _TOGETHER, _MOST_DIGITS = 0.1, 4
 """How far theory at rest may be above runs, relative, and the most digits of a limit."""
+IS_LOST = "it is lost"
+"""Why a run that does not stay bounded does not stay near either."""
 _SIGNS = "·∘•"
 """Of a timestep in a map: none, some or all of its runs were lost."""
 
@@ -29,7 +31,7 @@ def limit_text(row: StableRow) -> str:
         return reach_text(row.largest, row.searched)
     low, high = row.bracket
     if row.islands is not None:
-        low = min(low, high / max(1.0, widest_gaps([row])[0]))
+        low = min(low, high / _widest_gap(row))
     if isinstance(row.theory, float) and row.theory < high * (1 + _TOGETHER):
         low, high = min(low, row.theory), max(high, row.theory)
     if low <= 0:
@@ -63,18 +65,11 @@ def reach_text(limit: Reach | None, searched: tuple[float, float], digits: int =
     return seconds_text(limit, digits)
 
 
-def widest_gaps(rows: Iterable[StableRow]) -> tuple[float, float]:
-    """The largest ratios of timesteps that were tried next to each other: above half, and in all.
-
-    They count up to the largest stable one; 0 without any.
-    """
-    near, far = [0.0], [0.0]
-    for row in rows:
-        top = min(reach_bound(row.largest), row.searched[1])
-        steps = [step for step, _, _ in row.tries if step <= top * (1 + 1e-9)]
-        for step, following in pairwise(steps):
-            (near if step >= top / 2 else far).append(following / step)
-    return max(near), max(*near, *far)
+def _widest_gap(row: StableRow) -> float:
+    """The largest ratio of timesteps tried next to each other, from half the largest stable one."""
+    top = min(reach_bound(row.largest), row.searched[1])
+    steps = [step for step, _, _ in row.tries if top / 2 <= step <= top * (1 + 1e-9)]
+    return max((following / step for step, following in pairwise(steps)), default=1.0)
 
 
 def map_text(row: StableRow) -> str:
@@ -93,16 +88,26 @@ def stability_text(report: ScenarioReport) -> str:
     row = next((r for r in report.stable if baseline and r.integrator == baseline.integrator), None)
     if row is None:
         return ""
-    parts = [f"{row.integrator} stays bounded at {_upto(row, row.shown)}"]
+    low, high = (seconds_text(step, 3) for step in row.searched)
+    answers: dict[str, list[str]] = {}
     for limit, words, reason in (
+        (row.largest, "bounded", ""),
         (row.near, "near the motion of small steps", row.near_reason),
         (row.through, "with nothing going through", row.through_reason),
     ):
-        if limit is not None:
-            text = reach_text(limit, row.searched)
-            parts.append(f"{words} at {_upto(row, text)}" + (f" ({reason})" if reason else ""))
-    return ", ".join(parts)
+        if limit is None or (limit is row.near and reason == IS_LOST):
+            continue  # not asked, or as long as it stays bounded
+        text = row.shown if words == "bounded" else reach_text(limit, row.searched)
+        if text[:1].isdigit():
+            text = f"steps to {text}"
+        elif limit in ("all", "none"):
+            text = f"every step tried, to {high}" if limit == "all" else f"no step from {low} on"
+        text = f"at {text}" + (f" ({reason})" if reason else "")
+        answers.setdefault(text, []).append(words)
+    stays = "; ".join(f"{_enumerate(words)} {text}" for text, words in answers.items())
+    return f"{row.integrator} stays {stays}"
 
 
-def _upto(row: StableRow, text: str) -> str:
-    return f"steps to {text}" if text[:1].isdigit() else text
+def _enumerate(words: Sequence[str]) -> str:
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last

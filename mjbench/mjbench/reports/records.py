@@ -28,7 +28,7 @@ from mjbench.reports.diet_report import DietReport
 from mjbench.reports.engine_report import EngineReport
 from mjbench.reports.shown_errors import seconds_text, setting_text, status_text
 
-VERSION = 4
+VERSION = 5
 """Goes up when files that were written before cannot be read any more."""
 
 _T = TypeVar("_T")

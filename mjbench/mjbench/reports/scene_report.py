@@ -236,8 +236,6 @@ class StableRow(Record, frozen=True):
     """As `largest`, of linear theory; `None` where there is none for what the scenario visits."""
     formula: str = ""
     """Where the theory comes from; empty where there is none."""
-    orbital: Reach | None = None
-    """As `largest`, of a periodic motion; `None` where it is not periodic, or not known."""
     gain: tuple[float, float] | None = None
     """The first timestep (s) with which a scene that nothing drives gains energy, and how much (J);
     `None` where none does, or something drives it."""
@@ -427,9 +425,6 @@ class ScenarioReport(Record, frozen=True):
     it was not asked for."""
     profile_text: str = ""
     """What of that the verdict rests on."""
-    missed: tuple[float, float] | None = None
-    """Islands of lost timesteps can be missed where they are narrower: relative to the timestep,
-    above half the largest stable one, and in all; `None` without a search."""
     cut_short: bool = False
     """Whether the search for stable timesteps ended because of the scenario's duration."""
     drawn: tuple[str, ...] = ()

@@ -106,13 +106,17 @@ class FrontPoint(Struct, frozen=True):
         is_more_accurate = self.error * (1 + ERROR_SLACK) < rival.error
         is_no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
         return (self.is_cheaper(rival) and is_no_worse) or (
-            is_more_accurate and not rival.is_cheaper(self)
+            is_more_accurate and self.is_no_dearer(rival)
         )
 
     def is_cheaper(self, rival: FrontPoint) -> bool:
         """Whether this costs less, beyond what timing can tell."""
         is_separate = self.cost.high < rival.cost.low
         return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
+
+    def is_no_dearer(self, rival: FrontPoint) -> bool:
+        """Whether this costs no more: where times are uncertain, by the likeliest ones."""
+        return self.cost.value <= rival.cost.value * (1 + COST_SLACK)
 
 
 def front_point(row: WorkPrecisionRow, quantity: Quantity) -> FrontPoint | None:

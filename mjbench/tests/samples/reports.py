@@ -157,7 +157,7 @@ def awkward() -> ScenarioReport:
         row(
             "RK4",
             status="slow-growth",
-            reasons=("velocities reached 12 times what can be",),
+            reasons=("velocities reached 12 times their bound",),
             refsafe=True,
             growth=1.0123456789,
             **newton,

@@ -8,7 +8,6 @@ from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model.measurements import StableRow
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.features.bench.scenario_view import (
-    missed_islands,
     stable_again,
     stable_cells,
     stable_title,
@@ -24,26 +23,19 @@ def test_a_table_says_all_times_over_which_its_timesteps_are_stable() -> None:
 
 
 def test_what_stays_near_and_what_goes_through_has_columns_of_its_own() -> None:
-    row = replace(ROW, near=7.04, through="all", theory="none", orbital=0.0123456)
-    assert stable_cells(WORDS, row)[:5] == (
-        *("25.4 s", "7 s", "all up to 1000 s", "none", "12 ms"),
-    )
-    assert stable_cells(WORDS, ROW)[1:5] == ("", "", "", ""), "not measured"
+    row = replace(ROW, near=7.04, through="all", theory="none")
+    assert stable_cells(WORDS, row)[:4] == ("25.4 s", "7 s", "all up to 1000 s", "none")
+    assert stable_cells(WORDS, ROW)[1:4] == ("", "", ""), "not measured"
     lost = replace(ROW, largest="none", near="none")
     assert stable_cells(WORDS, lost)[:2] == ("none from 1 s on",) * 2
 
 
-def test_what_the_gaps_between_timesteps_may_hide_is_said() -> None:
-    assert missed_islands(WORDS, (0.0227, 0.15)) == [
-        "Islands of lost timesteps can be missed if they are narrower than 2.3 %, or than 15 % "
-        "below half the limit."
-    ]
-    assert missed_islands(WORDS, None) == []
+def test_larger_timesteps_that_are_stable_again_are_told() -> None:
     row = replace(ROW, islands=(60.0, 80.0))
     assert stable_again(WORDS, row) == "some are stable again, from 60 s to 80 s"
     assert stable_again(WORDS, replace(row, islands=(0.05,) * 2)) == "one is stable again: 50 ms"
 
 
 def test_energy_that_is_gained_at_the_shortest_timestep_may_be_gained_below() -> None:
-    assert stable_cells(WORDS, replace(ROW, gain=(1.0, 8.0)))[5].startswith("from ≤ 1 s")
-    assert "≤" not in stable_cells(WORDS, replace(ROW, gain=(20.0, 8.0)))[5]
+    assert stable_cells(WORDS, replace(ROW, gain=(1.0, 8.0)))[4].startswith("from ≤ 1 s")
+    assert "≤" not in stable_cells(WORDS, replace(ROW, gain=(20.0, 8.0)))[4]
