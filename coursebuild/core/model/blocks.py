@@ -392,6 +392,8 @@ class NumberedItem(Struct, frozen=True):
     """The conditions under which it was tried as an identity, perhaps empty."""
     callout: str = ""
     """The kind of callout that it is, if it is one."""
+    first_row: int = 0
+    """The number of the first numbered row of a formula such as `align`; 0 where it has none."""
 
     @property
     def kind(self) -> str:

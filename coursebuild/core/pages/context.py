@@ -23,7 +23,7 @@ from coursebuild.core.pages import typography, urls
 from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.markup import HtmlWriter
-from coursebuild.core.pages.numbering import item_name, number_items
+from coursebuild.core.pages.numbering import item_name, number_items, with_row_numbers
 from coursebuild.core.pages.references import ids_and_addresses
 from coursebuild.core.pages.renderer import Renderer, Strings, direction
 from coursebuild.core.pages.zips import Archive
@@ -273,6 +273,8 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
         mathml = self.renderer.mathml(tex, True)
         item = self.numbered_items.get(start)
         domain = item.domain if item is not None else None
+        if item is not None and item.first_row:
+            mathml = with_row_numbers(mathml, item.first_row)
         return self.template(
             "blocks/formula.html",
             mathml=mathml,

@@ -4,8 +4,8 @@ r"""Numbers of formulas, figures, tables, listings, labs and callouts.
    be referred to. Each kind is counted for itself.
 2. A figure of Lesson 4.2 is "Figure 4.2.3" wherever it is named, and on a page that is no lesson
    "Figure 3". A formula is "(3)" where it stands, and "(3) of Lesson 4.2" elsewhere.
-3. LaTeX's numbered environments count too: the style sheet writes their numbers, continuing ours. A
-   formula with such numbers of its own, or with a `\tag`, gets no other.
+3. LaTeX's numbered environments count too, continuing ours. A formula with such numbers of its own,
+   or with a `\tag`, gets no other.
 """
 
 from __future__ import annotations
@@ -46,8 +46,9 @@ def number_items(document: model.Document, mathml: Mathml) -> dict[int, model.Nu
         count += styled_count + has_margin_number
         if formula.id:
             conditions = formula.label.conditions if formula.label is not None else None
+            first = count - styled_count + 1 if styled_count else 0
             items[formula.start] = model.NumberedItem(
-                formula.id, number, has_margin_number, conditions
+                formula.id, number, has_margin_number, conditions, first_row=first
             )
     counts = Counter[str]()
     for block, label in model.labelled_blocks(document):
@@ -56,6 +57,14 @@ def number_items(document: model.Document, mathml: Mathml) -> dict[int, model.Nu
         counts[kind] += 1
         items[block.span.start] = model.NumberedItem(label.id, str(counts[kind]), callout=callout)
     return items
+
+
+def with_row_numbers(mathml: Markup, first: int) -> Markup:
+    """A formula whose numbered rows, as of `align`, get their numbers."""
+    head, *rows = mathml.split(_COUNTER_CLASS + ">")
+    for number, row in enumerate(rows, first):
+        head += Markup(f"{_COUNTER_CLASS}>({number})") + row
+    return head
 
 
 def items_of(document: model.Document, mathml: Mathml) -> tuple[model.NumberedItem, ...]:

@@ -291,7 +291,7 @@ def update_outputs(
             ]
             texts += bound.printed
             places = bound.look_up(texts)
-            if bound.contradicts_words(places, texts):
+            if bound.contradicts_words(places, texts) or bound.contradicts_itself(places, texts):
                 continue
             rewritten = {bound.text.rewrite(place) for place in places}
             is_shown = all(map(bound.text.shows, places))
@@ -335,6 +335,7 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
 def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     """The diagnostic of a binding at whose address stands another number now, or none."""
     binding, text = bound.binding, bound.text
+    bare = replace(text, before="", after="")
     places_now = next(filter(None, map(bound.look_up, bound.groups)), [])
     places_now.sort(key=lambda place: _distance(text.numbers, place.numbers))
     if len({text.rewrite(place) for place in places_now}) > 1:
@@ -351,7 +352,11 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         are = "are" if len(text.numbers) > 1 else "is"
         label = f"{place.text} {are} printed there now, in `{plain_text(place.line.text)}`"
         help = Fix(f"write `{better}`", better, safe=True) if better else ""
-        return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)
+        rivals = [] if bound.addresses else bare.shown_places([place.output])
+        notes = [place_note(binding, rival, places_now) for rival in rivals[:_MAX_NOTES]]
+        return diagnose(
+            "binding-mismatch", binding.text_span, message, label=label, help=help, notes=notes
+        )
     if binding.words:
         message = f"`{bound.path}` printed no number right after `{binding.words}`"
         return diagnose("binding-mismatch", binding.text_span, message)

@@ -256,6 +256,19 @@ class BoundNumber(Struct, frozen=True, dict=True):
         is_known = bool(self.binding.words) and any(known_places)
         return is_known and not any(place in places for place in known_places)
 
+    def contradicts_itself(
+        self, places: Sequence[PrintedPlace], outputs: Sequence[PrintedText]
+    ) -> bool:
+        """Whether its words choose one number, and it shows another printed one, or the negative.
+
+        It has not held yet, so only a human knows which of the two is meant.
+        """
+        if self.addresses or not places or all(map(self.text.shows, places)):
+            return False
+        unsigned = [re.sub("[-−+]", "", t) for t in (self.text.text, self.text.rewrite(places[0]))]
+        bare = replace(self.text, before="", after="")
+        return unsigned[0] == unsigned[1] or bare.is_in(outputs)
+
     def search(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers that it may mean: a proposal, until one that it shows is remembered."""
         return self.text.candidates(outputs, self.following)

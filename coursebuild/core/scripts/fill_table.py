@@ -31,21 +31,31 @@ class _Candidate(Struct, frozen=True):
 
     @property
     def line(self) -> str:
-        return self.places[0].line.text
+        return plain_text(self.places[0].line.text)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return self.places[0].labels
 
 
 def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
     """The edit that writes all rows; a diagnostic where it is uncertain which lines are meant."""
     titles = [ColumnTitle.of(cell) for cell in table.header]
+    output = PrintedText(map(PrintedLine, Side.of(stdout).lines))
+    labels = list(map(output.labels, range(len(output.lines))))
+    is_named = any(title.best_places(line) for title in titles for line in labels)
     kinds: dict[tuple[str, ...], list[_Candidate]] = {}
-    for candidate in _candidates(titles, stdout):
+    for candidate in _candidates(titles, output):
         kinds.setdefault(candidate.kind, []).append(candidate)
     scores = {kind: _score(titles, lines[0]) for kind, lines in kinds.items()}
     best = [kind for kind, score in scores.items() if score == max(scores.values())]
+    lines_of_best = [kinds[kind][0] for kind in best if not scores[kind][1]]
+    if is_named and any(any(map(str.isalpha, "".join(c.labels))) for c in lines_of_best):
+        best = []  # they have other words than the titles, and other lines have these
     if len(best) != 1:
         place = table.span.first_line()
         message = "no printed line has a number for each column of this table"
-        help = "print one line for each row, or write the rows by hand"
+        help = "print a line for each row, with the words of the header, or write the rows by hand"
         if best:
             lines_text = " or ".join(f"`{kinds[kind][0].line}`" for kind in best[:3])
             message = f"its rows may be lines such as {lines_text}"
@@ -60,8 +70,7 @@ def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
     return Edit(place, "".join(f"\n{delimiter[1]}{row}" for row in rows))
 
 
-def _candidates(titles: Sequence[ColumnTitle], stdout: str) -> Iterator[_Candidate]:
-    output = PrintedText(map(PrintedLine, map(plain_text, Side.of(stdout).lines)))
+def _candidates(titles: Sequence[ColumnTitle], output: PrintedText) -> Iterator[_Candidate]:
     for at, line in enumerate(output.lines):
         if not line.numbers:
             continue

@@ -158,8 +158,10 @@ class TableMatcher:
         self.titles = [ColumnTitle.of(cell) for cell in table.header]
         self._addresses = addresses if len(addresses) == len(self.rows) else [()] * len(self.rows)
         self._numbers_match = partial(same_number, comparison=comparison)
-        self.lines = list(map(plain_text, Side.of(stdout, comparison.filters).lines))
+        printed_lines = Side.of(stdout, comparison.filters).lines
+        self.lines = list(map(plain_text, printed_lines))
         self.text = PrintedText(map(PrintedLine, self.lines))
+        self._text_with_gaps = PrintedText(map(PrintedLine, printed_lines))
         self._canonical_line = cache(lambda line: canonicalize(self.lines[line]))
         self._fits_of_row = cache(self._fits_at_address)
 
@@ -237,11 +239,16 @@ class TableMatcher:
             (cell, PrintedPlace(self.text, fit.line, (n,))) for cell, _, n in pairs if n in numbers
         ]
         verdicts = [
-            self.titles[cell.column].names(place.labels, place.first, place.units[0])
+            self.titles[cell.column].names(self._labels(fit.line), place.first, place.units[0])
             for cell, place in places
         ]
         share = len(pairs) / max(1, len(numbers))
         return self._right_rows(layout), verdicts.count(True), -verdicts.count(False), share
+
+    def _labels(self, line: int) -> tuple[str, ...]:
+        """The labels of the numbers of a line; wide gaps tell its titles of several words apart."""
+        labels, plain_labels = self._text_with_gaps.labels(line), self.text.labels(line)
+        return labels if len(labels) == len(plain_labels) else plain_labels
 
     def _count_lines(self, layout: LineLayout | None) -> int:
         """How many printed lines have a layout, whatever text their cells hold."""
@@ -377,7 +384,7 @@ class TableMatcher:
             numbers = self.text.lines[row.line].numbers
             pairs = [(cell.column, n) for cell, _, n in reversed(row.pairs) if n in numbers]
             places = {column: numbers.index(number) for column, number in pairs}
-            columns = swapped_columns(self.titles, self.text.labels(row.line), places)
+            columns = swapped_columns(self.titles, self._labels(row.line), places)
             for column, right in columns.items():
                 title = self.titles[column]
                 back = next((a for a, b in columns.items() if b == column), right)

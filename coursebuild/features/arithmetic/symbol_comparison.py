@@ -124,6 +124,8 @@ class SymbolComparison:
             is_foreign = self.unit is not None and self.unit.dimension != base
             dimensions[bare] = self.unit.dimension if self.unit and is_foreign else base
         if dimensions[0] != dimensions[1] and not has_zero(*quantities):
+            if self._is_of_zeros():
+                raise NotJudged
             if bare is None:
                 self._pass_hidden_unit()
             message = " is held against ".join(map(describe_dimension, dimensions))
@@ -147,6 +149,11 @@ class SymbolComparison:
         texts |= {symbol.unit_text for symbol in self.known.values()}
         units = map(find_units, texts)
         return any(len(group) > 1 or any(unit.zero for unit in group) for group in units)
+
+    def _is_of_zeros(self) -> bool:
+        r"""Whether the chain says that all its sides are zero: `\dot x = x = 0`."""
+        zeros = (side.tex[side.start : side.end].strip(r" .,;~\!") for side in self.chain.sides)
+        return {*self.chain.relations} == {"="} and "0" in zeros
 
     def _pass_hidden_unit(self) -> None:
         """Raise unless units that do not fit are a mistake for sure."""

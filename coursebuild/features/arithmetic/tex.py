@@ -37,6 +37,9 @@ SPACE = re.compile(
 _NUMBER = re.compile(
     r"(?:[0-9]{1,3}(?:(?:\{,\}|\\[,;: ]|~)[0-9]{3})+(?![0-9])|[0-9]+)(?:\.[0-9]+)?|\.[0-9]+"
 )
+_E_NOTATION = re.compile(
+    r"(?:[eE]|\\mathrm\s*(?:[eE]|\{[eE]\}))(?:\{\s*[-+−]?[0-9]+\s*\}|[-+−][0-9])"
+)
 _LETTER = re.compile(r"[A-Za-z]|\\[A-Za-z]+")
 _DIFFERENTIAL = re.compile(r"\\mathrm\s*(?:\{\s*d\s*\}|d)|\\partial(?![A-Za-z])")
 _UPRIGHT = re.compile(r"\\(?:mathrm|text|textrm|operatorname|mathit)(?![A-Za-z])\s*")
@@ -56,6 +59,8 @@ _UNIT_SIGNS = ("/", r"\cdot")
 r"""Signs between upright units, as in `\mathrm N\cdot\mathrm m`."""
 _PRODUCT_SIGNS = (r"\cdot", r"\times", "*", "⋅", "×", *_QUOTIENT_SIGNS)
 _NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^") | {r"\rvert", *_PRODUCT_SIGNS}
+UNIT_OF_QUOTIENT = "unit of a quotient"
+"""The text of a product as `1/50 Hz`, whose unit may be that of the divisor alone."""
 SIDE_BY_SIDE = "side by side"
 """The text of a product in what a function without brackets is of."""
 _NUMBER_ONE, _NUMBER_TWO = (Expression("number", 0, 0, text=digit) for digit in "12")
@@ -205,7 +210,8 @@ class _Reader:
             kind = "/" if is_quotient else "*"
             product = Expression(kind, product.start, self.at, (product, factor))
             if unit is not None:
-                product = Expression("*", product.start, self.at, (product, unit))
+                parts = product, unit
+                product = Expression("*", product.start, self.at, parts, UNIT_OF_QUOTIENT)
 
     def begins_factor(self) -> bool:
         """Whether another factor begins here, with no sign before it."""
@@ -278,6 +284,8 @@ class _Reader:
             digits = re.sub(r"[^0-9.]", "", number[0])
             if re.match("0[0-9]", digits):
                 raise NotUnderstood("a number with leading zeros may be binary", start, self.at)
+            if _E_NOTATION.match(self.tex, self.at, self.end):
+                raise NotUnderstood("it may be a power of ten", start, self.at)
             return Expression("number", start, self.at, text=digits)
         if sign in _BRACKETS:
             self.at += len(sign)

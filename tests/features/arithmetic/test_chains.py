@@ -34,6 +34,7 @@ I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168
 \frac{6!}{2!\,4!} = \binom{6}{2} = \tbinom62 = 15, \quad -3!^2 = -36, \quad 0! = 1
 \sum_{k=1}^{4} k^2 + 1 = 31, \quad \sum\limits_{i=1}^3\sum_{j=1}^i i\,j = 25
 \sum_{n=0}^{10} \frac{1}{n!} \approx 2.7182818, \quad \prod_{i=1}^{5} i = 5!
+2\times10^{-6} = 2\,\mathrm{ppm}, \quad 10^{-9} = 1\,\mathrm{ppb}
 \sum_{i=1}^{3} 2^i\ \mathrm{m} = 14\ \mathrm m, \quad \sum_{i=3}^{2} i = 0
 """
 SILENT = r"""
@@ -149,11 +150,18 @@ def test_what_can_be_meant_otherwise_is_not_judged() -> None:
         "(1)(23) = (12)(3)": "two numbers stand side by side",
         "0 = 1": "there is nothing to compute",
         "3950/988 = 3": "`/` may be the division of whole numbers",
+        r"T = 1/50\,\mathrm{Hz} = 20\,\mathrm{ms}": "its unit may be that of another part",
+        r"2\cdot45 = 90^\circ": "its unit may be that of another part",
+        r"\tfrac34\cdot100 = 75\,\%": "its unit may be that of another part",
+        r"1.6\mathrm e{-19} = 1.6\times10^{-19}": "it may be a power of ten",
     }
     for tex, reason in reasons.items():
         (comparison,) = check_arithmetic(tex)
         assert (comparison.kind, comparison.message) == ("unread", reason)
     for tex in ("3950/988 = 4", r"\frac{7}{2} = 3", "1 + 0 = 0", r"2\cdot(13) = 36", "0.5 = 0.6"):
+        (comparison,) = check_arithmetic(tex)
+        assert comparison.kind == "wrong", tex
+    for tex in (r"1/50\,\mathrm{Hz} = 30\,\mathrm{ms}", r"0.35 = 0.35\,\%", r"\pi/2 = 1.57^\circ"):
         (comparison,) = check_arithmetic(tex)
         assert comparison.kind == "wrong", tex
 
