@@ -34,12 +34,15 @@ SIZES: dict[str, tuple[bytes, tuple[float, float] | None]] = {
         (37, 22),
     ),
     "WebP with parts": (b"RIFF\0\0\0\0WEBPVP8X" + bytes(8) + b"\x24\0\0\x15\0\0", (37, 22)),
-    "SVG in points": (b'<?xml version="1.0"?><!-- a --><svg width="72pt" height=".5in"/>', (96, 48)),
+    "SVG in points": (
+        b'<?xml version="1.0"?><!-- a --><svg width="72pt" height=".5in"/>', (96, 48),
+    ),
     "SVG with a prefix": (b'<s:svg xmlns:s="http://www.w3.org/2000/svg" width="1cm" height="5mm"/>',
                           (96 / 2.54, 48 / 2.54)),
     "SVG with a view alone": (b'<svg viewBox="0,0 30 10"/>', (WHOLE_COLUMN, WHOLE_COLUMN / 3)),
     "SVG as wide as its column": (
-        b'<svg width="100%" height="100%" viewBox="-3 0 3e1 10"/>', (WHOLE_COLUMN, WHOLE_COLUMN / 3),
+        b'<svg width="100%" height="100%" viewBox="-3 0 3e1 10"/>',
+        (WHOLE_COLUMN, WHOLE_COLUMN / 3),
     ),
     "SVG with one side": (b'<svg height="20" viewBox="0 0 30 10"/>', (60, 20)),
     "SVG that says nothing": (b'<svg xmlns="http://www.w3.org/2000/svg"/>', None),
