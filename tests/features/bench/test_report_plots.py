@@ -1,4 +1,4 @@
-"""The work–precision plot: every report gives a drawing in which everything is told apart."""
+"""Plots of reports and sweeps: every one is a drawing in which everything is told apart."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from coursebuild.core.drawing.scales import text_width
-from coursebuild.core.model.measurements import Interval, ScenarioReport
+from coursebuild.core.model.measurements import Interval, ScenarioReport, SweepReport, SweepRow
 from coursebuild.features.bench.chart import line_look, outline
-from coursebuild.features.bench.report_plots import plot_svgs
+from coursebuild.features.bench.report_plots import plot_svgs, sweep_svg
 from support.bench_reports import diverged_row, row, scenario, swing
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
@@ -246,3 +246,43 @@ def test_any_report_is_drawn(rows: Any, floor: float, narrow: bool) -> None:
     ]
     for svg in plot_svgs(scenario(report_rows, floor=floor), name="p", narrow=narrow):
         assert len(titles(ElementTree.fromstring(svg))) == len(report_rows)
+
+
+def table(*rows: SweepRow, show: tuple[str, ...] = ()) -> SweepReport:
+    return SweepReport("soft", "How <soft>", "swing", show, rows)
+
+
+ROWS = (
+    SweepRow("geom.solref[0]", "0.01", own=True, status="ok", penetration=1e-4, slip=0.0),
+    SweepRow("geom.solref[0]", "0.1", own=False, status="ok", penetration=1e-2, slip=0.0),
+    SweepRow("option.cone", "elliptic", own=False, status="diverged", reasons=("lost",)),
+    SweepRow("threads", "2", own=False, status="ok", throughput=Interval(2e3, 1e3, 3e3)),
+)
+
+
+def test_a_sweep_without_figures_has_no_plot() -> None:
+    assert sweep_svg(table(), name="p") == ""
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_every_value_is_a_dot_in_the_plot(narrow: bool) -> None:
+    report = table(*ROWS, show=("penetration", "throughput"))
+    root = ElementTree.fromstring(sweep_svg(report, name="p", narrow=narrow))
+    names = [element.text for path in root.iter("path") for element in path.iter("title")]
+    assert names == [
+        "geom.solref[0] 0.01: 0.0001",
+        "geom.solref[0] 0.1: 0.01",
+        "threads 2: 2000 ± 50 %",
+    ]
+    texts = [element.text for element in root.iter("text")]
+    assert {"geom.solref[0]", "option.cone", "diverged", "as the model is", "depth (m)"} <= {*texts}
+    assert len(list(root.iter("circle"))) == 2, "around the own value, and in the key"
+    assert "option.cone elliptic: depth (m) diverged" in root.findtext("desc", "")
+
+
+def test_in_chaos_no_size_of_a_change_is_drawn() -> None:
+    row = replace(ROWS[0], parted=2.0)
+    assert "1: just visible" in sweep_svg(
+        table(replace(row, change=3.0), show=("change",)), name="s"
+    )
+    assert "1: just visible" not in sweep_svg(table(row, show=("parted",)), name="s")
