@@ -30,6 +30,7 @@ from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, masked
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.diagnostics import Edit, Note
+from coursebuild.core.text.quantities import unit_behind, unit_of_label
 
 
 def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ...]:
@@ -217,10 +218,15 @@ class BoundNumber(Struct, frozen=True, dict=True):
 
     @property
     def following(self) -> str:
-        """What stands behind it, also on the next line of a quotation, or its own unit."""
-        end = self.binding.span.end
-        text = self.binding.span.source.text[end : end + 80]
-        return self.binding.unit or _LINE_END.sub(" ", text)
+        """What stands behind it, also on the next line of a quotation, or its own unit.
+
+        Where no unit stands there, the one of a label that ends before it, as in `v (m/s):`.
+        """
+        text, end = self.binding.span.source.text, self.binding.span.end
+        behind = self.binding.unit or _LINE_END.sub(" ", text[end : end + 80])
+        label = text[: self.binding.span.start].rpartition("\n")[2].rstrip(" *_")
+        is_label = label.endswith((":", "=")) and not unit_behind(behind)
+        return (is_label and unit_of_label(label).text) or behind
 
     def places(self) -> list[PrintedPlace]:
         """Where it holds: in recorded text, or else in the run."""

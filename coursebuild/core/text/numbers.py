@@ -52,6 +52,10 @@ _WITH_COMMA = re.compile(
     r"(?<![\w.,])(?:[0-9]{1,3}(?:\.[0-9]{3})+|[0-9]+),[0-9]+(?![0-9]|[.,][0-9])"
     r"|(?<![\w.,])[0-9]{1,3}(?:\.[0-9]{3}){2,}(?![0-9]|[.,][0-9])"
 )
+_WITH_SPACES = re.compile(
+    r"(?<![\w.,])(?<![0-9]\s)[1-9][0-9]{0,2}"
+    r"(?:(?: [0-9]{3})+(?=,[0-9])|(?:[\u00a0\u2009\u202f][0-9]{3})+)(?![0-9])"
+)
 _SWAPPED = str.maketrans(",.", ".,")
 _DIGIT_COMMA = re.compile("[0-9],[0-9]")
 _NOTATION = re.compile(
@@ -138,8 +142,10 @@ def scan(text: str, is_grouped: bool = False) -> tuple[Number, ...]:
 def point_decimals(text: str) -> str:
     """A text of the same length, with points for the commas before decimals.
 
-    Points that part thousands become commas: `1.234,5` is `1,234.5`, as programs print it.
+    Points and spaces that part thousands become commas: `1.234,5` is `1,234.5`, as programs print
+    it; an ordinary space only where it stands before decimals, as two numbers may have it between.
     """
+    text = _WITH_SPACES.sub(lambda match: re.sub(r"\s", ".", match[0]), text)
     return _WITH_COMMA.sub(lambda match: match[0].translate(_SWAPPED), text)
 
 

@@ -18,7 +18,8 @@ from collections.abc import Iterable, Sequence
 from msgspec import Struct
 
 from coursebuild.core.text.numbers import Number, only_number, scan
-from coursebuild.core.text.units import NAMES, Unit, find_units, is_name
+from coursebuild.core.text.unit_table import NAMES
+from coursebuild.core.text.units import PER, Unit, find_units, is_name
 
 _SECOND_READINGS = {
     "m": ("min",),
@@ -29,14 +30,25 @@ _SECOND_READINGS = {
 """What a symbol means in text besides."""
 _MAGNITUDES = frozenset("BGMP")
 """In text they count billions and millions more often than they are units."""
-_SIGNS = frozenset(("/", "·", "⋅", "*", "per"))
+_SIGNS = frozenset(("/", "·", "⋅", "*", *PER, "pour", "square", "cubic", "sq", "cu"))
+"""After these, more of a unit must follow."""
 _PER_UNIT = re.compile(r"/[^\W\d_]")
 _GAP = re.compile(r"[ \t]{2,}|\t")
+_NEXT_COLUMN = re.compile(r"[ \t]{2,}|\t|[ \t]?\|[ \t]?|,(?=[^\W\d])")
 _REACH = 80
-_LONGEST_PRODUCT = 4
-_CLOSING = ".,;:!?”\"'*_|>}"
-_UPRIGHT = re.compile(r"\$\s*(?:\\[,;: ])*\\(?:mathrm|text|textrm)\s*\{([^{}$]*)\}\s*\$")
+_LONGEST_PRODUCT = 6
+_CLOSING = ".,;:!?”\"'*_`|>}"
+_UPRIGHT = re.compile(r"\$([^$]*\\(?:mathrm|text|textrm)[^$]*)\$")
+_NUMBER = r"[-+−]?[0-9.]++(?:[eE][-+]?[0-9]++)?"
+_SPREAD = re.compile(rf"[ \t]?(?:±|\+/?-|–|\.\.+|to)[ \t]*{_NUMBER}(?=[ \t)\]])[ \t]*[)\]]?")
+"""A number that shares its unit with the one before: `83.4 ± 0.2 m`, `(83.4 .. 85.0) m`."""
+_REST_OF_LIST = re.compile(rf"(?:[,; \t]++{_NUMBER})*+[ \t]*[)\]]")
+_BEGIN_OF_LIST = frozenset("([ \t,;+-−.eE0123456789")
+"""What may stand in a list before a number of it."""
+_FRACTION = (re.compile(r"\\[td]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}"), r"(\1)/(\2)")
 _TEX_SIGNS = (
+    (re.compile(r"\^\{([-−]?\d+)\}"), r"^\1"),
+    _FRACTION,
     (re.compile(r"\\(?:mathrm|text|textrm|operatorname)\s*(?:\{([^{}]*)\}|(\w))"), r" \1\2"),
     (re.compile(r"\^?\{?\\(?:circ|degree)\}?"), "°"),
     (re.compile(r"(?:°|\b(?:degrees?|deg|Grad)\b)\s*([CF])(?:elsius|ahrenheit)?\b"), r"°\1"),
@@ -44,11 +56,19 @@ _TEX_SIGNS = (
     (re.compile(r"\\cdot"), "·"),
     (re.compile(r"\\mu\s*"), "µ"),
     (re.compile(r"\\Omega"), "Ω"),
-    (re.compile(r"\\[td]?frac\{([^{}]*)\}\{([^{}]*)\}"), r"(\1)/(\2)"),
+    _FRACTION,
     (re.compile(r"\\%"), "%"),
     (re.compile(r"\\[,;:! ]|[~$]"), " "),
+    (re.compile(r"\(\s+"), "("),
 )
 _BRACKET = re.compile(r"(?P<before>.?)[(\[](?P<unit>(?:[^()\[\]]|\([^()]*\))*)[)\]]\s*\Z")
+_BRACKET_WITH_WORDS = re.compile(
+    r"\A[^()\[\]\s]*?(?P<before>.?)[(\[](?P<unit>(?!min,)[^()\[\],]+)"
+    r"(?:, [^\W\d_][^()\[\]]{2,}[)\]]|[)\]],? [^\W\d_][^()\[\]]*)\Z"
+)
+"""`E (J, in total)`, `E [J] of the ball`."""
+_BEHIND_COMMA = re.compile(r"[^\W\d_]{2}|.*[/^²³°A-Z].*|[a-z]+s")
+"""What is a unit behind a comma, as in `duration, ms`; another word may be one as well."""
 _SOLIDUS = re.compile(r"\s*/\s*(?P<unit>[^/=:]+)\Z")
 _IN_WORDS = re.compile(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
 _SYMBOL = re.compile(r"\w{1,2}|\\[a-z]+")
@@ -81,7 +101,7 @@ NO_UNIT = UnitText()
 def read_unit(text: str) -> UnitText:
     """The unit that a whole text is, with all its readings."""
     text = plain_unit(text)
-    readings = [*find_units(text)] if text else []
+    readings = [*find_units(text)] if text.strip("()1 ") else []
     for reading in _SECOND_READINGS.get(NAMES.get(text, text), ()):
         readings += find_units(reading)
     return UnitText(text, tuple(readings))
@@ -116,13 +136,13 @@ def is_same_unit(left: UnitText, right: UnitText) -> bool:
 def printed_unit(line: str, start: int, end: int) -> UnitText:
     """The unit of the number at `line[start:end]` in what a program printed, in its own line.
 
-    It stands behind the number, or in the label before it, or before the list that it stands in.
+    It stands behind the number or its list, or in the label before it.
     """
-    if unit := unit_behind(line, end, has_names=line[:1].isalpha()):
-        return unit
-    before = line[:start][-_REACH:]
-    gap = _TO_NUMBER.search(before)
-    return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
+    rest_of_list = _REST_OF_LIST.match(line, end)
+    bracket = max(line.rfind(sign, 0, start) for sign in "([")
+    if rest_of_list is not None and bracket >= 0 and {*line[bracket:start]} <= _BEGIN_OF_LIST:
+        end = rest_of_list.end()  # `(83.4, 85.0) m`
+    return unit_behind(line, end, has_names=line[:1].isalpha()) or unit_of_label(line[:start])
 
 
 def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
@@ -130,10 +150,15 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
 
     `has_names`: names may stand before the numbers of the text, as in `l 2.0 T 2.8`.
     """
-    if _GAP.match(text, at):
-        return NO_UNIT  # the next column
+    if column := _NEXT_COLUMN.match(text, at):  # the last one may be that of units
+        unit = read_unit(text[column.end() : at + _REACH])
+        return unit if unit and len(unit.text) > 1 and not is_name(unit.text) else NO_UNIT
+    if spread := _SPREAD.match(text, at):
+        at = spread.end()
     rest = _UPRIGHT.sub(lambda match: plain_unit(match[1]), text[at : at + _REACH])
-    phrase = _GAP.split(rest.replace("&nbsp;", " ").lstrip("*_ \n"))[0]
+    rest = re.sub(r"\A-(?=[^\W\d_])|&nbsp;|\\(?= )", " ", rest)  # `a 2-kg ball`
+    phrase = _GAP.split(rest.lstrip("*_` \n"))[0]
+    phrase = re.sub(r"\A\[([^\[\]]*)\]", r"(\1)", phrase)
     words = phrase.split()[: _LONGEST_PRODUCT + 1]
     unit = NO_UNIT
     for count, word in enumerate(words[:_LONGEST_PRODUCT], 1):
@@ -148,7 +173,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
         if has_names or count > 1:
             is_certain &= re.match(r"[\d.+−-]", follows) is None
         if longer and not unit:
-            is_word = is_name(bare) and (follows.strip("|") != "" or _has_maximum(text))
+            is_word = is_name(bare) and follows.strip("|") != ""
+            is_word |= bare in ("d", "min") and _has_maximum(text)
             if is_word or not is_certain or bare in _MAGNITUDES:
                 return NO_UNIT
             unit = longer
@@ -160,7 +186,7 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
             unit = longer
         elif longer:
             unit = longer
-        if not longer and not is_open and words[count - 2 : count - 1] == ["per"]:
+        if not longer and not is_open and words[count - 2] in PER:
             return NO_UNIT  # `degrees per step`
         if bare != product or not (longer or is_open):
             break
@@ -196,9 +222,9 @@ def numbers_of_quantities(text: str, numbers: Iterable[Number]) -> tuple[Number,
 def unit_of_header(text: str) -> UnitText:
     """The unit in a label or the header of a column: `τ (min)`, `v [m/s]`, `t / s`, `time in s`."""
     text = plain_unit(text[-2 * _REACH :])
-    bracket = _BRACKET.search(text)
+    bracket = _BRACKET_WITH_WORDS.search(text) or _BRACKET.search(text)
     if bracket is not None:
-        unit = read_unit(bracket["unit"])
+        unit = read_unit(bracket["unit"].rstrip("."))
         is_letter = len(unit.text) == 1
         is_index = bracket["before"].strip() != "" and is_letter
         is_round = text.rstrip().endswith(")")
@@ -206,6 +232,11 @@ def unit_of_header(text: str) -> UnitText:
             return NO_UNIT  # `x(t)`, `y[m]` and `error (h)`
         return NO_UNIT if unit.text == "min" and _has_maximum(text) else unit
     in_words, quotient = _IN_WORDS.search(text), _SOLIDUS.search(text)
+    *before, last = text.split() or [""]
+    if before and (_BEHIND_COMMA.fullmatch(last) if before[-1][-1] == "," else "/" in last[1:]):
+        unit = read_unit(last)  # `speed km/h`, but not `at 200 rad/s`
+        if unit and before[0][0].isalpha() and not only_number(before[-1]):
+            return NO_UNIT if all(map(is_name, unit.text.split("/"))) else unit
     if in_words is not None:
         unit = read_unit(in_words["unit"])  # `F in N`, but not `change in V`
         is_certain = len(unit.text) > 1 or _SYMBOL.fullmatch(in_words["symbol"]) is not None
@@ -215,7 +246,15 @@ def unit_of_header(text: str) -> UnitText:
         is_certain = not is_unit_itself and unit.text not in _SECOND_READINGS
     else:
         return NO_UNIT
-    return unit if is_certain and not is_name(unit.text) else NO_UNIT
+    is_certain &= not is_name(unit.text) and not (unit.text == "min" and _has_maximum(text))
+    return unit if is_certain else NO_UNIT
+
+
+def unit_of_label(before: str) -> UnitText:
+    """The unit in the label that ends right before a number, or the list that it stands in."""
+    before = before[-_REACH:]
+    gap = _TO_NUMBER.search(before)
+    return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
 
 
 def unit_of_printed(line: str, number: Number, above: Sequence[str]) -> UnitText:

@@ -1,16 +1,13 @@
 """Units: one closed table, and the grammar in which they are written: `kg m²`, `N*m/rad`, `mm`.
 
-The table grows by cases: with all units that there are, `link`, `hand` and `pole` would be some.
-Sizes are exact, as defined by the SI Brochure (2019), NIST SP 811 (2008) and the IAU (2012, 2015);
-that of `u` is measured, and given as CODATA published it in 2022, 2018 and 2014. A unit with
-several sizes is read as any of these: a calorie is thermochemical or of the steam tables, a
-revolution a cycle or an angle.
+What there are is in `unit_table`. A unit with several sizes is read as any of these.
 """
 
 from __future__ import annotations
 
 import functools
 import re
+import unicodedata
 from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from itertools import product
@@ -22,6 +19,7 @@ from msgspec.structs import replace
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt
+from coursebuild.core.text.unit_table import NAMES, UNITS
 
 Dimension: TypeAlias = tuple[tuple[str, Fraction], ...]
 """Powers of base quantities, as of length and time, in the order of their names."""
@@ -49,120 +47,9 @@ _PREFIXES = {
 _PREFIX_NAMES = {
     **{"kilo": "k", "milli": "m", "micro": "µ", "mega": "M", "centi": "c", "giga": "G"},
     **{"nano": "n", "hecto": "h", "deci": "d", "pico": "p", "mikro": "µ", "zenti": "c"},
+    **{"tera": "T", "mili": "m"},
 }
 _BINARY_PREFIXES = {f"{letter}i": 2 ** (10 * n) for n, letter in enumerate("KMGTPE", 1)}
-
-_TABLE = """
-m* 1 m meter metre meters metres Meter Metern
-g* 1e-3 kg gram grams gramme grammes Gramm
-s* 1 s sec second seconds Sekunde Sekunden
-A*! 1 A ampere amperes Ampere
-K* 1 K kelvin kelvins Kelvin
-mol* 1 mol mole moles Mol
-cd* 1 cd candela candelas
-rad* 1 rad radian radians Radiant
-sr* 1 rad^2 steradian
-Hz* 1 cycle/s hertz Hertz
-N* 1 kg*m/s^2 newton newtons Newton
-Pa* 1 N/m^2 pascal pascals Pascal
-J* 1 N*m joule joules Joule
-W* 1 J/s watt watts Watt
-C*! 1 A*s coulomb coulombs Coulomb
-V* 1 W/A volt volts Volt
-F*! 1 C/V farad farads
-Ω* 1 V/A ohms Ohm
-ohm* 1 V/A
-S*! 1 A/V siemens
-Wb* 1 V*s weber
-T*! 1 Wb/m^2 tesla teslas Tesla
-H*! 1 Wb/A henry henries
-lm* 1 cd*sr lumen
-lx* 1 lm/m^2 lux
-Bq* 1 1/s becquerel
-Gy* 1 J/kg gray
-Sv* 1 J/kg sievert
-kat* 1 mol/s katal
-Nm* 1 N*m
-VA* 1 W
-Ws* 1 J
-Wh* 3600 J
-Ah* 3600 C
-min! 60 s minute minutes Minute Minuten
-h! 3600 s hour hours hr hrs Stunde Stunden
-d! 86400 s day days Tag Tage Tagen
-week? 604800 s weeks
-a*? 31557600,31536000,31556952 s
-yr 31557600,31536000,31556952 s year years Jahr Jahre Jahren
-t*! 1e3 kg tonne tonnes Tonne Tonnen
-L*! 1e-3 m^3 litre litres liter liters Liter Litern
-l*! 1e-3 m^3
-ha 1e4 m^2 hectare hectares Hektar
-au 149597870700 m AU
-ly 9460730472580800 m lightyear lightyears Lichtjahr Lichtjahre
-pc* 96939420213600000/π m parsec parsecs
-Å 1e-10 m angstrom ångström
-in? 0.0254 m inch inches
-ft 0.3048 m foot feet
-yd 0.9144 m yard yards
-mi 1609.344 m mile miles
-nmi 1852 m
-mph 1609.344 m/h
-kn 1852 m/h knot knots
-acre? 4046.8564224 m^2 acres
-gal? 3.785411784e-3,4.54609e-3 m^3 gallon gallons
-u? 1.66053906892e-27,1.66053906660e-27,1.660539040e-27 kg amu
-Da* 1.66053906892e-27,1.66053906660e-27,1.660539040e-27 kg dalton daltons
-lb 0.45359237 kg lbs pound pounds
-oz 0.028349523125,0.0311034768 kg ounce ounces
-dyn 1e-5 N
-kgf 9.80665 N kp
-lbf 4.4482216152605 N
-bar* 1e5 Pa bars
-atm 101325 Pa atmosphere atmospheres
-mmHg 133.322387415,101325/760 Pa
-Torr* 101325/760 Pa torr
-psi 4.4482216152605/0.00064516 Pa
-eV* 1.602176634e-19 J electronvolt electronvolts
-cal* 4.184,4.1868,4.1855 J calorie calories
-Cal 4184,4186.8,4185.5 J
-BTU 1055.05585262,1054.35 J Btu
-erg 1e-7 J
-hp 745.69987158227022,735.49875 W horsepower
-PS 735.49875 W
-°C 1@273.15 K degC celsius Celsius
-°F 5/9@459.67 K degF fahrenheit Fahrenheit
-° π/180 rad deg degree degrees Grad
-′ π/10800 rad arcmin
-″ π/648000 rad arcsec
-gon π/200 rad
-rev 1,2π cycle revolution revolutions Umdrehung Umdrehungen
-turn? 1,2π cycle turns
-rpm 1/60,π/30 cycle/s RPM
-G*! 1e-4 T gauss
-Gal* 1e-2 m/s^2
-P*! 0.1 Pa*s poise
-St* 1e-4 m^2/s stokes
-M*! 1e3 mol/m^3
-Ci* 3.7e10 Bq curie
-% 1e-2 1 percent Prozent
-‰ 1e-3 1
-ppm 1e-6 1
-ppb 1e-9 1
-bit* 1 bit bits
-B*! 8 bit byte bytes
-Bd* 1 1/s
-fps 1 1/s
-px 1 px pixel pixels
-pt! 0.0254/72 m
-dB ? 1 decibel
-Np ? 1
-"""
-"""Symbol, with marks; sizes in the third column's unit; names.
-
-A star: it takes prefixes. `!`: it is a name as often, as in `T = 2` and `0.2 min, 0.9 max`; `?`: a
-word as often. After an `@` stands where a scale begins: 0 °C are 273.15 of its degrees above
-absolute zero. The levels of a logarithmic scale have no size.
-"""
 
 COMMON = tuple(
     """
@@ -182,11 +69,25 @@ _POWER = (
 _GAP = "[ \u00a0\u202f]"
 _TOKEN = (
     rf"(?P<word>{_WORD})(?P<power>{_POWER})?|(?P<one>1)(?![\d.])|(?P<open>\()"
-    rf"|(?P<close>\))(?P<group_power>{_POWER})?|(?P<sign>{_GAP}*[·⋅*×/.]{_GAP}*|{_GAP}+)"
+    rf"|(?P<close>\))(?P<group_power>{_POWER})?|(?P<sign>{_GAP}*[·⋅*×/.]{_GAP}*|-(?=[^\W\d_])|{_GAP}+)"
 )
 """Compiled when it is needed, as few pages do: it takes longer than the table."""
-_TWO_UNITS = rf"(?<![^\W\d_])m([^\W\d_m])(?={_POWER})"
-_PER = re.compile(r"\s+per\s+")
+_TWO_UNITS = (
+    rf"(?<![^\W\d_])(?:m(?=[^\W\d_m]{_POWER})"
+    rf"|(?:kg|[kMGmµμunp]?(?:Pa|[NWVAJ]))(?=(?:[mc]?m|s|h|K|A)(?![^\W\d_])))"
+    rf"|(?<=[^\W\d_]){_POWER}(?=[^\W\d_])"
+)
+"""After what a space may be missing: `ms⁻¹`, `kgm²`, `mPas`, `W/m2K`."""
+PER = ("per", "pro", "par", "por")
+_WORDS = (
+    (re.compile(rf"\s+(?:{'|'.join(PER)})\s+(?!cent\b)"), "/"),
+    (re.compile(r"(?:per|pour|por) ?cent\b|por ciento\b"), "%"),
+    (re.compile(r"\b(?:square|sq\.?) ([^\W\d_]+)|\bQuadrat([^\W\d_]+)"), r"\1\2^2"),
+    (re.compile(r"\b(?:cubic|cu\.?) ([^\W\d_]+)|\bKubik([^\W\d_]+)"), r"\1\2^3"),
+    (re.compile(r"(?<=[^\W\d_]) (?:squared|carrés?|cuadrados?)\b"), "^2"),
+    (re.compile(r"(?<=[^\W\d_]) (?:cubed|cubes?|cúbicos?)\b"), "^3"),
+)
+"""How units are written in words."""
 _LONGEST = 100
 
 
@@ -246,28 +147,6 @@ def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Di
     return tuple(sorted((name, power) for name, power in powers.items() if power))
 
 
-class UnitRow(Struct, frozen=True):
-    """A row of the table."""
-
-    sizes: tuple[str, ...]
-    base: str
-    marks: str
-
-
-def _read_table() -> tuple[dict[str, UnitRow], dict[str, str]]:
-    rows: dict[str, UnitRow] = {}
-    names: dict[str, str] = {}
-    for line in _TABLE.strip().splitlines():
-        symbol, sizes, base, *other_names = line.split()
-        bare = symbol.rstrip("*!?")
-        rows[bare] = UnitRow(tuple(sizes.split(",")), base, symbol.removeprefix(bare))
-        names.update(dict.fromkeys(other_names, bare))
-    return rows, names
-
-
-UNITS, NAMES = _read_table()
-
-
 @functools.lru_cache(maxsize=512)
 def find_units(text: str) -> tuple[Unit, ...]:
     """The units that a text such as `N m/rad` may be, an empty one being 1; none for another text.
@@ -275,17 +154,24 @@ def find_units(text: str) -> tuple[Unit, ...]:
     Of `J/kg K` one may divide by all that follows the solidus, or by the first factor; `ms⁻¹` is
     of milliseconds, or metres per second.
     """
-    source = _PER.sub("/", text.strip())
+    source = _with_signs(text.strip())
     if not source:
         return (ONE,)
     if len(source) > _LONGEST:
         return ()
-    readings = _parse(source)
-    if re.search(r"/[^()/]*[ ·⋅*.]", source):
-        readings += _parse(source, is_wide=True)
-    if re.search(_TWO_UNITS, source):
-        readings += _parse(re.sub(_TWO_UNITS, r"m \1", source))
+    readings: tuple[Unit, ...] = ()
+    for spaced in dict.fromkeys((source, re.sub(_TWO_UNITS, r"\g<0> ", source))):
+        readings += _parse(spaced)
+        if re.search(r"/[^()/]*[ ·⋅*.-]", spaced):
+            readings += _parse(spaced, is_wide=True)
     return tuple(dict.fromkeys(readings))
+
+
+def _with_signs(text: str) -> str:
+    """A unit with signs and powers for words: `metres per second squared` is `metres/second^2`."""
+    for pattern, sign in _WORDS:
+        text = pattern.sub(sign, text)
+    return text
 
 
 def find_unit(text: str) -> Unit | None:
@@ -352,6 +238,9 @@ def _exponent(text: str | None) -> Fraction | None:
 def find_symbol(word: str) -> tuple[Unit, ...]:
     """The units that a word of letters may be, with or without a prefix."""
     word = re.sub(r"\s", "", word).replace("\u2126", "Ω").replace("\u212b", "Å")
+    if len(word) > 2 and word not in NAMES:  # `mètres`, `días`
+        word = re.sub("[\u0300\u0301]", "", unicodedata.normalize("NFD", word))
+        word = unicodedata.normalize("NFC", word)
     symbol = NAMES.get(word, word)
     if symbol in UNITS:
         row = UNITS[symbol]
@@ -359,8 +248,10 @@ def find_symbol(word: str) -> tuple[Unit, ...]:
     if symbol in _BASES:
         return (_base_unit(symbol),)
     for name, prefix in _PREFIX_NAMES.items():
-        if word.lower().startswith(name) and word[len(name) :] in NAMES:
-            return find_symbol(prefix + NAMES[word[len(name) :]])
+        rest = word[len(name) :]
+        rest = NAMES.get(rest, NAMES.get(rest.capitalize(), rest))
+        if word.lower().startswith(name) and rest in UNITS:
+            return find_symbol(prefix + rest)
     if len(word) > 2 and word[:2] in _BINARY_PREFIXES and word[2:] in ("B", "bit"):
         (unit,) = find_symbol(word[2:])
         return (replace(unit, size=unit.size * _BINARY_PREFIXES[word[:2]]),)
@@ -404,7 +295,7 @@ def is_name(word: str) -> bool:
 
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
     """Yield what is wrong with a unit, which may be empty."""
-    text = _PER.sub("/", " ".join(unit.text.split()))
+    text = _with_signs(" ".join(unit.text.split()))
     if len(text) > _LONGEST or not _parse(text or "1", find=lambda word: (ONE,)):
         message = f"`{text}` cannot be read as a unit"
         help = "write it as in `kg m^2`, `m/s²` or `N m/rad`"
@@ -412,7 +303,7 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
         return
     for match in re.finditer(_WORD, unit.text):
         word = match[0]
-        if find_symbol(word) or {word, NAMES.get(word)} & {*UNITS, "per"}:
+        if find_symbol(word) or {word, NAMES.get(word)} & {*UNITS, *PER}:
             continue
         units = (unit for unit in COMMON if unit.casefold() == word.casefold())
         pairs = ((first, word.removeprefix(first)) for first in _PRODUCT_UNITS)

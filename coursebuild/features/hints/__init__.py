@@ -127,8 +127,8 @@ def _source_text(inlines: Iterable[model.Inline]) -> tuple[str, list[tuple[int, 
 # --- degrees or radians
 
 _ANGLES = re.compile(r"<(joint|body|geom|site|camera|frame)\b([^<>]*)>")
-_VALUES = re.compile(r'\b(range|ref|springref|euler)\s*=\s*"([^"]*)"')
-_SLIDES = re.compile(r'\btype\s*=\s*"(?:slide|free|ball)"')
+_VALUES = re.compile(r'\b(range|ref|springref|euler|axisangle)\s*=\s*"([^"]*)"')
+_SLIDES = re.compile(r'\btype\s*=\s*"(?:slide|free)"')
 _COMPILER = re.compile(r'<compiler\b[^<>]*\bangle\s*=\s*"(degree|radian)"')
 
 
@@ -145,12 +145,13 @@ def odd_angles(course: Course, documents: Collection[Document]) -> Iterator[Diag
         unit = "degree" if compiler is None else compiler[1]
         for element in _ANGLES.finditer(text):
             for values in _VALUES.finditer(text, element.start(2), element.end(2)):
-                number = next((n for n in values[2].split() if _is_odd(n, unit)), None)
-                of_joint = element[1] == "joint"
-                is_angle = not _SLIDES.search(element[2]) if of_joint else values[1] == "euler"
+                turns = values[1] in ("euler", "axisangle")
+                numbers = values[2].split()[3 if values[1] == "axisangle" else 0 :]
+                number = next((n for n in numbers if _is_odd(n, unit)), None)
+                is_angle = turns or (element[1] == "joint" and not _SLIDES.search(element[2]))
                 if number is None or not is_angle:
                     continue
-                start = place.start + values.start(2) + values[2].index(number)
+                start = place.start + values.start(2) + values[2].rindex(number)
                 span = Span(place.source, start, start + len(number))
                 likely = "radians" if unit == "degree" else "degrees"
                 message = f"`{number}` has the look of {likely}, and this model reads {unit}s"
@@ -163,10 +164,12 @@ def _is_odd(number: str, unit: str) -> bool:
     """Whether a number is likely no angle in a unit: a multiple of pi/12, or whole degrees."""
     if unit == "radian":
         return re.fullmatch(r"[-+]?\d*[1-9]\d*0|[-+]?\d*[1-9]5", number) is not None
-    if not re.fullmatch(r"[-+]?\d*\.\d{4,}", number):
+    decimals = len(number.partition(".")[2])
+    if not re.fullmatch(r"[-+]?\d*\.\d{2,}", number):
         return False
-    parts = float(number) / (math.pi / 12)
-    return round(parts) != 0 and abs(parts - round(parts)) < 4e-4
+    step = math.pi / (12 if decimals > 3 else 2)  # 1.57 and 3.14, but not 0.79
+    parts = float(number) / step
+    return round(parts) != 0 and abs(parts - round(parts)) * step < max(10.0**-decimals / 2, 1e-4)
 
 
 FEATURE = Feature(

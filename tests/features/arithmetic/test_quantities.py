@@ -88,7 +88,8 @@ def test_any_text_can_be_read_for_units(text: str) -> None:
 
 
 def test_each_sentence_has_its_verdict() -> None:
-    words = {"en": ENGLISH, "de": words_for(read_assets().templates, "de")}
+    templates = read_assets().templates
+    words = {"en": ENGLISH, **{name: words_for(templates, name) for name in ("de", "es", "fr")}}
     offenders = [
         f"{verdict}, not {expected}: {printed} => {text}"
         for language, expected, printed, text in sentences()
