@@ -436,17 +436,12 @@ class _Loader:
         return tuple(path for path in self.files.files if path not in excluded)
 
     def _picture_sizes(self, course: Course, files: tuple[str, ...]) -> dict[str, tuple[int, int]]:
-        paths = {
-            local_file(image.url, document.source.path)
-            for document in course.documents
-            for image in find_inlines(document, Image)
-        }
+        images = ((i.url, d.source.path) for d in course.documents for i in find_inlines(d, Image))
         sizes: dict[str, tuple[int, int]] = {}
-        for path in sorted(paths & {*files}):
+        for path in sorted({local_file(*image) for image in images} & {*files}):
             with contextlib.suppress(EffectError):  # it is told where the file is copied
-                sides = picture_size(read_bytes(self.root, path))
-                if sides is not None:
-                    sizes[path] = max(1, round(sides[0])), max(1, round(sides[1]))
+                if (size := picture_size(read_bytes(self.root, path))) is not None:
+                    sizes[path] = size
         return sizes
 
 

@@ -3,7 +3,8 @@
  */
 
 import loadMujoco from '@mujoco/mujoco'
-import { judgeHere } from './exercise/worker.js'
+import { confine } from './exercise/attempt.js'
+import { judge } from './exercise/judge.js'
 import { Host } from './lab/worker/host.js'
 import { createLater } from './lab/worker/later.js'
 
@@ -31,4 +32,32 @@ async function get(url) {
   return response
 }
 
-self.onmessage = ({ data }) => void (data.type === 'judge' ? judgeHere(host, data) : host.receive(data))
+/**
+ * Judge an attempt in a worker that the page has started for it, which the page ends if it takes too long.
+ *
+ * To the worker: judge {config, module, mjb, wasm}; the last three are absolute addresses. To the page:
+ *
+ *   judging                                the engine has started
+ *   verdict {index, passed, seen, failure} of a trial, in their order (see judge.js)
+ *   judged                                 it was the last one
+ *   refused {message}                      nothing can be tried
+ *
+ * @param {Record<string, any>} message
+ */
+async function judgeHere({ config, module, mjb, wasm }) {
+  const { post, fetchBytes, importModule } = host.services
+  const tell = (type, rest = {}) => post({ type, ...rest }, [])
+  try {
+    const model = config.exercise.subject === 'model' ? null : fetchBytes(mjb)
+    const [engine, code, bytes] = await Promise.all([host.start(wasm), importModule(module), model])
+    confine()
+    tell('judging')
+    let index = 0
+    for (const verdict of judge(engine, config, code, bytes)) tell('verdict', { index: index++, ...verdict })
+    tell('judged')
+  } catch (error) {
+    tell('refused', { message: error.message ?? String(error) })
+  }
+}
+
+self.onmessage = ({ data }) => void (data.type === 'judge' ? judgeHere(data) : host.receive(data))

@@ -5,14 +5,12 @@
  * still as the server sent it.
  */
 
+import { holdPlace } from './page/place.js'
 import { connect } from './preview/connection.js'
-import { needsLoad, takeHead } from './preview/head.js'
 import { Marks } from './preview/marks.js'
 import { Panel } from './preview/panel.js'
-import { holdPlace } from './preview/place.js'
 import { setClock } from './preview/times.js'
 import { Twin } from './preview/twin.js'
-import { dismissWorkers } from './preview/workers.js'
 import { say } from './progress/words.js'
 
 const script = document.currentScript
@@ -20,6 +18,8 @@ const page = script.dataset.page
 const texts = JSON.parse(script.dataset.words)
 const sayHere = (key, values) => say((name) => texts[name] ?? name, `preview.${key}`, values)
 const parse = (text) => new DOMParser().parseFromString(text, 'text/html')
+const scripts = (page) => [...page.querySelectorAll('head script[src]')].map((script) => script.getAttribute('src')).join('\n')
+const sheet = (page) => page.querySelector('head link[rel="stylesheet"]')
 const stateOf = (next) => next.querySelector('script[data-state]')?.dataset.state ?? ''
 
 let state = script.dataset.state // of the page on screen
@@ -73,6 +73,48 @@ async function ask(command, values) {
   } catch {
     return sayHere('silent')
   }
+}
+
+/** Whether the page must be loaded as a whole. */
+function needsLoad(old, next) {
+  return scripts(old) !== scripts(next)
+}
+
+/** Take over a new page's title, language and style sheet. Its scripts cannot be taken over. */
+function takeHead(next) {
+  document.title = next.title
+  document.documentElement.lang = next.documentElement.lang
+  takeSheet(sheet(next)?.getAttribute('href'))
+}
+
+/** Replace the style sheet once the new one and its fonts are loaded, so that nothing flashes. */
+async function takeSheet(address) {
+  const old = sheet(document)
+  if (!address || !old || old.dataset.next === address) return
+  if (!old.dataset.next && old.getAttribute('href') === address) return
+  old.dataset.next = address
+  await loadFonts(new URL(address, document.baseURI)).catch(() => {})
+  if (old.dataset.next !== address) return // there is a newer one
+  const fresh = document.createElement('link')
+  fresh.rel = 'stylesheet'
+  fresh.href = address
+  fresh.addEventListener('load', () => old.remove())
+  fresh.addEventListener('error', () => fresh.remove())
+  old.after(fresh)
+}
+
+async function loadFonts(address) {
+  const text = await (await fetch(address)).text()
+  const fonts = [...text.matchAll(/url\(["']?([^"')]+\.woff2)["']?\)/g)].map(([, file]) => new URL(file, address))
+  await Promise.all(fonts.map(async (font) => (await fetch(font)).arrayBuffer()))
+}
+
+/** Unregister service workers that a published site left at this address, so that they do not answer for the preview. */
+async function dismissWorkers(navigator) {
+  const registrations = (await navigator.serviceWorker?.getRegistrations()) ?? []
+  const scripts = (registration) => [registration.active, registration.waiting, registration.installing].filter(Boolean)
+  const isSiteWorker = (registration) => scripts(registration).some(({ scriptURL }) => new URL(scriptURL).pathname.endsWith('/service-worker.js'))
+  await Promise.all(registrations.filter(isSiteWorker).map((registration) => registration.unregister()))
 }
 
 dismissWorkers(navigator).catch(() => {}) // a browser may hide them from pages

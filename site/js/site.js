@@ -16,7 +16,7 @@ import { unfoldLinked } from './page/unfold.js'
 import { showVersions } from './page/versions.js'
 import { readWords } from './page/words.js'
 import { showProgress } from './progress/index.js'
-import { rekeyAnswers } from './progress/rekey.js'
+import { rekeyAnswers } from './progress/match.js'
 import { openProgress } from './progress/store.js'
 
 let table = readWords(document)

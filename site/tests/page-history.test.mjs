@@ -2,7 +2,7 @@
 
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
-import { curvesText } from '../js/lab/page/csv.js'
+import { curvesText } from '../js/lab/page/export.js'
 import { History } from '../js/lab/page/history.js'
 
 const filled = (history, count, dt = 0.01) => {

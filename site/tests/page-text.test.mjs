@@ -17,7 +17,7 @@ import {
   withUnit,
 } from '../js/lab/page/numbers.js'
 import { LONGEST, readLink, writeLink } from '../js/lab/page/share.js'
-import { spread } from '../js/lab/page/spread.js'
+import { spread } from '../js/lab/page/span.js'
 import { fill } from '../js/lab/page/words.js'
 
 test('numbers keep their width when the sign changes, and zero has none', () => {

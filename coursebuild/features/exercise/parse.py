@@ -144,16 +144,18 @@ def _lab(subject: Subject, node: ObjectNode, fields: ExerciseFile) -> Lab:
     ]
     places += [((name,), node.place(name)) for name in ("model", "key") if name in node.members]
     buttons: list[Button] = []
+    readouts: list[Readout] = []
     for i, (trial_node, trial) in enumerate(zip(trials, fields.trials, strict=True)):
         expr: Entry = ("readouts", i, "expr")
         code.append((expr, _text(trial_node, "expr")))
         places.append((expr, trial_node.place("expr")))
+        unit = f" ({trial.unit})" if trial.unit else ""
+        readouts.append(Readout(f"{trial.name}{unit}", trial.expr, trial.digits))
         if trial.setup:
             run: Entry = ("controls", len(buttons), "run")
             code.append((run, _text(trial_node, "setup")))
             places.append((run, trial_node.place("setup")))
             buttons.append(Button(trial.name, trial.setup))
-    readouts = tuple(Readout(trial.name, trial.expr, trial.digits) for trial in fields.trials)
     return Lab(
         span=solution.span(),
         kind=SIMLAB,
@@ -170,7 +172,7 @@ def _lab(subject: Subject, node: ObjectNode, fields: ExerciseFile) -> Lab:
             setup=setup,
             controller=controller,
             controls=tuple(buttons),
-            readouts=readouts,
+            readouts=tuple(readouts),
             plots=fields.plots,
         ),
         xml=solution if subject == MODEL else None,

@@ -32,9 +32,7 @@ export function loadLabs(part, words, progress) {
   }
   const observer = new IntersectionObserver(
     (entries) => entries.filter((entry) => entry.isIntersecting).forEach(({ target }) => start(target)),
-    {
-      rootMargin: NEAR,
-    },
+    { rootMargin: NEAR },
   )
   // The page's own files come first.
   const watch = () => labs.forEach((lab) => observer.observe(lab))

@@ -4,7 +4,7 @@
  *   mountQuizzes(part, words, progress)    called for new parts of the page
  *   leaveQuizzes(part)                     called for removed parts
  *
- * Answers to questions whose text has changed were moved to their new keys before (progress/rekey.js). After every change of an answer
+ * Answers to questions whose text has changed were moved to their new keys before (progress/match.js). After every change of an answer
  * the event `coursebuild:answered` bubbles from the question; its detail is `{ quiz, key, answer }`.
  */
 

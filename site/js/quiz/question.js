@@ -12,8 +12,7 @@
  */
 
 import { Choices } from './choices.js'
-import { Numeric, Output } from './entries.js'
-import { Open } from './open.js'
+import { Numeric, Open, Output } from './entries.js'
 import { Ordering } from './ordering.js'
 import { button, fill, h, setHidden, shape } from './parts.js'
 

@@ -5,8 +5,7 @@
 
 import { h } from './dom.js'
 import { formatLabel } from './numbers.js'
-import { spanOf } from './span.js'
-import { spread } from './spread.js'
+import { spanOf, spread } from './span.js'
 
 const SVG = 'http://www.w3.org/2000/svg'
 const DASHES = ['', '6 3', '2 3', '8 3 2 3', '1 4']

@@ -1,11 +1,27 @@
+/** What a lab hands over: its script, and its curves. */
+
 /**
  * "Export as Python": the script that the build wrote, with the present values of the controls.
  *
  * The config's `exportPython` is `{name, text}`; `{{control:N}}` in the text stands for the value of control N, a number or a
  * string, which Python writes as JSON does.
  */
-
-/** The text of the script. */
 export function fillScript(text, values) {
   return text.replace(/\{\{control:(\d+)\}\}/g, (_, index) => JSON.stringify(values[Number(index)]))
 }
+
+/**
+ * The curves of a lab as a table, comma-separated as RFC 4180 says.
+ *
+ * @param {{ylabel: string, labels: string[], columns: Float64Array[]}[]} curves of each plot: what its axis says, the names of its lines,
+ *   and its samples: the same times in all, then one column for each line, NaN for a gap
+ * @returns {string} a header, then one row for each time
+ */
+export function curvesText(curves) {
+  const names = curves.flatMap(({ ylabel, labels }) => labels.map((label) => (ylabel && ylabel !== label ? `${label}: ${ylabel}` : label)))
+  const columns = [curves[0].columns[0], ...curves.flatMap((curve) => curve.columns.slice(1))]
+  const rows = Array.from(columns[0], (_, i) => columns.map((column) => (Number.isFinite(column[i]) ? String(column[i]) : '')))
+  return [['time (s)', ...names].map(quoted), ...rows].map((row) => `${row.join(',')}\r\n`).join('')
+}
+
+const quoted = (text) => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text)

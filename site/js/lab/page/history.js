@@ -1,17 +1,17 @@
 /**
- * The samples of a plot in typed arrays: of a window of some seconds, or of the whole run.
+ * The samples of a plot in typed arrays, or the poses of a picture: of a window of some seconds, or of the whole run.
  *
- * With a window, samples that have left it are dropped. Without one, every second sample is dropped whenever there are more than a
- * plot can show. No DOM.
+ * With a window, samples that have left it are dropped. Without one, every second sample is dropped whenever there are too many. No DOM.
  */
 
 const MOST = 4000 // samples of a plot that shows all of its run
 
 export class History {
-  /** @param {number} traces how many values a sample has @param {number | null} window s; null: everything */
-  constructor(traces, window) {
+  /** @param {number} traces how many values a sample has @param {number | null} window s; null: everything @param {number} [most] samples without one */
+  constructor(traces, window, most = MOST) {
     this.window = window
-    this.columns = Array.from({ length: traces + 1 }, () => new Float64Array(1024))
+    this.most = most
+    this.columns = Array.from({ length: traces + 1 }, () => new Float64Array(Math.min(1024, most + 1)))
     this.clear()
   }
 
@@ -45,12 +45,13 @@ export class History {
     if (this.window !== null) {
       // One sample before the window stays, so that the line reaches its edge.
       while (this.start + 1 < this.end && this.columns[0][this.start + 1] < time - this.window) this.start += 1
-    } else if (this.length > MOST) this.thin()
+    } else if (this.length > this.most) this.thin()
   }
 
-  /** Drop the samples after a time (s). */
+  /** Drop the samples after a time (s); without any left, a new run begins. */
   cut(time) {
     while (this.end > this.start && this.columns[0][this.end - 1] > time) this.end -= 1
+    if (this.length === 0) this.clear()
   }
 
   makeRoom() {

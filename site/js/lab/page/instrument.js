@@ -8,9 +8,9 @@
  */
 
 import { buildControls, buildOverlays, buildReadouts, switchButton } from './controls.js'
-import { curvesText } from './csv.js'
 import { download, h, icon, textButton } from './dom.js'
-import { fillScript } from './export.js'
+import { curvesText, fillScript } from './export.js'
+import { History } from './history.js'
 import { formatReadout, formatTime } from './numbers.js'
 import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
@@ -19,14 +19,15 @@ import { writeLog } from './share.js'
 import { Shell } from './shell.js'
 import { Simulation } from './simulation.js'
 import { prefersStillness } from './support.js'
-import { buildTape } from './tape.js'
-import { buildTransport } from './transport.js'
+import { buildTape, buildTransport } from './transport.js'
 import { View } from './view.js'
+import { ROW } from './world.js'
 
 const TEXT_EVERY = 90 // ms; nobody reads numbers faster
 const PLOT_EVERY = 30
 const SETTLE_TIME = 400 // ms, after which the last picture of a paused lab has arrived
 const HEIGHT = 300 // CSS pixels, of a view that is 480 wide
+const MOST_NUMBERS = 500_000 // in all poses of a run, 4 MB
 const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
 export class Instrument extends Shell {
@@ -42,6 +43,9 @@ export class Instrument extends Shell {
     this.playRequested = false
     this.hasStarted = false // whether it has played, or the reader has stepped
     this.pendingAction = null // to be done when the lab is ready
+    /** @type {History | null} the poses of the run, as its pictures showed them */
+    this.poses = null
+    this.keptPoses = null
     this.build()
     this.simulation = new Simulation({
       config: { ...config, autoplay: Boolean(config.autoplay) && !prefersStillness() },
@@ -129,12 +133,15 @@ export class Instrument extends Shell {
     )
   }
 
-  /** A button that keeps the curves of the run behind those of the next ones, and then one that drops them. */
+  /** A button that keeps the run, as a ghost in the picture and behind the curves of the next ones, and then one that drops it. */
   makeKeepButton() {
     let isKept = false
     const button = this.makeButton('keep', () => {
       isKept = !isKept
       button.textContent = this.words(isKept ? 'lab.live.drop' : 'lab.live.keep')
+      this.keptPoses = isKept && (this.poses?.length ?? 0) > 0 ? this.makePoses() : null
+      this.keptPoses?.refill(this.poses, -Infinity)
+      this.haunt()
       this.plots.forEach((plot) => {
         plot.keep(isKept)
         plot.draw(plot.now)
@@ -167,6 +174,7 @@ export class Instrument extends Shell {
   }
 
   onReady(values) {
+    this.poses = this.makePoses()
     this.update(values)
     const { pendingAction, playRequested: pressed } = this
     this.pendingAction = null
@@ -198,12 +206,27 @@ export class Instrument extends Shell {
     this.notices.say(this.words(`lab.live.${key}`, { t: `${formatTime(this.simulation.latest?.time ?? 0)} s` }))
   }
 
+  /** Room for the poses of a run; null without a picture. */
+  makePoses() {
+    const { world } = this.view
+    if (world === null) return null
+    const length = ROW * world.geoms.length
+    return new History(length, null, Math.ceil(MOST_NUMBERS / length))
+  }
+
+  /** Show where the kept run was at the time that is shown. */
+  haunt() {
+    this.view.ghost = this.keptPoses?.at(this.simulation.latest.time) ?? null
+    this.view.invalidate()
+  }
+
   collect({ times, values, from }, fresh) {
-    if (fresh || from < Infinity) this.panel.cut(fresh ? -Infinity : from)
-    for (const plot of this.plots) {
-      if (fresh) plot.clear()
-      else if (from < Infinity) plot.cut(from)
-    }
+    const end = fresh ? -Infinity : from
+    if (end < Infinity) for (const record of [this.poses, this.panel, ...this.plots]) record?.cut(end)
+    const { poses, view } = this
+    const { time } = this.simulation.latest
+    if (poses !== null && (poses.length === 0 || time > poses.last)) poses.push(time, view.world.pose(view.frame), 0)
+    this.haunt()
     const width = times.length > 0 ? values.length / times.length : 0
     let offset = 0
     for (const plot of this.plots) {

@@ -1,5 +1,6 @@
 /** Puts a live instrument in place of a lab's static form. */
 
+import { holdPlace } from '../../page/place.js'
 import { h } from './dom.js'
 import { readLink } from './share.js'
 import { fill } from './words.js'
@@ -22,7 +23,7 @@ export async function mount(element, texts, missing, make) {
     const response = await fetch(base)
     if (!response.ok) throw new Error(words('lab.live.not_found', { status: response.status }))
     const config = await response.json()
-    const keepPlace = holdPlace(element)
+    const keepPlace = holdPlace(lookedAt(element))
     const made = make(config, base, words)
     keepPlace()
     const instrument = await made
@@ -36,21 +37,15 @@ export async function mount(element, texts, missing, make) {
   }
 }
 
-/**
- * Notes where in the window something below a lab is: what the reader points at, has focused, or has in the middle.
- *
- * @returns {() => void} scrolls it back there after the lab has changed its height: not every browser does, and none for a pointer
- */
-function holdPlace(lab) {
-  const { scrollY, innerWidth, innerHeight } = window
-  const middle = scrollY > 0 ? document.elementFromPoint(innerWidth / 2, innerHeight / 2) : null
-  const place = (element) => element.getBoundingClientRect()
-  const isSeen = (element) => element && !element.contains(lab) && place(element).bottom > 0 && place(element).top < innerHeight
-  const held = [[...document.querySelectorAll(':hover')].at(-1), document.activeElement, middle].find(isSeen)
-  const isBelow = held && !lab.contains(held) && lab.compareDocumentPosition(held) & Node.DOCUMENT_POSITION_FOLLOWING
-  if (!isBelow) return () => {}
-  const { top } = place(held)
-  return () => window.scrollBy({ top: place(held).top - top, behavior: 'instant' })
+/** What the reader points at, has focused, or has in the middle of the window, if it is below a lab. @returns {Element[]} */
+function lookedAt(lab) {
+  const middle = document.elementFromPoint(window.innerWidth / 2, window.innerHeight / 2)
+  const isSeen = (element) => {
+    const { top, bottom } = element.getBoundingClientRect()
+    return bottom > 0 && top < window.innerHeight && !element.contains(lab)
+  }
+  const [seen] = [...[...document.querySelectorAll(':hover')].slice(-1), document.activeElement, middle].filter((element) => element && isSeen(element))
+  return seen && !lab.contains(seen) && lab.compareDocumentPosition(seen) & Node.DOCUMENT_POSITION_FOLLOWING ? [seen] : []
 }
 
 /** Move the keyboard focus from the static form, which is now hidden, into the instrument. */

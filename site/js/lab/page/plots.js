@@ -9,8 +9,7 @@ import { h } from './dom.js'
 import { History } from './history.js'
 import { formatLabel, formatTime, superscript } from './numbers.js'
 import { palette, watchTheme } from './palette.js'
-import { spanOf } from './span.js'
-import { spread } from './spread.js'
+import { spanOf, spread } from './span.js'
 
 const HEIGHT = 170 // CSS pixels where texts have their usual size
 const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3], [4, 4], [12, 3]]

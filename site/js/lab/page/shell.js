@@ -4,7 +4,7 @@ import { h, textButton } from './dom.js'
 import { GoalView } from './goal.js'
 import { Notices } from './notices.js'
 import { copyLink, writeLink } from './share.js'
-import { watchSight } from './sight.js'
+import { watchSight } from './support.js'
 
 /** Put a body before the static form of a lab, which is hidden as long as it is there. */
 export function insertBody(element, body) {

@@ -6,14 +6,16 @@
 
 import { PerspectiveCamera } from 'three'
 import { ModelCamera, OrbitCamera } from './camera.js'
-import { h } from './dom.js'
+import { h, outline } from './dom.js'
 import { channels, resolve, watchTheme } from './palette.js'
-import { ScaleBar } from './scale.js'
 import { stage } from './stage.js'
-import { STUDIO_LAYER } from './studio.js'
+import { STUDIO_LAYER, roundLength } from './studio.js'
 import { World, aim } from './world.js'
 
 const CAMERA = 13 // floats of a camera in a frame
+const LONGEST = 0.2 // of the view's width, for the scale bar
+const MARGIN = 10 // CSS pixels, around that bar
+const TICK = 5
 
 export class View {
   /**
@@ -38,6 +40,7 @@ export class View {
     this.world = null
     this.camera = null
     this.frame = null
+    this.ghost = null // another pose that is shown, see `World.pose`
     this.width = 0
     this.height = 0
     this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
@@ -108,7 +111,7 @@ export class View {
   prepare() {
     if (this.world === null || this.frame === null || this.width === 0 || this.height === 0) return false
     if (this.camera instanceof ModelCamera) this.camera.follow(this.frame)
-    this.world.update(this.frame, this.camera)
+    this.world.update(this.frame, this.camera, this.ghost)
     aim(this.lens, this.camera, this.world.description, this.width, this.height)
     this.world.edges.update(this.width, this.height)
     this.poster?.remove()
@@ -174,5 +177,30 @@ export class View {
     stage.remove(this)
     this.world?.dispose()
     this.world = null
+  }
+}
+
+/** A scale bar in the corner of a view: a round length at the distance of the camera's target. */
+class ScaleBar {
+  /** @param {(key: string, values?: Record<string, any>) => string} words */
+  constructor(words) {
+    this.words = words
+    this.svg = outline('')
+    this.length = h('span')
+    this.element = h('p', { class: 'lab-scale', role: 'img' }, this.svg, this.length)
+  }
+
+  /** Fit the bar to a view of `width` by `height` CSS pixels, of which a metre has `metre`. */
+  show(width, height, metre) {
+    const length = roundLength((LONGEST * width) / metre)
+    const path = `M${MARGIN} ${height - MARGIN - TICK}v${TICK}h${(length * metre).toFixed(1)}v${-TICK}`
+    if (path === this.path) return
+    this.path = path
+    this.svg.setAttribute('viewBox', `0 0 ${width} ${height}`)
+    this.svg.firstElementChild.setAttribute('d', path)
+    const text = `${Number(length.toPrecision(1))} m`
+    if (text === this.length.textContent) return
+    this.length.textContent = text
+    this.element.setAttribute('aria-label', this.words('lab.scale', { length: text }))
   }
 }

@@ -14,11 +14,12 @@ import { Edges, Floor } from './studio.js'
 import { Flex, Skin } from './surfaces.js'
 
 const SHOWN_GROUPS = 3 // groups 0, 1 and 2, as in MuJoCo's viewer
-const ROW = 19 // floats of a geom or site in a frame
+export const ROW = 19 // floats of a geom or site in a frame
 const SIZE = 12
 const COLOUR = 15
 const DECORATION = 24
 const IN_FRONT = -2 // see `arrows.js` of the core
+const PALE = 0.35 // opacity of a ghost
 const USUAL = 1.6 // width of a view over its height
 
 export class World {
@@ -41,6 +42,7 @@ export class World {
     this.pins = description.pins.map((pin) => new Pin(this.scene, this.materials, pin, description.camera.distance))
     this.trail = description.layout.longestTrail > 0 ? new Trail(this.scene, description.layout) : null
     this.decorations = new Map()
+    this.ghosts = [] // pale geoms of bodies that move, once a kept run is shown
     this.edges = new Edges()
     this.floor = this.makeFloor()
     this.mirror = this.makeMirror()
@@ -95,10 +97,33 @@ export class World {
     return this.hfields[id]
   }
 
-  /** Move everything to its place in a frame. */
-  update(frame, camera) {
+  /** The pose in a frame: its part that holds the geoms. */
+  pose(frame) {
+    const { layout, geoms } = this.description
+    return frame.subarray(layout.geoms, layout.geoms + ROW * geoms.length)
+  }
+
+  /** Show pale copies of what moves in another pose, or none. */
+  haunt(pose, sight) {
+    if (pose?.length !== ROW * this.geoms.length) return this.ghosts.forEach((ghost) => ghost?.show(false))
+    if (this.ghosts.length === 0) this.ghosts = this.geoms.map((solid, i) => (solid === null ? null : this.ghost(this.description.geoms[i])))
+    const pale = pose.map((x, i) => (i % ROW === ROW - 1 ? PALE * x : x))
+    this.place(this.ghosts, pale, 0, sight)
+  }
+
+  ghost(geom) {
+    if (!this.description.bodies[geom.body].movable) return null
+    const ghost = this.solid(geom)
+    for (const mesh of ghost.meshes) mesh.castShadow = mesh.receiveShadow = false
+    Object.assign(ghost.material, { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 }) // behind the body where they coincide
+    return ghost
+  }
+
+  /** Move everything to its place in a frame, and the ghost of a kept run, if there is one, to its pose. */
+  update(frame, camera, ghost = null) {
     const { layout } = this.description
     const sight = { eye: camera.position(), target: camera.target }
+    this.haunt(ghost, sight)
     this.place(this.geoms, frame, layout.geoms, sight)
     this.place(this.sites, frame, layout.sites, sight)
     this.skins.forEach((skin) => skin.update(frame))
@@ -176,7 +201,7 @@ export class World {
     this.edges.dispose()
     this.floor?.dispose()
     for (const thing of [...this.meshes, ...this.hfields, ...this.skins, ...this.flexes, ...this.coils, ...this.pins, this.trail]) thing?.dispose()
-    for (const solid of [...this.geoms, ...this.sites, ...[...this.decorations.values()].flat()]) solid?.remove()
+    for (const solid of [...this.geoms, ...this.sites, ...this.ghosts, ...[...this.decorations.values()].flat()]) solid?.remove()
     this.scene.clear()
   }
 }

@@ -10,10 +10,11 @@
 const STICKY = 'nav, nav *, .dock-lab, .dock-lab *'
 const SELECTOR = `main :is(p, h1, h2, h3, h4, li, pre, figure, table, dl, details, math):not(${STICKY})`
 
-export function holdPlace() {
+/** @param {Element[]} elements that the reader may look at: the first that is still there then keeps its place */
+export function holdPlace(elements = inSight()) {
   const root = document.documentElement
   if (window.scrollY === 0) return () => {}
-  const anchors = inSight()
+  const anchors = elements.map((element) => ({ element, top: element.getBoundingClientRect().top }))
   // Some browsers do the same by themselves, at another moment.
   root.style.overflowAnchor = 'none'
   return () => {
@@ -30,8 +31,8 @@ function inSight() {
   for (const element of document.querySelectorAll(SELECTOR)) {
     if (!element.checkVisibility()) continue // folded away
     const { top, bottom } = element.getBoundingClientRect()
-    if (top >= 0 && top < window.innerHeight) inside.push({ element, top })
-    else if (top < 0 && bottom > 0) overlapping.unshift({ element, top })
+    if (top >= 0 && top < window.innerHeight) inside.push(element)
+    else if (top < 0 && bottom > 0) overlapping.unshift(element)
   }
   return [...inside, ...overlapping]
 }
