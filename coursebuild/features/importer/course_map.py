@@ -276,7 +276,8 @@ def _read_file(
         message = f"`{name}` of its metadata, which a lesson does not have"
         files.leave(text.file, message, "metadata of a text")
     files.account.changed["text", "a lesson" if id else "a page"] += 1
-    title = " ".join((title or read.title or title_of_file(text.file)).split())
+    title = _ROLE.sub(r"\1", title or read.title) or title_of_file(text.file)
+    title = " ".join(title.split())
     slug = slug_of(slug or title_of_file(text.file))
     if not re.search("[a-z]", slug):
         slug = slug_of(title)
@@ -289,6 +290,10 @@ def _read_file(
     text = replace(text, summary=text.summary or read.summary)
     text = replace(text, segments=read.segments, pictures=read.pictures)
     return replace(text, id=id or page, slug=slug, title=title, path=path)
+
+
+_ROLE = re.compile(r"\{[a-z][\w:-]*\}`([^`]*?)(?:\s*<[^`<>]*>)?`")
+"""A role of MyST, of which the map, where titles are plain, keeps the words."""
 
 
 def map_lines(

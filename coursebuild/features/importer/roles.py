@@ -29,7 +29,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             return write_link(words, context.resolve_anchor(f"eq:{formula_anchor(target)}"))
         case "doc":
             return write_link(words or title_of_file(target), context.resolve_link(f"{target}.md"))
-        case "ref" | "numref" | "prf:ref":
+        case "ref" | "numref" | "prf:ref" | "any":
             label = label_anchor(target)
             anchors = (to_anchor(target), f"fig:{label}", f"tab:{label}")
             address = next(filter(None, map(context.resolve_anchor, anchors)), "")

@@ -40,6 +40,7 @@ MYST: list[Construct] = [
     ("role `{index}`", CHANGED, "{index}`wa19`"),
     ("role `{doc}`", CHANGED, "{doc}`words wa20\n<two>`"),
     ("role `{ref}`", CHANGED, "{ref}`words wa21 <here>`"),
+    ("role `{any}`", CHANGED, "{any}`words wa99 <here>`"),
     ("role `{numref}`", CHANGED, "{numref}`fig-one`"),
     ("role `{eq}`", CHANGED, "{eq}`energy`"),
     ("role `{term}`", CHANGED, "{term}`wa22`"),

@@ -37,6 +37,15 @@ def import_map(folder: Path, files: dict[str, str]) -> tuple[Outline, list[str],
     return outline, [page["title"] for page in table.get("page", ())], left
 
 
+def test_titles_are_the_words_of_the_roles_in_them(tmp_path: Path) -> None:
+    files = {
+        "a.md": "# {index}`NumPy <single: NumPy>`\n\nText.\n",
+        "b.md": "# Use of {py:func}`run` and `{x}`\n\nText.\n",
+    }
+    ((_, titles),), *_ = import_map(tmp_path, files)
+    assert titles == ["NumPy", "Use of run and `{x}`"]
+
+
 SUMMARY = r"""# Summary
 
 [Before](before.md)
