@@ -243,7 +243,7 @@ class Passages:
         return frozenset((*self.through, *self.inside))
 
     def texts(self) -> tuple[str, ...]:
-        """What went through what, unless it does so in small steps too."""
+        """What went through what first, unless it does so in small steps too, and how many more."""
         sentences = {
             pair: f"{pair_names(self.model, pair)} went through each other, at {time:.3g} s"
             for pair, time in self.through.items()
@@ -251,7 +251,8 @@ class Passages:
         for pair in self.inside:
             names = pair_names(self.model, pair)
             sentences.setdefault(pair, f"{names} stay inside each other at the end")
-        return tuple(text for pair, text in sentences.items() if pair not in self.setup.passing)
+        texts = [text for pair, text in sentences.items() if pair not in self.setup.passing]
+        return (texts[0], f"and {len(texts) - 1} more pairs") if texts[1:] else tuple(texts)
 
 
 _DIPPING = 0.25

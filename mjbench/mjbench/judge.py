@@ -442,10 +442,7 @@ def _mending_row(
         return is_kind and row.seen is not None and 2 * row.seen <= (baseline.seen or 0.0)
 
     matches = [row for row in report.rows if row.status == "ok" and not row.lucky and halves(row)]
-    priced = [row for row in matches if row.cost is not None]
-    if priced:
-        return min(priced, key=lambda r: r.cost.value if r.cost else 0.0)
-    return matches[0] if matches else None
+    return min(matches, key=lambda r: r.cost.value if r.cost else math.inf, default=None)
 
 
 def largest_of(rows: Sequence[StableRow]) -> dict[str, float]:

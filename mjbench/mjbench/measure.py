@@ -23,19 +23,15 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 
-from mjbench.pilot import Pilot
 from mjbench.problem import STANDARD, Array, Integrator, Motion, Reference, Sizes
 from mjbench.reports import scene_report
 from mjbench.rotations import angular_distance
 from mjbench.scene import Scene
 from mjbench.simulation import (
     EngineStates,
-    Run,
     initial_data,
     motion_of,
-    simulate,
     with_integrator,
-    without_sleep,
 )
 
 _LOWEST, _HIGHEST = 100.0, 0.1
@@ -179,27 +175,6 @@ def energy_drift(energy: Array, scale: float | None = None) -> float | None:
         return None
     changes = (whole - whole[0]) / scale
     return float(changes[np.argmax(np.abs(changes))])
-
-
-def mean_energy(run: Run, horizon: float, expected: float | None) -> float | None:
-    """Mean kinetic energy from the horizon to the end, relative to the expected one, less 1."""
-    energies = run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1]
-    if expected is None or len(energies) < 2 or not np.isfinite(energies).all():
-        return None
-    return float(energies.mean()) / expected - 1
-
-
-def mean_late_energy(model: Any, pilot: Pilot, horizon: float) -> float | None:
-    """Mean kinetic energy after a horizon (s), J, in small steps; `None` where that is the end."""
-    scenario = pilot.scene.scenario
-    if horizon > scenario.duration - scenario.sample * 1.5:
-        return None
-    integrator = Integrator.RK4 if pilot.smooth else Integrator.IMPLICITFAST
-    step = min(pilot.scene.timesteps) / 2
-    fine = without_sleep(with_integrator(model, integrator, step))
-    run = simulate(pilot.setup, fine)
-    mean = float(run.energy[1:][run.states.times > horizon * (1 + 1e-9), 1].mean())
-    return mean if math.isfinite(mean) and mean > 0 else None
 
 
 def energy_scale(energy: Array) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,7 +13,6 @@ from msgspec.structs import asdict, replace
 from mjbench import known_motion, measure, simulation
 from mjbench.pilot import Pilot, horizon_errors, position_distances, with_setting
 from mjbench.reports import scene_report
-from mjbench.stability_runs import run_trial
 
 
 class Basis(Struct, frozen=True, eq=False):
@@ -28,8 +26,6 @@ class Basis(Struct, frozen=True, eq=False):
     energy: float | None
     """The scale for changes of energy, J; `None` where energy is not conserved."""
     momentum_conserved: bool
-    late_energy: float | None
-    """Mean kinetic energy after the horizon, J; `None` where it is the end."""
     least_seen: float
     """Below this nothing is known of what is seen."""
     least_figure: float
@@ -76,14 +72,10 @@ def measure_setting(
         reasons=run.judgement.reasons,
         energy_drift=None if energy is None else measure.energy_drift(run.energy, energy),
         momentum_drift=measure.momentum_drift(run.momentum) if basis.momentum_conserved else None,
-        mean_energy=measure.mean_energy(run, cone.reference.horizon, basis.late_energy),
         penetration=run.penetration,
     )
     if not run.judgement.ok:
-        variant = with_setting(model, setting)
-        growth = run_trial(pilot.setup, variant, pilot.setup.scenario.duration).growth
-        has_grown = math.isfinite(growth) and growth > 1
-        return replace(row, growth=growth if has_grown else None), None
+        return row, None
     if pilot.constrained:
         # A step of RK4 has four times the iterations of its last evaluation.
         count = simulation.count_iterations(with_setting(model, setting), pilot.scene.scenario)

@@ -114,7 +114,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
         if not peaks.finite:
             setting = f"{simulation.integrator_of(model).value} at {seconds_text(step)}"
             message = f"it diverges within {seconds_text(times[index])} even under {setting}"
-            raise SceneError(message, help="measure shorter `timesteps`, or another integrator")
+            raise SceneError(message, help="shorter `timesteps` or another integrator may hold")
         if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:
             message = f"a command is no number, or huge, before {seconds_text(times[index])}"
             raise SceneError(f"{message}: MuJoCo takes all of them as 0 then")

@@ -89,7 +89,7 @@ class Laboratory(Struct, frozen=True, eq=False):
     span: float
     """s."""
     starts: int = 1
-    asked: tuple[str, ...] = ()
+    questions: tuple[str, ...] = ()
     """What else is asked: whether runs go `astray` from the motion of small steps, and whether
     anything goes `through` anything, where it can touch."""
     shortest: float = math.inf
@@ -250,7 +250,7 @@ def _limit_of(
     `None` where that is not asked. It is not looked for below the shortest that was tried to see
     what is bounded, or that the scene is measured at.
     """
-    if kind not in laboratory.asked:
+    if kind not in laboratory.questions:
         return None, ""
     steps_tried = laboratory.own_steps()
     low = min(steps_tried[0], laboratory.shortest)
@@ -365,7 +365,7 @@ def stable_rows(
     limits = scene.declaration.limits
     setup_over = cache(partial(longer_setup, model, pilot))
     motion = kept_motion(model, pilot, reference)
-    asked = ("astray", "through") if Passages(model).needed else ("astray",)
+    questions = ("astray", "through") if Passages(model).needed else ("astray",)
 
     def declared_limit(integrator: Integrator) -> Limit | None:
         step = limits.get(integrator.value)  # type: ignore[call-overload]
@@ -401,7 +401,7 @@ def stable_rows(
         if search[1] <= search[0]:
             return None
         starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
-        laboratory = Laboratory(run, span, starts, asked, shortest)
+        laboratory = Laboratory(run, span, starts, questions, shortest)
         return search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
 
     rows = (

@@ -13,7 +13,6 @@ from msgspec.structs import replace
 from mjbench.detector import Passages, Peaks, RunStatus, has_bad_state, judge, update_peaks
 from mjbench.pilot import Pilot, horizon_error, nudges, position_distance, scales
 from mjbench.problem import Array, Setup
-from mjbench.reports.limits import IS_LOST
 from mjbench.reports.shown_errors import horizon_error_text
 from mjbench.simulation import EngineStates, initial_data, watch_steps
 
@@ -164,7 +163,7 @@ def run_trial(
     if is_lost and status is RunStatus.OK:
         status, reason = RunStatus.SLOW_GROWTH, "what shot up in the first steps did not come down"
     through = "; ".join(passages.texts())
-    astray = astray or (IS_LOST if is_lost else "")
+    astray = astray or ("it is lost" if is_lost else "")
     return StabilityTrial(timestep, status, _growth(sizes), energy, reason, astray, through)
 
 

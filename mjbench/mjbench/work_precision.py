@@ -166,12 +166,11 @@ def _find_basis(
     baseline = own_setting(model, pilot)
     reference = cones[baseline.cone].reference
     conserved = find_conserved(model, pilot, reference)
-    late_energy = measure.mean_late_energy(model, pilot, reference.horizon)
     leasts = zip(
         *(known_motion.least_known(model, scene, cone.reference) for cone in cones.values()),
         strict=True,
     )
-    return Basis(model, pilot, baseline, cones, *conserved, late_energy, *map(max, leasts))
+    return Basis(model, pilot, baseline, cones, *conserved, *map(max, leasts))
 
 
 class StoppedError(Exception):

@@ -229,25 +229,27 @@ def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
 def test_five_lines_say_speed_error_verdict_and_limits() -> None:
     limit = StableRow(
         "Euler", 0.0181, (1e-3, 0.1), None, 1.0, 55, 20, None, bracket=(0.0181, 0.0181),
-        near=0.007, near_reason="off by 0.1 rad at 0.8 s", through="all",
+        near=0.007, near_reason="off by 0.1 rad at 0.8 s", through=0.012,
     )  # fmt: skip
     lines = judged(rows_of((1, 0.5)), stable=(limit,)).verdict.lines
     assert len(lines) == 5
     assert lines[0] == "Euler at 2 ms: 100 times real time"
     assert lines[3] == (
         "Euler stays bounded at steps to 18.1 ms; near the motion of small steps at steps to 7 ms "
-        "(off by 0.1 rad at 0.8 s); with nothing going through at every step tried, to 100 ms"
+        "(off by 0.1 rad at 0.8 s); with nothing going through at steps to 12 ms"
     )
     assert lines[4] == "not known: the error was not taken apart"
-    all_stay = replace(limit, bracket=None, largest="all", near="all", near_reason="")
+    all_stay = replace(
+        limit, bracket=None, largest="all", near="all", near_reason="", through="all"
+    )
     lines = judged(rows_of((1, 0.5)), stable=(all_stay,)).verdict.lines
     assert lines[3] == (
         "Euler stays bounded, near the motion of small steps and with nothing going through at "
         "every step tried, to 100 ms"
     )
-    lost = replace(limit, near=0.0181, near_reason="it is lost", through=None)
+    lost = replace(limit, near=0.0183, near_reason="it is lost", through="all")
     lines = judged(rows_of((1, 0.5)), stable=(lost,)).verdict.lines
-    assert lines[3] == "Euler stays bounded at steps to 18.1 ms", "near says no more"
+    assert lines[3] == "Euler stays bounded at steps to 18.1 ms", "the rest says no more"
 
 
 def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:

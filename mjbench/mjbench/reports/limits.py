@@ -12,8 +12,6 @@ from mjbench.reports.shown_errors import seconds_text
 
 _TOGETHER, _MOST_DIGITS = 0.1, 4
 """How far theory at rest may be above runs, relative, and the most digits of a limit."""
-IS_LOST = "it is lost"
-"""Why a run that does not stay bounded does not stay near either."""
 _SIGNS = "·∘•"
 """Of a timestep in a map: none, some or all of its runs were lost."""
 
@@ -95,7 +93,8 @@ def stability_text(report: ScenarioReport) -> str:
         (row.near, "near the motion of small steps", row.near_reason),
         (row.through, "with nothing going through", row.through_reason),
     ):
-        if limit is None or (limit is row.near and reason == IS_LOST):
+        is_bound = words == "bounded" or row.largest == "all"
+        if limit is None or not (is_bound or reach_bound(limit) < reach_bound(row.largest)):
             continue  # not asked, or as long as it stays bounded
         text = row.shown if words == "bounded" else reach_text(limit, row.searched)
         if text[:1].isdigit():

@@ -127,8 +127,6 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     """Time for the scenario, relative to the scene's own setting; `None` where it was not timed."""
     seconds: Interval | None
     """Processor time for a simulated second on this machine, s; `None` where it was not timed."""
-    growth: float | None
-    """The factor by which velocities grew in a step; `None` where they did not."""
     own: bool
     """Whether it is the scene's own setting."""
     front: bool
@@ -142,9 +140,6 @@ class WorkPrecisionRow(MeasuredRun, frozen=True):
     parted: float | None = None
     """In a chaotic scenario, s: when it is `horizon_error` from the reference; its errors mean
     nothing later, and are not given."""
-    mean_energy: float | None = None
-    """Mean kinetic energy from the horizon to the end, relative to that of a run in small steps,
-    less 1; `None` where nothing is beyond the horizon."""
     evaluations: int = 0
     """How often the forward dynamics are computed in the scenario, on any machine; 0 where that was
     not recorded."""

@@ -50,7 +50,6 @@ def row(integrator: str = "Euler", timestep: float = 0.002, **overrides: Any) ->
         "steps": round(1 / timestep),
         "cost": 0.002 / timestep,
         "seconds": 2e-5 / timestep,
-        "growth": None,
         "own": False,
         "front": False,
         "dominated_by": None,
@@ -140,7 +139,7 @@ def scene(*scenarios: ScenarioReport, **overrides: Any) -> SceneReport:
 
 
 def awkward() -> ScenarioReport:
-    """A report that is hard to show: other solvers, growth, refsafe, chaos, odd times."""
+    """A report that is hard to show: other solvers, refsafe, chaos, odd times."""
     newton = {"solver": "Newton", "iterations": 100, "cone": "pyramidal", "position": None}
     rows = [
         row(
@@ -159,7 +158,6 @@ def awkward() -> ScenarioReport:
             status="slow-growth",
             reasons=("velocities reached 12 times their bound",),
             refsafe=True,
-            growth=1.0123456789,
             **newton,
         ),
         row(
