@@ -45,8 +45,8 @@ def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
         kinds.setdefault(candidate.kind, []).append(candidate)
     scores = {kind: _score(titles, lines[0]) for kind, lines in kinds.items()}
     best = [kind for kind, score in scores.items() if score == max(scores.values())]
-    others = ["".join(kinds[kind][0].places[0].labels) for kind in best if not scores[kind][1]]
-    if is_named and any(map(str.isalpha, "".join(others))):
+    words = ["".join(kinds[kind][0].places[0].labels) for kind in best if not scores[kind][1]]
+    if is_named and any(map(str.isalpha, "".join(words))):
         best = []  # they have other words than the titles, and other lines have these
     if len(best) != 1:
         place = table.span.first_line()

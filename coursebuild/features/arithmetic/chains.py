@@ -162,13 +162,13 @@ def _has_common_unit(sides: tuple[FormulaSide, ...]) -> bool:
     return len(units) == 1 and not any(_strip_unit(e).has("unit") for e in expressions)
 
 
-def _strip_unit(expression: Expression, kept: Collection[str] = _OF_ONE_NUMBER) -> Expression:
-    """Return an expression without the unit at its end, but for those that are kept."""
+def _strip_unit(expression: Expression, whole: Collection[str] = _OF_ONE_NUMBER) -> Expression:
+    """Return an expression without the unit at its end, but for units in `whole`."""
     kind, parts = expression.kind, expression.parts
     if kind == "-" and len(parts) == 1:
-        return replace(expression, parts=(_strip_unit(parts[0], kept),))
+        return replace(expression, parts=(_strip_unit(parts[0], whole),))
     has_unit = kind == "*" and parts[1].kind == "unit"
-    return parts[0] if has_unit and parts[1].text not in kept else expression
+    return parts[0] if has_unit and parts[1].text not in whole else expression
 
 
 def _may_hold(sides: tuple[Expression, Expression], relation: str) -> bool:
@@ -176,12 +176,12 @@ def _may_hold(sides: tuple[Expression, Expression], relation: str) -> bool:
 
     `1/50\ \mathrm{Hz}` may divide by hertz, `2\cdot45 = 90^\circ` be of degrees; not one number.
     """
-    others = [(_divide_by_unit(sides[0]), _divide_by_unit(sides[1]))]
+    pairs = [(_divide_by_unit(sides[0]), _divide_by_unit(sides[1]))]
     bare = [side for side in sides if not side.has("unit")]
     if len(bare) == 1 and bare[0].parts and not bare[0].has("symbol"):
-        others.append((_strip_unit(sides[0], ()), _strip_unit(sides[1], ())))
+        pairs.append((_strip_unit(sides[0], ()), _strip_unit(sides[1], ())))
     try:
-        return any(_find_mistake(*other, relation) is None for other in others if other != sides)
+        return any(_find_mistake(*pair, relation) is None for pair in pairs if pair != sides)
     except NotUnderstood:
         return False
 
