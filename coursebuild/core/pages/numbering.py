@@ -14,6 +14,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from html import unescape
+from itertools import count
 from typing import TypeVar
 from urllib.parse import unquote
 
@@ -34,7 +35,7 @@ _NUMBER = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 def number_items(document: model.Document, mathml: Mathml) -> dict[int, model.NumberedItem]:
     """What has a number in a document, and formulas that have an id only, by offset."""
     items: dict[int, model.NumberedItem] = {}
-    count = 0
+    total = 0
     for formula in model.display_formulas(document):
         html = mathml(formula.tex, True)
         styled_count = html.count(_COUNTER_CLASS)
@@ -42,11 +43,11 @@ def number_items(document: model.Document, mathml: Mathml) -> dict[int, model.Nu
         number, has_margin_number = "", False
         if formula.label is not None and formula.id:
             has_margin_number = not styled_count and tag is None
-            number = unescape(tag[1]) if tag is not None and not styled_count else str(count + 1)
-        count += styled_count + has_margin_number
+            number = unescape(tag[1]) if tag is not None and not styled_count else str(total + 1)
+        total += styled_count + has_margin_number
         if formula.id:
             conditions = formula.label.conditions if formula.label is not None else None
-            first = count - styled_count + 1 if styled_count else 0
+            first = total - styled_count + 1 if styled_count else 0
             items[formula.start] = model.NumberedItem(
                 formula.id, number, has_margin_number, conditions, first_row=first
             )
@@ -61,10 +62,8 @@ def number_items(document: model.Document, mathml: Mathml) -> dict[int, model.Nu
 
 def with_row_numbers(mathml: Markup, first: int) -> Markup:
     """A formula whose numbered rows, as of `align`, get their numbers."""
-    head, *rows = mathml.split(_COUNTER_CLASS + ">")
-    for number, row in enumerate(rows, first):
-        head += Markup(f"{_COUNTER_CLASS}>({number})") + row
-    return head
+    numbers = count(first)
+    return Markup(re.sub(f"{_COUNTER_CLASS}>", lambda m: f"{m[0]}({next(numbers)})", str(mathml)))
 
 
 def items_of(document: model.Document, mathml: Mathml) -> tuple[model.NumberedItem, ...]:

@@ -33,10 +33,6 @@ class _Candidate(Struct, frozen=True):
     def line(self) -> str:
         return plain_text(self.places[0].line.text)
 
-    @property
-    def labels(self) -> tuple[str, ...]:
-        return self.places[0].labels
-
 
 def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
     """The edit that writes all rows; a diagnostic where it is uncertain which lines are meant."""
@@ -49,8 +45,8 @@ def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
         kinds.setdefault(candidate.kind, []).append(candidate)
     scores = {kind: _score(titles, lines[0]) for kind, lines in kinds.items()}
     best = [kind for kind, score in scores.items() if score == max(scores.values())]
-    lines_of_best = [kinds[kind][0] for kind in best if not scores[kind][1]]
-    if is_named and any(any(map(str.isalpha, "".join(c.labels))) for c in lines_of_best):
+    words = ["".join(kinds[kind][0].places[0].labels) for kind in best if not scores[kind][1]]
+    if is_named and any(map(str.isalpha, "".join(words))):
         best = []  # they have other words than the titles, and other lines have these
     if len(best) != 1:
         place = table.span.first_line()

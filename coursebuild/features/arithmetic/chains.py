@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from msgspec.structs import replace
 
@@ -47,7 +47,7 @@ from coursebuild.features.arithmetic.symbol_comparison import (
     SymbolQuantity,
     decide,
 )
-from coursebuild.features.arithmetic.tex import CONSTANTS, UNIT_OF_QUOTIENT
+from coursebuild.features.arithmetic.tex import CONSTANTS, OF_QUOTIENT
 
 _RELATION = re.compile(r"[=<>≈≤≥≠]|\\(?:approx|sim|le|ge|ne|ll|gg)")
 
@@ -97,13 +97,9 @@ def _check_chain(
             if _is_of_numbers(left, symbols) and _is_of_numbers(right, symbols):
                 if has_common_unit is None:
                     has_common_unit = _has_common_unit(statement.sides)
-                written = left.get_expression(), right.get_expression()
-                terms = (_strip_unit(written[0]), _strip_unit(written[1]))
-                terms = terms if has_common_unit else written
+                terms = left.get_expression(), right.get_expression()
+                terms = (_strip_unit(terms[0]), _strip_unit(terms[1])) if has_common_unit else terms
                 mistake = _find_mistake(*terms, relation)
-                if mistake is not None and _may_hold(written, relation):
-                    reason = "its unit may be that of another part"
-                    mistake = FormulaComparison("unread", left.start, right.end, reason)
                 if mistake is not None and (reason := _other_reading(left, right, relation)):
                     mistake = FormulaComparison("unread", left.start, right.end, reason)
                 letters = (t.text for t in terms if t.kind == "symbol" and t.text in CONSTANTS)
@@ -128,6 +124,8 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
 
     `0 = 1` ends a proof by contradiction, and of whole numbers `/` may be a division without rest.
     """
+    if _may_hold((left.get_expression(), right.get_expression()), relation):
+        return "its unit may be that of another part"
     if relation == "≈":
         return ""
     first, second = (side.tex[side.start : side.end].strip(" .") for side in (left, right))
@@ -160,35 +158,33 @@ def _has_common_unit(sides: tuple[FormulaSide, ...]) -> bool:
     return len(units) == 1 and not any(_strip_unit(e).has("unit") for e in expressions)
 
 
-def _strip_unit(expression: Expression, is_any: bool = False) -> Expression:
-    """Return an expression without the unit at its end; `is_any`: also if it is of one number."""
+def _strip_unit(expression: Expression, whole: Collection[str] = _OF_ONE_NUMBER) -> Expression:
+    """Return an expression without the unit at its end, but for units in `whole`."""
     kind, parts = expression.kind, expression.parts
     if kind == "-" and len(parts) == 1:
-        return replace(expression, parts=(_strip_unit(parts[0], is_any),))
+        return replace(expression, parts=(_strip_unit(parts[0], whole),))
     has_unit = kind == "*" and parts[1].kind == "unit"
-    is_stripped = has_unit and (is_any or parts[1].text not in _OF_ONE_NUMBER)
-    return parts[0] if is_stripped else expression
+    return parts[0] if has_unit and parts[1].text not in whole else expression
 
 
 def _may_hold(sides: tuple[Expression, Expression], relation: str) -> bool:
     r"""Whether a relation holds where a unit is of more or less than it stands behind.
 
-    `1/50\ \mathrm{Hz}` may divide by hertz, and `2\cdot45 = 90^\circ` be of degrees. A number
-    alone, as in `6.6\,\% = 0.66`, leaves no unit out, and no multiple of π degrees.
+    `1/50\ \mathrm{Hz}` may divide by hertz, `2\cdot45 = 90^\circ` be of degrees; not one number.
     """
-    others = [(_divide_by_unit(sides[0]), _divide_by_unit(sides[1]))]
+    pairs = [(_divide_by_unit(sides[0]), _divide_by_unit(sides[1]))]
     bare = [side for side in sides if not side.has("unit")]
     if len(bare) == 1 and bare[0].parts and not bare[0].has("symbol"):
-        others.append((_strip_unit(sides[0], is_any=True), _strip_unit(sides[1], is_any=True)))
+        pairs.append((_strip_unit(sides[0], ()), _strip_unit(sides[1], ())))
     try:
-        return any(_find_mistake(*other, relation) is None for other in others if other != sides)
+        return any(_find_mistake(*pair, relation) is None for pair in pairs if pair != sides)
     except NotUnderstood:
         return False
 
 
 def _divide_by_unit(expression: Expression) -> Expression:
     """Return a quotient with a unit, as `1/50 Hz`, with the unit as a part of what divides."""
-    if expression.text != UNIT_OF_QUOTIENT:
+    if expression.text != OF_QUOTIENT:
         return expression
     quotient, unit = expression.parts
     divisor = replace(expression, parts=(quotient.parts[1], unit), text="")

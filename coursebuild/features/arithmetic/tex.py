@@ -37,9 +37,7 @@ SPACE = re.compile(
 _NUMBER = re.compile(
     r"(?:[0-9]{1,3}(?:(?:\{,\}|\\[,;: ]|~)[0-9]{3})+(?![0-9])|[0-9]+)(?:\.[0-9]+)?|\.[0-9]+"
 )
-_E_NOTATION = re.compile(
-    r"(?:[eE]|\\mathrm\s*(?:[eE]|\{[eE]\}))(?:\{\s*[-+−]?[0-9]+\s*\}|[-+−][0-9])"
-)
+_E_NOTATION = re.compile(r"(?:[eE]|\\mathrm\s*(?:[eE]|\{[eE]\}))(?:\{[-+−]?[0-9]+\}|[-+−][0-9])")
 _LETTER = re.compile(r"[A-Za-z]|\\[A-Za-z]+")
 _DIFFERENTIAL = re.compile(r"\\mathrm\s*(?:\{\s*d\s*\}|d)|\\partial(?![A-Za-z])")
 _UPRIGHT = re.compile(r"\\(?:mathrm|text|textrm|operatorname|mathit)(?![A-Za-z])\s*")
@@ -59,7 +57,7 @@ _UNIT_SIGNS = ("/", r"\cdot")
 r"""Signs between upright units, as in `\mathrm N\cdot\mathrm m`."""
 _PRODUCT_SIGNS = (r"\cdot", r"\times", "*", "⋅", "×", *_QUOTIENT_SIGNS)
 _NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^") | {r"\rvert", *_PRODUCT_SIGNS}
-UNIT_OF_QUOTIENT = "unit of a quotient"
+OF_QUOTIENT = "unit of a quotient"
 """The text of a product as `1/50 Hz`, whose unit may be that of the divisor alone."""
 SIDE_BY_SIDE = "side by side"
 """The text of a product in what a function without brackets is of."""
@@ -210,8 +208,7 @@ class _Reader:
             kind = "/" if is_quotient else "*"
             product = Expression(kind, product.start, self.at, (product, factor))
             if unit is not None:
-                parts = product, unit
-                product = Expression("*", product.start, self.at, parts, UNIT_OF_QUOTIENT)
+                product = Expression("*", product.start, self.at, (product, unit), OF_QUOTIENT)
 
     def begins_factor(self) -> bool:
         """Whether another factor begins here, with no sign before it."""
