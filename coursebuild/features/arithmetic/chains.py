@@ -19,7 +19,7 @@ from collections.abc import Collection, Iterator, Mapping
 
 from msgspec.structs import replace
 
-from coursebuild.core.text.units import UNITS
+from coursebuild.core.text.unit_table import UNITS
 from coursebuild.features.arithmetic.evaluate import (
     ORDERS,
     UNDECIDED,
