@@ -73,6 +73,26 @@ def test_on_a_desk_picture_curves_and_controls_share_a_screen(
         assert plot and view_below and plot["y"] > view_below["y"] + view_below["height"]
 
 
+def test_page_keeps_its_place_while_a_picture_arrives_late(
+    browsers: Mapping[str, Browser], site: str
+) -> None:
+    with browsers["plain"].new_context() as context:
+        late: list[Route] = []
+        context.route(re.compile(r"stone[^/]*\.svg$"), lambda route: late.append(route))
+        page, _ = watch_page(context)
+        page.goto(site + "lessons/1.2-fall.html", wait_until="domcontentloaded")
+        quiz = page.locator("[data-quiz]").first
+        picture = page.locator(".figure > img:visible, p > img:visible").first
+        wait_for_condition(page, lambda: late != [])
+        assert picture.bounding_box() is not None
+        assert picture.evaluate("(img) => [img.clientWidth, img.clientHeight]") == [9, 9]
+        for route in late:
+            route.continue_()
+        wait_for_condition(page, lambda: picture.evaluate("(img) => img.naturalWidth") == 9)
+        assert picture.evaluate("(img) => [img.clientWidth, img.clientHeight]") == [9, 9]
+        expect(quiz).to_be_attached()
+
+
 def test_a_plot_grows_with_the_size_of_texts(browsers: Mapping[str, Browser], base: str) -> None:
     larger = "document.documentElement.style.fontSize = '32px'"
     with browsers["plain"].new_context() as context:
