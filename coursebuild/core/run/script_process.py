@@ -58,8 +58,8 @@ def _read_sources_in(root: str) -> None:
 
     def find_in(folder: str) -> Any:
         path = f"{os.path.abspath(folder)}/"  # noqa: PTH100 (time counts)
-        is_project = path.startswith(f"{root}/") and "/site-packages/" not in path
-        return (of_project if is_project else installed)(folder)
+        is_installed = not path.startswith(f"{root}/") or "/site-packages/" in path
+        return (installed if is_installed else of_project)(folder)
 
     sys.path_hooks[-1] = find_in
     sys.path_importer_cache.clear()
