@@ -26,11 +26,9 @@ def say(status: int, text: str) -> int:
 
 def _harmless(text: str) -> str:
     """The text, such as one that names a file, which commands neither a terminal nor a service."""
-    if not text.replace("\n", "").isprintable():
-        from coursebuild.core.text.characters import printable_lines
+    from coursebuild.core.text.characters import printable_lines, without_commands
 
-        text = printable_lines(text)
-    return _without_commands(text)
+    return without_commands(printable_lines(text))
 
 
 def write(text: str, status: int, *, commands: bool = False) -> int:

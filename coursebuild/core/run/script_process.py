@@ -21,17 +21,8 @@ import site
 import sys
 import traceback
 from collections.abc import Mapping, Sequence
-from importlib.machinery import (
-    BYTECODE_SUFFIXES,
-    EXTENSION_SUFFIXES,
-    SOURCE_SUFFIXES,
-    ExtensionFileLoader,
-    FileFinder,
-    ModuleSpec,
-    PathFinder,
-    SourceFileLoader,
-    SourcelessFileLoader,
-)
+from importlib import machinery
+from importlib.machinery import FileFinder, ModuleSpec, PathFinder, SourceFileLoader
 from types import CodeType, ModuleType
 from typing import Any, TypedDict
 
@@ -60,15 +51,15 @@ def _read_sources_in(root: str) -> None:
     """From now on, import modules of the project from their sources, but not what is installed."""
     installed = sys.path_hooks[-1]
     of_project = FileFinder.path_hook(
-        (ExtensionFileLoader, EXTENSION_SUFFIXES),
-        (_SourceLoader, SOURCE_SUFFIXES),
-        (SourcelessFileLoader, BYTECODE_SUFFIXES),
+        (machinery.ExtensionFileLoader, machinery.EXTENSION_SUFFIXES),
+        (_SourceLoader, machinery.SOURCE_SUFFIXES),
+        (machinery.SourcelessFileLoader, machinery.BYTECODE_SUFFIXES),
     )
 
     def find_in(folder: str) -> Any:
         path = f"{os.path.abspath(folder)}/"  # noqa: PTH100 (time counts)
-        is_project = path.startswith(f"{root}/") and "/site-packages/" not in path
-        return (of_project if is_project else installed)(folder)
+        is_installed = not path.startswith(f"{root}/") or "/site-packages/" in path
+        return (installed if is_installed else of_project)(folder)
 
     sys.path_hooks[-1] = find_in
     sys.path_importer_cache.clear()

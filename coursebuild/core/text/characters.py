@@ -62,21 +62,16 @@ ISOLATING = re.compile("[\u202a-\u202e\u2066-\u2069]")
 TAB = 4
 
 
+_PICTURES = {**{code: 0x2400 + code for code in range(0x20)}, 0x7F: 0x2421, 0x09: " " * TAB}
+
+
 def printable(text: str) -> str:
     """Return a text with symbols for control characters, so that it cannot change the terminal."""
-    parts: list[str] = []
-    for char in text:
-        code = ord(char)
-        if char == "\t":
-            char = " " * TAB
-        elif code < 0x20:
-            char = chr(0x2400 + code)
-        elif code == 0x7F:
-            char = "\u2421"
-        elif unicodedata.category(char) in ("Cc", "Cf", "Cs", "Zl", "Zp") and char != "\u200d":
-            char = "\ufffd"
-        parts.append(char)
-    return "".join(parts)
+    unseen = ("Cc", "Cf", "Cs", "Zl", "Zp")
+    return "".join(
+        "\ufffd" if unicodedata.category(char) in unseen and char != "\u200d" else char
+        for char in text.translate(_PICTURES)
+    )
 
 
 def printable_lines(text: str) -> str:

@@ -55,13 +55,9 @@ def expand_includes(
             files.leave(path, message, "file that is included", line)
             return ""
         part_text = _part_of(files.read_text(target), part, by_lines=True)
-        if part_text is None:
-            message = f"`{name}`: the file has no such part"
-            files.leave(path, message, "file that is included", line)
-            return ""
-        if not files.may_include(part_text, lesson or path):
-            message = f"`{name}`: {TOO_MUCH}"
-            files.leave(path, message, "file that is included", line)
+        if part_text is None or not files.may_include(part_text, lesson or path):
+            problem = "the file has no such part" if part_text is None else TOO_MUCH
+            files.leave(path, f"`{name}`: {problem}", "file that is included", line)
             return ""
         files.account.changed["file that is included", "its lines stand in the text"] += 1
         expanded = expand_includes(part_text, target, files, depth + 1, lesson=lesson or path)

@@ -176,8 +176,6 @@ _MAX_DEPTH = 100
 """Folders around a folder."""
 _MAX_INCLUDED = 2_000_000
 """Characters that a lesson may include: files that include each other could become endless."""
-_COST = 1_000
-"""Characters that an inclusion counts as, besides its own."""
 TOO_MUCH = "with it the lesson would include too much text"
 _BAD_NAME = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")
 _OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -271,7 +269,7 @@ class SourceFiles:
 
     def may_include(self, text: str, lesson: str) -> bool:
         """Whether a lesson may include this text as well; it counts from now on."""
-        self._included[lesson] += len(text) + _COST
+        self._included[lesson] += 1_000 + len(text)  # an empty one counts, too
         return self._included[lesson] <= _MAX_INCLUDED
 
     def _list(self) -> None:
