@@ -6,7 +6,6 @@ Where the map is broken the lessons are parsed all the same, so that one run rep
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -14,23 +13,20 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import diagnose_orphan_scenarios
-from coursebuild.core.drawing.picture_size import picture_size
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.course_features import features_digest, load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
-from coursebuild.core.files.read import read_bytes, read_course, read_records, read_sources
+from coursebuild.core.files.read import read_course, read_picture_sizes, read_records, read_sources
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import (
     Course,
     Declarations,
     Document,
-    Image,
     Lesson,
     Limits,
     Link,
     UrlTarget,
     document_inlines,
-    find_inlines,
     local_file,
 )
 from coursebuild.core.model.course import (
@@ -165,7 +161,7 @@ class _Loader:
             course,
             models=self.files.models,
             files=(files := self._files_to_show(course)),
-            pictures=self._picture_sizes(course, files),
+            pictures=read_picture_sizes(self.root, course.documents, files),
             records=read_records(self.root, [MAP, *(d.source.path for d in course.documents)]),
             declarations=declarations,
             theme=self._load_theme(course.theme),
@@ -434,15 +430,6 @@ class _Loader:
         texts += [page.path for page in course.pages]
         excluded = {MAP, *texts, *map(record_path, (MAP, *texts)), *models}
         return tuple(path for path in self.files.files if path not in excluded)
-
-    def _picture_sizes(self, course: Course, files: tuple[str, ...]) -> dict[str, tuple[int, int]]:
-        images = ((i.url, d.source.path) for d in course.documents for i in find_inlines(d, Image))
-        sizes: dict[str, tuple[int, int]] = {}
-        for path in sorted({local_file(*image) for image in images} & {*files}):
-            with contextlib.suppress(EffectError):  # it is told where the file is copied
-                if (size := picture_size(read_bytes(self.root, path))) is not None:
-                    sizes[path] = size
-        return sizes
 
 
 def _check_unlisted_files(course: Course) -> Iterator[Diagnostic]:

@@ -17,9 +17,10 @@ from pathlib import Path
 
 from msgspec import Struct
 
+from coursebuild.core.drawing.picture_size import picture_size
 from coursebuild.core.files.course_root import MAP, find_course_root, is_dropping, read_regular
 from coursebuild.core.files.errors import EffectError, OutsideProjectError, UsageError, reason
-from coursebuild.core.model import MjcfModel
+from coursebuild.core.model import Document, Image, MjcfModel, find_inlines, local_file
 from coursebuild.core.model.lesson_record import LessonRecord, record_path
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.source import Source
@@ -129,6 +130,23 @@ def read_folder(
     reader = _Reader(root.resolve())
     sources = reader.sources([path for path in reader.walk(folder) if path.endswith(endings)])
     return Parsed(sources, tuple(reader.diagnostics))
+
+
+def read_picture_sizes(
+    root: Path, documents: Iterable[Document], files: Iterable[str]
+) -> dict[str, tuple[int, int]]:
+    """Width and height of the pictures that documents show, in CSS pixels, by path.
+
+    `files`: those that a page may show. Pictures of unknown size, or that cannot be read, are left
+    out.
+    """
+    images = ((i.url, d.source.path) for d in documents for i in find_inlines(d, Image))
+    sizes: dict[str, tuple[int, int]] = {}
+    for path in sorted({local_file(*image) for image in images} & {*files}):
+        with contextlib.suppress(EffectError):  # it is told where the file is copied
+            if (size := picture_size(read_bytes(root, path))) is not None:
+                sizes[path] = size
+    return sizes
 
 
 def read_records(root: Path, documents: Iterable[str]) -> dict[str, LessonRecord]:

@@ -11,7 +11,15 @@ from msgspec.structs import replace
 
 from coursebuild.core.model import fields
 from coursebuild.core.model.blocks import Comparison, Document, Filter, Paragraph, Recording
-from coursebuild.core.model.fields import Author, CoursePath, Slug, WebPlace, describe, matching
+from coursebuild.core.model.fields import (
+    Author,
+    CoursePath,
+    Silence,
+    Slug,
+    WebPlace,
+    describe,
+    matching,
+)
 from coursebuild.core.model.inlines import NumberBinding
 from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.scenarios import Declarations
@@ -239,17 +247,6 @@ class CalloutKind(Struct, frozen=True):
     name: str
     label: str = ""
     promise: str = ""
-
-
-class Silence(Struct, frozen=True, forbid_unknown_fields=True):
-    """A warning that is not shown."""
-
-    rule: Annotated[str, describe("the name of a warning or a hint", pattern=r"\S")]
-    reason: Annotated[str, describe("why")] = ""
-    path: Annotated[
-        Annotated[str, Meta(pattern=r"\S")] | None,
-        describe("only in these files; `*` and `?` stand for anything"),
-    ] = None
 
 
 class NamedPath(Struct, frozen=True):

@@ -118,3 +118,14 @@ class CoursePath(Struct, frozen=True, forbid_unknown_fields=True):
     picture: Annotated[
         Text | None, describe("the lesson whose picture it has; otherwise the last with one")
     ] = None
+
+
+class Silence(Struct, frozen=True, forbid_unknown_fields=True):
+    """A warning that is not shown."""
+
+    rule: Annotated[str, describe("the name of a warning or a hint", pattern=r"\S")]
+    reason: Annotated[str, describe("why")] = ""
+    path: Annotated[
+        Annotated[str, Meta(pattern=r"\S")] | None,
+        describe("only in these files; `*` and `?` stand for anything"),
+    ] = None

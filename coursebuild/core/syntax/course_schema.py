@@ -21,7 +21,7 @@ from coursebuild.core.drawing.contrast import (
     contrast,
     legible,
 )
-from coursebuild.core.model import Filter, LessonTable, Limits, Silence
+from coursebuild.core.model import Filter, LessonTable, Limits
 from coursebuild.core.model.course import PICTURES, FontFamily, Launch, Theme, ThemeFile
 from coursebuild.core.model.fields import (
     Author,

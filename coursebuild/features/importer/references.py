@@ -97,7 +97,7 @@ def _read(
             for media in html.media:
                 if _ELSEWHERE.match(media.url):
                     edits |= _link_to_picture(source, media.span, link, leave)
-        links = [linked.span for linked in model.find_inlines(document, model.Link)]
+        links = [link_node.span for link_node in model.find_inlines(document, model.Link)]
         for image in model.find_inlines(document, model.Image):
             if _ELSEWHERE.match(image.url):
                 place, name = image.span, image.url.rpartition("/")[2]

@@ -382,11 +382,11 @@ class _LabTrial(Struct, frozen=True):
             from coursebuild.features.lab.picture.static import draw_film, draw_picture
 
             picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
-            store = self.context.run_store.store
-            picture = store.get_or_make(
-                "pictures", picture_key, lambda: draw_picture(self.lab, main)
-            )
-            film = store.get_or_make("films", picture_key, lambda: draw_film(self.lab, main))
+            keep = self.context.run_store.store.get_or_make
+            picture = keep("pictures", picture_key, lambda: draw_picture(self.lab, main))
+            film = b""
+            if main["film"]:
+                film = keep("films", picture_key, lambda: draw_film(self.lab, main))
             output = replace(output, record=lab_record(lab, main), picture=picture, film=film)
         return _Evaluation(reply, failures, remarks, output)
 

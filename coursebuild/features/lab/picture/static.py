@@ -48,14 +48,12 @@ def draw_picture(lab: Lab, main: MainRun) -> bytes:
 
 
 def draw_film(lab: Lab, main: MainRun) -> bytes:
-    """Draw the film of a lab's trial, as animated PNG of half the width; empty without one."""
+    """Draw the film of a lab's trial, as animated PNG of half the width."""
     width, height = _size(lab)
     scene = unpack_arrays(main["scene"])
-    frames = unpack_arrays(main["film"])
-    if not frames:
-        return b""
-    drawn = [_draw_frame(lab, scene, frame, (width // 2, height // 2)) for frame in frames]
-    return moving_png(drawn, FILM_RATE, _FILM_ROUNDS)
+    size = width // 2, height // 2
+    frames = [_draw_frame(lab, scene, frame, size) for frame in unpack_arrays(main["film"])]
+    return moving_png(frames, FILM_RATE, _FILM_ROUNDS)
 
 
 def _draw_frame(
