@@ -223,10 +223,10 @@ class BoundNumber(Struct, frozen=True, dict=True):
         Where no unit stands there, the one of a label that ends before it, as in `v (m/s):`.
         """
         text, end = self.binding.span.source.text, self.binding.span.end
-        behind = self.binding.unit or _LINE_END.sub(" ", text[end : end + 80])
+        rest = self.binding.unit or _LINE_END.sub(" ", text[end : end + 80])
         label = text[: self.binding.span.start].rpartition("\n")[2].rstrip(" *_")
-        is_label = label.endswith((":", "=")) and not unit_behind(behind)
-        return (is_label and unit_of_label(label).text) or behind
+        is_label = label.endswith((":", "=")) and not unit_behind(rest)
+        return (is_label and unit_of_label(label).text) or rest
 
     def places(self) -> list[PrintedPlace]:
         """Where it holds: in recorded text, or else in the run."""
