@@ -45,7 +45,7 @@ _SPREAD = re.compile(rf"[ \t]?(?:±|\+/?-|–|\.\.+|to)[ \t]*{_NUMBER}(?=[ \t)\]
 
 Not so `0.5 ± 0.8 %`, which may be relative.
 """
-_REST_OF_LIST = re.compile(rf"(?:[,; \t]++{_NUMBER})*+[ \t]*[)\]]")
+_REST_OF_LIST = re.compile(rf"(?:[,; \t]++{_NUMBER})*[ \t]*[)\]]")
 _BEGIN_OF_LIST = frozenset("([ \t,;+-−.eE0123456789")
 """What may stand in a list before a number of it."""
 _FRACTION = (re.compile(r"\\[td]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}"), r"(\1)/(\2)")
