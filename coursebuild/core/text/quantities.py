@@ -40,9 +40,12 @@ _LONGEST_PRODUCT = 6
 _CLOSING = ".,;:!?”\"'*_`|>}"
 _UPRIGHT = re.compile(r"\$([^$]*\\(?:mathrm|text|textrm)[^$]*)\$")
 _NUMBER = r"[-+−]?[0-9.]++(?:[eE][-+]?[0-9]++)?"
-_SPREAD = re.compile(rf"[ \t]?(?:±|\+/?-|–|\.\.+|to)[ \t]*{_NUMBER}(?=[ \t)\]])[ \t]*[)\]]?")
-"""A number that shares its unit with the one before: `83.4 ± 0.2 m`, `(83.4 .. 85.0) m`."""
-_REST_OF_LIST = re.compile(rf"(?:[,; \t]++{_NUMBER})*+[ \t]*[)\]]")
+_SPREAD = re.compile(rf"[ \t]?(?:±|\+/?-|–|\.\.+|to)[ \t]*{_NUMBER}(?=[ \t)\]])[ \t]*[)\]]?(?! ?%)")
+"""A number that shares its unit with the one before: `83.4 ± 0.2 m`, `(83.4 .. 85.0) m`.
+
+Not so `0.5 ± 0.8 %`, which may be relative.
+"""
+_REST_OF_LIST = re.compile(rf"(?:[,; \t]++{_NUMBER})*[ \t]*[)\]]")
 _BEGIN_OF_LIST = frozenset("([ \t,;+-−.eE0123456789")
 """What may stand in a list before a number of it."""
 _FRACTION = (re.compile(r"\\[td]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}"), r"(\1)/(\2)")
@@ -64,9 +67,9 @@ _TEX_SIGNS = (
 _BRACKET = re.compile(r"(?P<before>.?)[(\[](?P<unit>(?:[^()\[\]]|\([^()]*\))*)[)\]]\s*\Z")
 _BRACKET_WITH_WORDS = re.compile(
     r"\A[^()\[\]\s]*?(?P<before>.?)[(\[](?P<unit>(?!min,)[^()\[\],]+)"
-    r"(?:, [^\W\d_][^()\[\]]{2,}[)\]]|[)\]],? [^\W\d_][^()\[\]]*)\Z"
+    r"(?:, [^\W\d_][^()\[\]]{2,}[)\]]|[)\]] of [^()\[\]]*)\Z"
 )
-"""`E (J, in total)`, `E [J] of the ball`."""
+"""`E (J, in total)`, `E [J] of the ball`; behind a comma another label may stand."""
 _BEHIND_COMMA = re.compile(r"[^\W\d_]{2}|.*[/^²³°A-Z].*|[a-z]+s")
 """What is a unit behind a comma, as in `duration, ms`; another word may be one as well."""
 _SOLIDUS = re.compile(r"\s*/\s*(?P<unit>[^/=:]+)\Z")
