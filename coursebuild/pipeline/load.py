@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import diagnose_orphan_scenarios
+from coursebuild.core.checks.links import is_whole
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.course_features import features_digest, load_course_features
 from coursebuild.core.files.errors import EffectError, UsageError
@@ -433,11 +434,9 @@ class _Loader:
 
 
 def _check_unlisted_files(course: Course) -> Iterator[Diagnostic]:
-    if not course.is_whole:
-        return
     folders = ("content/lessons/", "content/pages/")  # files in these have rules of their own
     paths = [path for path in course.files if path.startswith("content/") and path.endswith(".md")]
-    paths = [path for path in paths if not path.startswith(folders)]
+    paths = [path for path in paths if is_whole(course) and not path.startswith(folders)]
     used_paths = {*shown_files(course)} if paths else set()
     for document in course.documents if paths else ():
         for inline in document_inlines(document):

@@ -375,14 +375,6 @@ class Course(Struct, frozen=True):
         digest = key_of(self.title)[:8]
         return self.id or "-".join((*words, digest))
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether all its texts could be read: else nobody knows what is nowhere in it."""
-        return all(
-            owner.document is not None or (isinstance(owner, Lesson) and owner.status == "planned")
-            for owner in self.owners
-        )
-
     def comparison_of(self, recording: Recording) -> Comparison:
         """How a recorded output is compared."""
         comparison = recording.comparison or self.comparison

@@ -29,6 +29,7 @@ from coursebuild.core.model.fields import (
     Language,
     NotNegative,
     RelativeTolerance,
+    Silence,
     Slug,
     Text,
     describe,

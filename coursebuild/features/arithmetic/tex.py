@@ -8,7 +8,7 @@ Entry point: `read_expression(tex, start, end)`, an `Expression`, by recursive d
    `\sin 2\pi/3`, `\sin x\cdot y`.
 3. Round or square brackets right after a function hold all that it is of: `\cos(x)^2` is the square
    of the cosine. Without brackets it is of the factors that follow, up to the next function.
-4. Digits with a zero before them (`0010`) may be of another base, and have no value here.
+4. Digits with a zero before them (`0010`) may be of another base: they have no value.
 """
 
 from __future__ import annotations
@@ -190,7 +190,7 @@ class _Reader:
                 factor = self.power()
                 if minus:
                     factor = Expression("-", start, self.at, (factor,))
-                is_run = self.tex[start].isdigit() or self.tex[start] == "."
+                is_run = self.tex[start] in ".0123456789"
                 is_run &= SPACE.sub("", self.tex[product.start : start])[-1:] != "!"
                 is_run |= re.search(r"\([0-9]+\)\s*\([0-9]+\)$", self.tex[: self.at]) is not None
                 if not sign and (is_run or is_mixed(product, factor)):
@@ -427,9 +427,7 @@ class _Reader:
         if self.peek() in ("°", "!") or (self.take("^") and (exponent or self.match(_DEGREES))):
             raise self.not_understood("it may be of the function, or of what it is of")
         self.at = end
-        if exponent is None:
-            return value
-        return Expression("^", start, self.at, (value, exponent))
+        return value if exponent is None else Expression("^", start, end, (value, exponent))
 
     def argument(self) -> Expression:
         """Parse the factors that a function without brackets is of."""

@@ -378,7 +378,6 @@ class _LabTrial(Struct, frozen=True):
                 config["extent"] = scene["extent"]
         output = LabOutput(module.code, config)
         if self.context.static and not failures and main is not None:
-            # Draw the start of the main run
             from coursebuild.features.lab.picture.static import draw_film, draw_picture
 
             picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
