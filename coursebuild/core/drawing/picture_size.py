@@ -1,7 +1,4 @@
-"""How large a picture is shown, read from the head of its file.
-
-A page that knows it keeps a place for each picture until it has arrived.
-"""
+"""How large a picture is shown, read from the head of its file, so that pages keep its place."""
 
 from __future__ import annotations
 
