@@ -16,7 +16,7 @@ from msgspec.structs import asdict, replace
 
 from coursebuild.core import model
 from coursebuild.core.model.course import CALLOUTS, ENGLISH, Launch
-from coursebuild.core.model.fields import Author
+from coursebuild.core.model.fields import Author, Silence
 from coursebuild.core.syntax.course_schema import (
     CourseFile,
     LevelTable,
@@ -342,7 +342,7 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             message = f"{format_name(name)} cannot be a kind of callout"
             help = "expected: lower-case letters and digits in words joined by single hyphens"
             yield diagnose("field-value", member.key.span, message, help=help)
-    for node, silence in decoding.find_structs(model.Silence):
+    for node, silence in decoding.find_structs(Silence):
         rule = RULES.get(silence.rule)
         if rule is None:
             names = [name for name, entry in RULES.items() if entry.severity != "error"]
