@@ -20,11 +20,12 @@ _LIES_ON_SIDE = re.compile(
 """The orientation in the Exif data of a JPEG, in either order of bytes."""
 
 
-def picture_size(data: bytes) -> tuple[int, int] | None:
+def picture_size(data: bytes, column: float | None = None) -> tuple[int, int] | None:
     """Width and height of a picture in CSS pixels, from the bytes of its file.
 
     It may be an SVG, a PNG, a JPEG or a WebP; `None` where it is something else, is damaged,
-    or does not say how large it is.
+    or does not say how large it is. A drawing without a width is as wide as its `viewBox`, or as
+    the `column` that it fills, in CSS pixels.
     """
     sides: tuple[float, float] | None = None
     with contextlib.suppress(struct.error):
@@ -35,13 +36,13 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
         elif data[:4] == b"RIFF" and data[8:12] == b"WEBP":
             sides = _webp_size(data)
         else:
-            sides = _svg_size(data)
+            sides = _svg_size(data, column)
     if sides is None or not all(1e-6 < side < 1e6 for side in sides):
         return None
     return max(1, round(sides[0])), max(1, round(sides[1]))
 
 
-def _svg_size(data: bytes) -> tuple[float, float] | None:
+def _svg_size(data: bytes, column: float | None) -> tuple[float, float] | None:
     """The size that the first element says; where sides are missing, the ratio of its `viewBox`."""
     root: dict[str, str] = {}
 
@@ -65,7 +66,8 @@ def _svg_size(data: bytes) -> tuple[float, float] | None:
     ratio = box[2] / box[3]
     if height is not None:
         return height * ratio, height
-    return width or WHOLE_COLUMN, (width or WHOLE_COLUMN) / ratio
+    width = width or column or box[2]
+    return width, width / ratio
 
 
 def _jpeg_size(data: bytes) -> tuple[float, float] | None:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from msgspec import Struct
 
-from coursebuild.core.drawing.picture_size import picture_size
+from coursebuild.core.drawing.picture_size import WHOLE_COLUMN, picture_size
 from coursebuild.core.files.course_root import MAP, find_course_root, is_dropping, read_regular
 from coursebuild.core.files.errors import EffectError, OutsideProjectError, UsageError, reason
 from coursebuild.core.model import Document, Image, MjcfModel, find_inlines, local_file
@@ -144,7 +144,7 @@ def read_picture_sizes(
     sizes: dict[str, tuple[int, int]] = {}
     for path in sorted({local_file(*image) for image in images} & {*files}):
         with contextlib.suppress(EffectError):  # it is told where the file is copied
-            if (size := picture_size(read_bytes(root, path))) is not None:
+            if (size := picture_size(read_bytes(root, path), WHOLE_COLUMN)) is not None:
                 sizes[path] = size
     return sizes
 

@@ -62,7 +62,11 @@ ISOLATING = re.compile("[\u202a-\u202e\u2066-\u2069]")
 TAB = 4
 
 
-_PICTURES: dict[int, int | str] = {**{code: 0x2400 + code for code in range(0x20)}, 0x7F: 0x2421, 0x09: " " * TAB}
+_PICTURES: dict[int, int | str] = {
+    **{code: 0x2400 + code for code in range(0x20)},
+    0x7F: 0x2421,
+    0x09: " " * TAB,
+}
 
 
 def printable(text: str) -> str:

@@ -53,7 +53,7 @@ SIZES: dict[str, tuple[bytes, tuple[int, int] | None]] = {
 @pytest.mark.parametrize("name", SIZES)
 def test_size_of_a_picture(name: str) -> None:
     data, size = SIZES[name]
-    assert picture_size(data) == size
+    assert picture_size(data, WHOLE_COLUMN) == size
 
 
 @pytest.mark.parametrize("name", [name for name in SIZES if "SVG" not in name])

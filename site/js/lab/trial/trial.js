@@ -378,6 +378,7 @@ class Trial {
       plots: record(lab),
       parity,
       fallen: fallenBodies(lab, this.engine, this.framing.fallen),
+      film: [], // see `film`
       fill: null, // see `frame`; likewise those below
       moved: null,
       arrows: null,
