@@ -71,8 +71,8 @@ def link_targets(course: model.Course) -> LinkTargets:
 
 def is_whole(course: model.Course) -> bool:
     """Whether all its texts could be read: else nobody knows what is nowhere in it."""
-    written = all(o.document is not None for o in course.lessons if o.status != "planned")
-    return written and all(page.document is not None for page in course.pages)
+    has_lessons = all(o.document is not None for o in course.lessons if o.status != "planned")
+    return has_lessons and all(page.document is not None for page in course.pages)
 
 
 def anchors(document: model.Document) -> Mapping[str, Span]:
