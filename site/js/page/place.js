@@ -13,7 +13,7 @@ const SELECTOR = `main :is(p, h1, h2, h3, h4, li, pre, figure, table, dl, detail
 /** @param {Element[]} elements that the reader may look at: the first that is still there then keeps its place */
 export function holdPlace(elements = inSight()) {
   const root = document.documentElement
-  if (window.scrollY === 0) return () => {}
+  if (window.scrollY === 0 || elements.length === 0) return () => {}
   const anchors = elements.map((element) => ({ element, top: element.getBoundingClientRect().top }))
   // Some browsers do the same by themselves, at another moment.
   root.style.overflowAnchor = 'none'
