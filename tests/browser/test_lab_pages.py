@@ -249,3 +249,24 @@ def test_missing_file_is_told(context: BrowserContext, base: str) -> None:
     page.goto(base + PAGE)
     swing = lab(page, SWING, "ended")
     expect(swing.locator(".lab-message:visible")).to_contain_text("404")
+
+
+def test_what_is_pointed_at_below_a_lab_keeps_its_place_when_the_lab_arrives(
+    calm: BrowserContext, base: str
+) -> None:
+    page, _ = watch_page(calm)
+    page.set_viewport_size({"width": 390, "height": 900})
+    late: list[Route] = []
+    page.route(re.compile(r"/labs/lab\.[0-9a-f]+\.js$"), lambda route: late.append(route))
+    page.goto(base + PAGE)
+    swing, below = page.locator(".lab").first, page.locator(".lab + div").first
+    below.evaluate("(div) => window.scrollBy(0, div.getBoundingClientRect().top - 300)")
+    page.mouse.move(195, 600)
+    wait_for_condition(page, lambda: late != [])
+    place = "(element) => element.getBoundingClientRect().top"
+    top, height = below.evaluate(place), swing.evaluate("(lab) => lab.offsetHeight")
+    for route in late:
+        route.continue_()
+    expect(swing.locator(".lab-play")).to_be_attached()
+    wait_for_condition(page, lambda: swing.evaluate("(lab) => lab.offsetHeight") > height + 50)
+    wait_for_condition(page, lambda: abs(below.evaluate(place) - top) < 1)

@@ -25,7 +25,7 @@ export function holdPlace(elements = inSight()) {
 }
 
 /** The elements that begin in the window, from its top; then those that reach into it from above. */
-function inSight() {
+export function inSight() {
   const inside = []
   const overlapping = []
   for (const element of document.querySelectorAll(SELECTOR)) {

@@ -1,6 +1,6 @@
 /** Puts a live instrument in place of a lab's static form. */
 
-import { holdPlace } from '../../page/place.js'
+import { holdPlace, inSight } from '../../page/place.js'
 import { h } from './dom.js'
 import { readLink } from './share.js'
 import { fill } from './words.js'
@@ -37,15 +37,16 @@ export async function mount(element, texts, missing, make) {
   }
 }
 
-/** What the reader points at, has focused, or has in the middle of the window, if it is below a lab. @returns {Element[]} */
+/** What the reader points at or has focused below a lab; else what is in sight there, if the lab begins above the window. @returns {Element[]} */
 function lookedAt(lab) {
-  const middle = document.elementFromPoint(window.innerWidth / 2, window.innerHeight / 2)
-  const isSeen = (element) => {
+  const follows = (element) => !lab.contains(element) && Boolean(lab.compareDocumentPosition(element) & Node.DOCUMENT_POSITION_FOLLOWING)
+  const isInSight = (element) => {
     const { top, bottom } = element.getBoundingClientRect()
-    return bottom > 0 && top < window.innerHeight && !element.contains(lab)
+    return bottom > 0 && top < window.innerHeight
   }
-  const [seen] = [...[...document.querySelectorAll(':hover')].slice(-1), document.activeElement, middle].filter((element) => element && isSeen(element))
-  return seen && !lab.contains(seen) && lab.compareDocumentPosition(seen) & Node.DOCUMENT_POSITION_FOLLOWING ? [seen] : []
+  const pointedAt = [...document.querySelectorAll(':hover')].slice(-1)
+  const chosen = [...pointedAt, document.activeElement].filter((element) => element && follows(element) && isInSight(element))
+  return chosen.length > 0 || lab.getBoundingClientRect().top >= 0 ? chosen : inSight().filter(follows)
 }
 
 /** Move the keyboard focus from the static form, which is now hidden, into the instrument. */
