@@ -47,7 +47,7 @@ def derived(report: ScenarioReport) -> ScenarioReport:
 
 
 def _scenario(rows: list[dict[str, Any]], **fields: Any) -> ScenarioReport:
-    whole = reports.scenario([{"growth": None, **row} for row in rows], **fields)
+    whole = reports.scenario(rows, **fields)
     return derived(msgspec.convert(msgspec.to_builtins(whole), ScenarioReport))
 
 
