@@ -91,7 +91,6 @@ def test_a_scene_that_blows_up_under_its_own_setting() -> None:
     assert own_row.status == "diverged"
     assert any("MuJoCo warned of bad " in reason for reason in own_row.reasons)
     assert (own_row.position, own_row.velocity, own_row.seen) == (None, None, None)
-    assert own_row.growth is None or own_row.growth > 1
     assert not report.verdict.on_front
     text = "the scene does not run under its own setting, Euler at 8 ms: "
     assert report.verdict.text.startswith(text)

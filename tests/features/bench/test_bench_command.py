@@ -33,7 +33,7 @@ def test_bench_prints_a_table_and_json(course: Path, capsys: Capture) -> None:
     write(course / "models" / "box.toml", TOML)
     assert run(course, "--quick") == 0
     out, err = capsys.readouterr()
-    assert out.startswith("box  (quick: fewer settings, rough times)\n  swing: swing\n")
+    assert out.startswith("box  (quick: fewer settings, rough times)\n  swing\n")
     assert "\n  swing\n" in out and "RK4" in out and "the model's own" in out
     assert "measuring (1)\n  box\n  box: measured after " in err
     assert run(course, "--quick", "--format", "json", "-q") == 0
