@@ -77,21 +77,29 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Measure models, or check their recorded reports."""
     require("mjbench", "measure", "`coursebuild bench`")
-    names, quick = tuple(arguments.scenes), arguments.quick
+    names, quick, record = tuple(arguments.scenes), arguments.quick, arguments.record
     if arguments.engines is not None:
-        return run_engines(arguments)
+        _refuse_options_of_bench(arguments)
+    report, field = ("bench", "scenes") if arguments.engines is None else ("engines", "engines")
 
     def measure(options: Options) -> Measurement[Any]:
         with Mjbench(options.root, "`coursebuild bench`") as mjbench:
             if arguments.check:
                 return check(options, mjbench, names, quick=quick)
-            measurement = bench(options, mjbench, names, quick=quick, record=arguments.record)
-            return in_words(arguments, mjbench, "bench", measurement)
+            measurement: Measurement[Any]
+            if arguments.engines is None:
+                measurement = bench(options, mjbench, names, quick=quick, record=record)
+            else:
+                choice = choose_engines(mjbench, arguments.engines)
+                measurement = bench_engines(
+                    options, mjbench, names, choice, quick=quick, record=record
+                )
+            return in_words(arguments, mjbench, report, measurement)
 
     return run_measurement(
         arguments,
         measure,
-        lambda measurement: measurement_json({"scenes": measurement.values}, measurement),
+        lambda measurement: measurement_json({field: measurement.values}, measurement),
         empty="there is no model to measure\n",
     )
 
@@ -271,32 +279,12 @@ class EngineChoice(Struct, frozen=True):
     remarks: tuple[str, ...]
 
 
-def run_engines(arguments: argparse.Namespace) -> int:
-    """Measure models in other engines."""
+def _refuse_options_of_bench(arguments: argparse.Namespace) -> None:
     if arguments.check:
         message = "--check takes no --engines: 32 bits do not repeat from one device to the next"
         raise UsageError(message)
     if arguments.executor is not None:
         raise UsageError("--engines measures engines on this machine, not on others")
-
-    def measure(options: Options) -> Measurement[EngineReport]:
-        with Mjbench(options.root, "`coursebuild bench`") as mjbench:
-            measurement = bench_engines(
-                options,
-                mjbench,
-                tuple(arguments.scenes),
-                choose_engines(mjbench, arguments.engines),
-                quick=arguments.quick,
-                record=arguments.record,
-            )
-            return in_words(arguments, mjbench, "engines", measurement)
-
-    return run_measurement(
-        arguments,
-        measure,
-        lambda measurement: measurement_json({"engines": measurement.values}, measurement),
-        empty="there is no model to measure\n",
-    )
 
 
 def choose_engines(mjbench: Mjbench, text: str) -> EngineChoice:
