@@ -84,6 +84,7 @@ from coursebuild.core.run.script_environment import Interpreter as Interpreter
 from coursebuild.core.run.script_server import RunAll as RunAll
 from coursebuild.core.run.script_server import RunStoppedError as RunStoppedError
 from coursebuild.core.run.script_server import ScriptServer as ScriptServer
+from coursebuild.core.scripts.extract import is_run as is_run
 from coursebuild.core.syntax.decode import decode as decode
 from coursebuild.core.syntax.fence import Fence as Fence
 from coursebuild.core.syntax.fence import Prose as Prose

@@ -144,7 +144,7 @@ def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list
     again = " again" if run.made is not None else ""
     verdicts = {
         "remembered": style.paint("is remembered", GREEN),
-        "norun": "is never run: its lesson says `norun`",
+        "norun": "is never run: its lesson says `norun`, or its language has no runner in the map",
         "would run": style.paint(f"would {verb}{again}", YELLOW),
     }
     lines = [f"{name} {verdicts[run.state]}"]
@@ -265,7 +265,7 @@ class _Explainer:
 
     def _explain_script(self, path: str) -> RunExplanation:
         extraction, job = self.scripts[path]
-        if extraction.script.norun:
+        if not extraction.is_run:
             return RunExplanation("script", path, extraction.owner, "norun")
         inputs = self.run_store.inputs(job, extraction.data)
         record = self.run_store.get_record(inputs)

@@ -26,7 +26,7 @@ from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.scripts.edit import shown_files
-from coursebuild.core.scripts.extract import extract
+from coursebuild.core.scripts.extract import extract, is_run
 from coursebuild.core.scripts.findings import unproven_units
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
@@ -310,12 +310,16 @@ def _refuse_unproven(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Di
         if line.did_run or line.path in allowed_paths:
             continue
         script = by_path[line.path]
-        if not (line.missing or script.norun):
+        if not line.missing and is_run(course, script):
             continue  # another mistake says why
         names = " and ".join(f"`{name}`" for name in line.missing)
         are = "are" if len(line.missing) > 1 else "is"
-        reason = f"{names} {are} not installed" if line.missing else "its fence says `norun`"
-        cure = f"install {names}" if line.missing else "remove `norun`"
+        reason, cure = f"{names} {are} not installed", f"install {names}"
+        if not line.missing:
+            reason, cure = "its fence says `norun`", "remove `norun`"
+            if not script.norun:
+                reason = f"`[runners]` of the map has nothing for `{script.language}`"
+                cure = "name what runs it"
         unproven = unproven_things(line) or "that it runs"
         yield diagnose(
             "script-unproven",

@@ -258,7 +258,7 @@ class Reader:
                 numbered_items=items_of(whole.document, mathml),
                 summaries=notes.value,
             )
-            scripts = document_scripts(whole.document)
+            scripts = [s for s in document_scripts(whole.document) if s.is_python]
             summary = DocumentSummary(
                 bare,
                 (*whole.diagnostics, *formula_diagnostics, *notes.diagnostics),

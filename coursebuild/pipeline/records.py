@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import posixpath
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -48,12 +49,16 @@ def with_provenance(
     One that was known before has it already, and one that the course keeps ran elsewhere. `imports`
     has the modules that scripts import, as far as they are known.
     """
-    texts = {script.path: script.text for script in scripts}
+    extractions = {script.path: script for script in scripts}
     new_runs = [
         run for run in runs.values() if run.did_run and run.provenance is None and not run.recorded
     ]
+
+    def find(extraction: Extraction) -> frozenset[str]:
+        return find_imports(extraction.text) if extraction.script.is_python else frozenset()
+
     imports_by_path = {
-        run.path: imports[run.path] if run.path in imports else find_imports(texts[run.path])
+        run.path: imports[run.path] if run.path in imports else find(extractions[run.path])
         for run in new_runs
     }
     modules_by_path = {
@@ -77,6 +82,9 @@ def with_provenance(
         return find_imports(text)
 
     def provenance(run: ScriptRun) -> Provenance:
+        if commands := extractions[run.path].commands:  # of what version they are is not known
+            program = posixpath.basename(commands[0][0])
+            return Provenance("", surroundings["platform"], ((program, ""),))
         names = {*imports_by_path[run.path]}
         for path in () if run.trace is None else run.trace.files:
             is_of_course = path.endswith(".py") and not path.startswith("mjcourse/")  # our package

@@ -67,7 +67,9 @@ class _Course:
         self._prefixes = tuple(f"{package.path.rstrip('/')}/" for package in course.packages)
         self._models = {model.source.path: model.source.text for model in course.models}
         self.modules = {
-            _dotted(e.path.removeprefix(_EXAMPLES)): CourseModule(e.path, e.text) for e in scripts
+            _dotted(e.path.removeprefix(_EXAMPLES)): CourseModule(e.path, e.text)
+            for e in scripts
+            if e.script.is_python
         }
         self._find_top = functools.cache(self._read_top)
         self.files_of_module = functools.cache(
@@ -77,6 +79,8 @@ class _Course:
 
     def imports(self, extraction: Extraction) -> frozenset[str]:
         """The top-level modules that a script imports."""
+        if not extraction.script.is_python:
+            return frozenset()
         modules = self._imports.get(extraction.path)
         return find_imports(extraction.text) if modules is None else modules
 
@@ -142,11 +146,11 @@ def find_downloads(
     models: Iterable[tuple[str, CompileResult]],
     options: Options,
 ) -> tuple[ScriptDownload, ...]:
-    """What is handed over of these scripts; nothing of those that fail as they are."""
+    """What is handed over of these scripts in Python; nothing of those that fail as they are."""
     facts = ((name, result.facts) for name, result in models)
     course_files = _Course(course, scripts, options, runs, facts)
     downloads = []
-    for extraction in scripts:
+    for extraction in (e for e in scripts if e.script.is_python):
         run = course_files.runs.get(extraction.path)
         if run is None or run.outcome in (Outcome.OK, Outcome.SKIPPED, Outcome.NORUN):
             downloads.append(_make_download(course_files, extraction))

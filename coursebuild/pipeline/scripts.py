@@ -7,7 +7,8 @@ that have no remembered result which still holds, the longest first.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+import shutil
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from msgspec import Struct
@@ -141,8 +142,7 @@ def run(
         options = replace(options, on_result=lambda run: tell(complete(run)))
     run_store = options.run_store() if run_store is None else run_store
     all_jobs = jobs(extractions, perturbation, keeps_going=keeps_going)
-    norun = (script.path for script in extractions if script.script.norun)
-    runs = {path: ScriptRun(path, Outcome.NORUN, 0, "", "", 0.0) for path in norun}
+    runs = dict(_unrun(extractions))
     runs |= {**(known_runs or {}), **recorded_runs(extractions, options)}
     inputs = {
         job.path: run_store.inputs(job, extraction.data)
@@ -161,6 +161,16 @@ def run(
         runs |= _run(jobs_to_run, inputs, options, stage, run_store, records)
     runs = with_provenance(runs, extractions, options, imports)
     return tuple(runs[job.path] for job in all_jobs)
+
+
+def _unrun(extractions: Iterable[Extraction]) -> Iterator[tuple[str, ScriptRun]]:
+    """The scripts that are not to be run, or whose runner is not installed, by their paths."""
+    for extraction in extractions:
+        path, first = extraction.path, next(iter(extraction.commands), ("",))[0]
+        if not extraction.is_run:
+            yield path, ScriptRun(path, Outcome.NORUN, 0, "", "", 0.0)
+        elif first and "/" not in first and shutil.which(first) is None:
+            yield path, ScriptRun(path, Outcome.SKIPPED, 0, "", "", 0.0, missing=(first,))
 
 
 class _Records:

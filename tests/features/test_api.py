@@ -40,7 +40,11 @@ SUBJECTS = {
         "core.syntax.toml_text",
     ),
     "The course": ("core", "core.model"),
-    "What was run, and files of the site": ("core.model.results", "core.engine.tool"),
+    "What was run, and files of the site": (
+        "core.model.results",
+        "core.engine.tool",
+        "core.scripts.extract",
+    ),
     "Pages": (
         "core.pages",
         "core.pages.assets",

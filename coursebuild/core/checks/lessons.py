@@ -40,7 +40,7 @@ def check_course(course: Course) -> tuple[Diagnostic, ...]:
         elif script is None:
             message = f"no lesson or page has a script `{entry.path}`"
             help = did_you_mean(entry.path, scripts) or "remove it"
-        elif not (script.norun or script.requires):
+        elif script.is_python and not (script.norun or script.requires):
             message = f"`{entry.path}` always runs: it says neither `norun` nor `requires`"
             help = "remove it"
         else:

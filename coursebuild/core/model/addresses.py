@@ -133,7 +133,7 @@ def output_anchor(path: str, number: int) -> str:
 
 
 def _stem(path: str) -> str:
-    return listing_anchor(path).rpartition(".")[0]
+    return re.sub(r"\.(?:py|xml)\Z", "", listing_anchor(path))
 
 
 def model_anchors(scenarios: Iterable[str]) -> tuple[str, ...]:

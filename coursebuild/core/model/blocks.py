@@ -159,6 +159,9 @@ class ScriptPart(Labelled, frozen=True):
     show: Show = "open"
 
 
+PYTHON = "python"
+
+
 class Script(Labelled, frozen=True):
     """A complete script, or its beginning: ```` ```python file=examples/x.py ````.
 
@@ -189,6 +192,12 @@ class Script(Labelled, frozen=True):
     """Whether readers are handed over an archive, not one file."""
     parts: tuple[Script | ScriptPart, ...] = ()
     """The blocks of a whole script that stands in several."""
+    language: str = PYTHON
+    """The kind of its fence; one in another language than Python needs a runner of the map."""
+
+    @property
+    def is_python(self) -> bool:
+        return self.language == PYTHON
 
     @property
     def part_lines(self) -> tuple[int, ...]:
@@ -292,10 +301,11 @@ class SourcePart(Struct, frozen=True):
 
 
 class PlainCode(Labelled, frozen=True):
-    """A Python block without `file=`, shown but not run."""
+    """A Python block without `file=`, or a part of a file in any language: shown but not run."""
 
     code: Excerpt
     source: SourcePart | None = None
+    language: str = PYTHON
 
 
 class FeatureBlock(Labelled, frozen=True, kw_only=True):

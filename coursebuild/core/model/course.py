@@ -336,6 +336,8 @@ class Course(Struct, frozen=True):
     """Folders that scripts import from, after their own and before all others."""
     environment: tuple[tuple[str, str], ...] = ()
     """Variables of scripts, sorted."""
+    runners: Mapping[str, tuple[tuple[str, ...], ...]] = {}
+    """The commands that run scripts in other languages, by the kinds of their fences."""
     python: NamedPath | None = None
     """The interpreter of the scripts, if not the one that runs this tool."""
     strict: bool = False

@@ -99,10 +99,10 @@ def shown_versions(provenances: Iterable[Provenance | None]) -> tuple[str, ...]:
     for made_with in provenances:
         if made_with is not None:
             packages |= dict.fromkeys(
-                f"{proper_name(name)} {version}" for name, version in made_with.packages
+                f"{proper_name(name)} {version}".strip() for name, version in made_with.packages
             )
             pythons[made_with.python] = None
-    return (*sorted(packages), *sorted(pythons))
+    return (*sorted(packages), *sorted(filter(None, pythons)))
 
 
 class Recorded(Struct, frozen=True, tag_field="is", tag="recording"):

@@ -55,6 +55,7 @@ class ScriptJob(Struct, frozen=True):
     part_lines: tuple[int, ...] = ()
     """The lines of its file, from 1, at which its parts but the first begin."""
     keeps_going: bool = False  # after a part that fails
+    commands: tuple[tuple[str, ...], ...] = ()  # that run it in place of Python
 
 
 class Sign(enum.Enum):

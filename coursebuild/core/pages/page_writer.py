@@ -130,8 +130,8 @@ class PageWriter(PageContext, frozen=True):
                     engine=self.inputs.engine,
                 )
             case model.PlainCode():
-                code = self.highlight("python", block.code.text.rstrip("\n"))
-                html = self.template("blocks/code.html", language="python", html=code)
+                code = self.highlight(block.language, block.code.text.rstrip("\n"))
+                html = self.template("blocks/code.html", language=block.language, html=code)
                 if block.source is not None:
                     source = block.source
                     lines = re.fullmatch(r"L(\d+)(?:-L(\d+))?", source.part)
@@ -152,7 +152,7 @@ class PageWriter(PageContext, frozen=True):
     ) -> Markup:
         """A script or a part of one, and the outputs that belong to it, as one object."""
         script, first = self.script_places[block.span.start]
-        lines = highlight_lines("python", block.code.text.rstrip("\n"))
+        lines = highlight_lines(script.language, block.code.text.rstrip("\n"))
         receipt = None
         if isinstance(block, model.Script) and not recordings:
             receipt = script_receipt(self, block)

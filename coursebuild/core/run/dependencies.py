@@ -13,6 +13,7 @@ import functools
 import hashlib
 import json
 import re
+import shlex
 from collections.abc import Callable, Iterable, Iterator
 from typing import assert_never
 
@@ -112,6 +113,7 @@ def inputs_of(job: ScriptJob, text: bytes, conditions: tuple[tuple[str, str], ..
         "MiB that it may take": "" if job.memory == Limits().scripts else str(job.memory),
         "lines at which its parts begin": " ".join(map(str, job.part_lines)),
         "going on after a part that fails": "yes" if job.keeps_going else "",
+        "commands that run it": "\n".join(map(shlex.join, job.commands)),
         _PERTURBATION: str(job.perturbation or ""),
     }
     job_conditions += [(name, value) for name, value in options.items() if value]

@@ -18,6 +18,7 @@ import io
 import mmap
 import os
 import site
+import subprocess
 import sys
 import traceback
 from collections.abc import Mapping, Sequence
@@ -100,6 +101,8 @@ class Job(TypedDict):
     """What stands in its output between two of them, in hexadecimal digits."""
     keeps_going: bool
     """Whether it goes on after a part that fails."""
+    commands: list[list[str]]
+    """What runs it, one after the other, in place of Python."""
     perturbation: int
     """The direction in which initial states are moved (`perturbation`); 0: none;
     below, steps are changed (`step_changes.change_steps`)."""
@@ -278,10 +281,32 @@ class ScriptProcess:
         _read_sources_in(job["root"])
         tracer.install()
         tracer.begin(standard)
+        if job["commands"]:
+            self.names["run"] = self._run_commands
+            return compile("run()", "<runner>", "exec")
         if job["part_lines"] or job["keeps_going"]:
             mark, keeps_going = PartMark(bytes.fromhex(job["part_mark"])), job["keeps_going"]
             return compile_parts(text, self.path, job["part_lines"], mark, keeps_going=keeps_going)
         return compile(text, self.path, "exec", dont_inherit=True)
+
+    def _run_commands(self) -> None:
+        """Become the last of the commands that run a script of another language, after the others.
+
+        `{file}` in an argument is the script's path, `{folder}` the temporary folder of this run;
+        the script's arguments follow those of the last command.
+        """
+        folder, (*before, last) = self._environment["TMPDIR"], self.job["commands"]
+
+        def words(command: Sequence[str]) -> list[str]:
+            return [
+                w.replace("{file}", self.job["path"]).replace("{folder}", folder) for w in command
+            ]
+
+        for command in before:
+            if status := subprocess.call(words(command), stdin=subprocess.DEVNULL):
+                sys.exit(abs(status))
+        program, *arguments = words(last)
+        os.execvp(program, [program, *arguments, *self.job["args"]])
 
     def _tracer(self) -> Tracer:
         folders = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120

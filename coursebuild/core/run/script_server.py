@@ -269,6 +269,7 @@ class _Work:
             "part_lines": list(job.part_lines),
             "part_mark": "",
             "keeps_going": job.keeps_going,
+            "commands": [list(command) for command in job.commands],
             "perturbation": job.perturbation,
             "memory": job.memory,
         }

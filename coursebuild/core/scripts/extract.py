@@ -26,6 +26,9 @@ class Extraction(Struct, frozen=True):
     packages: tuple[str, ...] = ()
     environment: tuple[tuple[str, str], ...] = ()
     memory: int = Limits().scripts
+    is_run: bool = True
+    commands: tuple[tuple[str, ...], ...] = ()
+    """What runs it, where Python does not; see `Course.runners`."""
 
     @property
     def path(self) -> str:
@@ -56,6 +59,11 @@ class Extraction(Struct, frozen=True):
         return code.span(start, start + len(lines[line - 1]))
 
 
+def is_run(course: Course, script: Script) -> bool:
+    """Whether a script is to be run; one of another language needs a runner of the map."""
+    return not script.norun and (script.is_python or script.language in course.runners)
+
+
 def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     """The scripts of a course in order, no two of which clash."""
     extractions: list[Extraction] = []
@@ -66,7 +74,13 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
     for owner, document in course.owned_documents:
         for script in document_scripts(document):
             extraction = Extraction(
-                script, owner.id, packages, course.environment, course.limits.scripts
+                script,
+                owner.id,
+                packages,
+                course.environment,
+                course.limits.scripts,
+                is_run(course, script),
+                course.runners.get(script.language, ()),
             )
             # Equal for paths that some file system takes for the same file
             key = unicodedata.normalize("NFC", script.path).casefold()
@@ -123,6 +137,7 @@ def jobs(
             extraction.memory,
             extraction.script.part_lines,
             keeps_going,
+            extraction.commands,
         )
         for extraction in extractions
     )

@@ -107,8 +107,11 @@ def failure_diagnostic(
         frames = list(_FRAME.finditer(stderr, max(0, dump)))
         lines = (_find_line(m, scripts) for m in (frames if dump >= 0 else reversed(frames)))
         source, span = next(filter(None, lines), (extraction, fence))
+        if not extraction.script.is_python:  # as compilers and interpreters write a place
+            place = re.search(rf"{re.escape(extraction.path)}:([0-9]{{1,9}})\b", stderr)
+            span = (extraction.line_span(int(place[1])) if place else None) or fence
         label = "" if span is fence else "it was here"
-    if run.outcome is Outcome.FAILED:
+    if run.outcome is Outcome.FAILED and extraction.script.is_python:
         if not (_parses(source) and _parses(extraction)):
             return None
         error = _last_message(stderr)

@@ -22,7 +22,7 @@ from coursebuild.core.model import (
     Show,
     SourcePart,
 )
-from coursebuild.core.model.blocks import FigureName, Labelled
+from coursebuild.core.model.blocks import PYTHON, FigureName, Labelled
 from coursebuild.core.registry import fence_kind
 from coursebuild.core.syntax.fence import (
     Fence,
@@ -43,6 +43,7 @@ DEFAULT_TIMEOUT, MAX_TIMEOUT = 60.0, 86400.0
 
 _VALUES = ("timeout", "requires", "args", "writes", "record", "figure", "download")
 _FLAGS = ("norun", "diverges", "deep")
+_PROGRAM_VALUES = ("timeout", "args", "writes", "record")
 _SHOWS: tuple[Show, ...] = ("open", "folded", "hidden")
 _WHOLE_STATEMENTS = "a part holds whole statements: a function or a loop stands in one part"
 _NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
@@ -84,9 +85,9 @@ def parse_python(fence: Fence) -> Parsed[Script | ScriptPart | PlainCode]:
         script = build(fence, file, keys.value, diagnostics)
     source = None
     if show is not None and not has_file:
-        path, _, part = (show.value or "").partition("#")
+        path = (show.value or "").partition("#")[0]
         if _PATH.fullmatch(path) and not fence.nested:
-            source = SourcePart(path, part, show.value_span, fence.body_span, fence.prefix)
+            source = _source_part(fence, show)
         else:
             message = f"`{path}` is not the path of a file of the project"
             if fence.nested:
@@ -95,6 +96,33 @@ def parse_python(fence: Fence) -> Parsed[Script | ScriptPart | PlainCode]:
             diagnostics.append(diagnose("fence-key-value", show.value_span, message, help=help))
     code = PlainCode(fence.span, fence.body, source)
     return Parsed(script or code, tuple(diagnostics))
+
+
+def parse_program(fence: Fence) -> Parsed[Script | PlainCode | None]:
+    """A fence of another language: a script if it has a `file` in `examples/`, or a shown file.
+
+    `None` if it is neither: then it is only code, whatever its first line says.
+    """
+    first = {word.key: word.value or "" for word in reversed(split_words(fence.info).value)}
+    if first.get("file", "").startswith("examples/"):
+        keys = fence.keys(values=("file", *_PROGRAM_VALUES), flags=("norun", *_SHOWS))
+        diagnostics, file = list(keys.diagnostics), keys.value.get("file")
+        script = None if file is None else _build_script(fence, file, keys.value, diagnostics)
+        return Parsed(
+            script or PlainCode(fence.span, fence.body, None, fence.kind), (*diagnostics,)
+        )
+    path = first.get("show", "").partition("#")[0]
+    if fence.nested or not _PATH.fullmatch(path) or not {"/", "."} & {*path}:
+        return Parsed(None, ())
+    keys = fence.keys(values=("show",))
+    word = keys.value.get("show")
+    source = None if word is None else _source_part(fence, word)
+    return Parsed(PlainCode(fence.span, fence.body, source, fence.kind), keys.diagnostics)
+
+
+def _source_part(fence: Fence, word: Word) -> SourcePart:
+    path, _, part = (word.value or "").partition("#")
+    return SourcePart(path, part, word.value_span, fence.body_span, fence.prefix)
 
 
 def _build_part(
@@ -114,7 +142,8 @@ def _build_part(
 
 def _check_path(fence: Fence, file: Word, diagnostics: list[Diagnostic]) -> bool:
     path = file.value or ""
-    mistake, help = path_mistake(path), "a script is written to `examples/`, for example "
+    mistake = path_mistake(path, is_python=fence.kind == PYTHON)
+    help = "a script is written to `examples/`, for example "
     help += "`examples/l4_2_inertia.py`"
     if fence.nested:
         mistake, help = "a text of a quiz or lab cannot hold a script", ""
@@ -188,6 +217,7 @@ def _build_script(
         figures=tuple(FigureName(name.text, name.span()) for name in figures),
         show=show,
         archive=download is not None,
+        language=fence.kind,
     )
 
 
@@ -242,7 +272,7 @@ _LISTS: dict[str, tuple[Callable[[str], bool], str, str]] = {
 """Keys with a list of names: which are right, and the message and the help for others."""
 
 
-def path_mistake(path: str) -> str:
+def path_mistake(path: str, *, is_python: bool = True) -> str:
     """Why a script cannot have this path; empty if it can."""
     parts = path.split("/")
     stem = parts[-1].removesuffix(".py")
@@ -258,15 +288,17 @@ def path_mistake(path: str) -> str:
         return f"`{path}` has a part that is empty or `.`"
     if parts[0] != "examples" or len(parts) < 2:
         return f"`{path}` is not below `examples/`"
-    if not path.endswith(".py") or not stem:
+    if is_python and (not path.endswith(".py") or not stem):
         return f"`{path}` does not end in `.py`" if stem else f"`{path}` has no name before `.py`"
+    if not is_python and path.lower().endswith((".py", ".pyc", ".so", ".pyd", ".pth")):
+        return f"`{path}` would be imported by Python scripts beside it"
     if _UNPORTABLE.search(path) or any(part[-1] in ". " or part[0] == " " for part in parts):
         return f"`{path}` has a character that not every file system and shell takes"
     if any(len(part.encode()) > 255 for part in parts):
         return "a part of the path is longer than 255 bytes"
     if device := next((part for part in parts if _DEVICE.fullmatch(part)), None):
         return f"`{device}` is a reserved name on some systems"
-    if stem in _UNUSABLE_NAMES:
+    if is_python and stem in _UNUSABLE_NAMES:
         return f"`{path}` would be imported in place of the module `{stem}` by its neighbours"
     return ""
 
@@ -305,7 +337,7 @@ def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
         case "python":
             python = parse_python(fence)
             state.diagnostics += python.diagnostics
-            return _place_python(fence, python, state)
+            return _place_script(fence, python, state)
         case "output" if fence.nested:
             message = "a text of a quiz or lab cannot hold a recorded output"
             state.report(diagnose("fence-info", fence.head, message))
@@ -341,17 +373,21 @@ def _read_kind(fence: Fence, state: ParsingState, texts: TextParser) -> Block:
             block = kind.parse(fence, texts)
             state.diagnostics += block.diagnostics
             return block.value or fence.code()
+        case _ if (program := parse_program(fence)).value is not None:
+            state.diagnostics += program.diagnostics
+            return _place_script(fence, program, state)
         case _:
             state.diagnostics += check_kind(fence)
             return fence.code()
 
 
-def _place_python(
-    fence: Fence, python: Parsed[Script | ScriptPart | PlainCode], state: ParsingState
+def _place_script(
+    fence: Fence, result: Parsed[Script | ScriptPart | PlainCode | None], state: ParsingState
 ) -> Block:
     """The block, after which outputs are those of its script, and figures may be its figures."""
-    block = python.value
-    is_invalid = any(d.rule in _HEAD_RULES for d in python.diagnostics)
+    block = result.value
+    assert block is not None, "what is only code is placed nowhere"
+    is_invalid = any(d.rule in _HEAD_RULES for d in result.diagnostics)
     if isinstance(block, ScriptPart) and block.path not in state.parts:
         message = f"no block above this part begins `{block.path}`"
         help = "the parts of a script stand in one lesson, in the order of the file; "

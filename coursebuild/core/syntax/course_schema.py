@@ -331,6 +331,10 @@ class SecurityTable(Struct, frozen=True, forbid_unknown_fields=True):
     ] = "safe"
 
 
+Command: TypeAlias = Annotated[tuple[Text, ...], Meta(min_length=1)]
+"""A program and its arguments."""
+
+
 class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     """The course map: the whole syllabus, and how the course is built."""
 
@@ -344,6 +348,10 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
     callouts: Annotated[
         dict[str, Text | CalloutTable],
         describe("more kinds of callouts by name, with a label or a table"),
+    ] = {}
+    runners: Annotated[
+        dict[str, Annotated[tuple[Command, ...], Meta(min_length=1)]],
+        describe("by the kind of a fence, the commands that run scripts in another language"),
     ] = {}
     silence: tuple[Silence, ...] = ()
     level: tuple[LevelTable, ...] = ()

@@ -38,6 +38,7 @@ from coursebuild.core.syntax.nodes import (
     format_name,
     shorten,
 )
+from coursebuild.core.syntax.other_tools import is_known_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.syntax.tree import NestedTextParser
@@ -157,6 +158,7 @@ def _build_course(
         features=_named_paths(table, "features", settings.features),
         packages=_named_paths(table, "packages", settings.packages),
         environment=tuple(sorted(verify.env.items())),
+        runners=fields.runners,
         width=fields.format.width if fields.format is not None else 0,
         html=fields.security.html,
         limits=fields.limits,
@@ -295,6 +297,7 @@ def _check_paths(root: ObjectNode, lessons: Iterable[model.Lesson]) -> Iterator[
 _DIFFERENT_TEXTS = (("length 1.962 cm", "length 2.481 cm"), ("length 1.962 cm", "weight 1.962 cm"))
 """What no filter may take for the same, or else it would do so with any numbers or words."""
 _VARIABLE = re.compile(r"(?!PYTHON|PATH$|TMPDIR$)[A-Za-z_][A-Za-z0-9_]*")
+_LANGUAGE = re.compile(r"[a-z0-9][a-z0-9+#._-]*")
 _CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
@@ -341,6 +344,18 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
         if not _CALLOUT.fullmatch(name):
             message = f"{format_name(name)} cannot be a kind of callout"
             help = "expected: lower-case letters and digits in words joined by single hyphens"
+            yield diagnose("field-value", member.key.span, message, help=help)
+    for _, course in decoding.find_structs(CourseFile):
+        for name, commands in course.runners.items():
+            if not any("{file}" in word for command in commands for word in command):
+                message = f"no argument of `{name}` has `{{file}}`, the path of the script"
+                yield diagnose("field-value", root.object("runners").place(name), message)
+    for name, member in root.object("runners").members.items():
+        if is_known_kind(name) or not _LANGUAGE.fullmatch(name):
+            message = f"{format_name(name)} is no kind of block that holds another language"
+            help = "expected: the first word of the fence, in lower case, as in `c`"
+            if name == model.PYTHON:
+                help = "Python scripts are run by `python` in `[verify]`"
             yield diagnose("field-value", member.key.span, message, help=help)
     for node, silence in decoding.find_structs(Silence):
         rule = RULES.get(silence.rule)

@@ -108,7 +108,7 @@ def _check_scripts(
         mistakes = [d for d in diagnostics if d.rule == "python-syntax"]
         if parts and not any(p.span.contains(d.span) for p in parts for d in mistakes):
             yield from check_syntax(script.code)
-        if not (script.figures or script.norun):
+        if script.is_python and not (script.figures or script.norun):
             yield from find_windows(script.code)
 
 

@@ -115,7 +115,7 @@ class DocumentWriter:
                 inner = self.blocks(block.blocks)
                 return marks.block_quote(f"{head}\n\n{inner}" if inner else head)
             case model.PlainCode():
-                return self._below_caption(block, marks.fence("python", block.code.text))
+                return self._below_caption(block, marks.fence(block.language, block.code.text))
             case model.Script() | model.ScriptPart():
                 return self._script(block)
             case model.Recording():
@@ -296,8 +296,9 @@ class DocumentWriter:
 
     def is_cell(self, block: model.Script | model.ScriptPart) -> bool:
         """Whether a notebook has the whole script in a cell at the place of this block."""
-        parts = self.page.script_places[block.span.start][0].parts
-        return self.notebook and (not parts or parts[-1].span == block.span)
+        script = self.page.script_places[block.span.start][0]
+        is_end = not script.parts or script.parts[-1].span == block.span
+        return self.notebook and script.is_python and is_end
 
     def _script(self, block: model.Script | model.ScriptPart) -> str:
         """Write a script or a part of one, with the outputs that follow it."""
@@ -330,7 +331,7 @@ class DocumentWriter:
             last = first + block.code.text.rstrip("\n").count("\n")
             lines = self.words("code.lines", first=first, last=last)
             name += f", {lines if first < last else self.words('code.line', first=first)}"
-        parts[:0] = [f"{name}:", marks.fence("python", block.code.text.rstrip("\n"))]
+        parts[:0] = [f"{name}:", marks.fence(script.language, block.code.text.rstrip("\n"))]
         if isinstance(block, model.Script) and not recordings and not self.notebook:
             receipt = script_receipt(self.page, block)
             parts.append(f"*{marks.escape_marks(receipt.text)}*")

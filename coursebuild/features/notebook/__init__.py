@@ -241,7 +241,7 @@ def _setup_cells(site: SiteContext, lesson: model.Lesson, archive: zips.Archive)
     requirements = files.pop("requirements.txt", b"").decode().splitlines()
     packages = [line for line in requirements if not line.startswith("#")]
     files.pop("README.md", None)
-    scripts = [script.path for script in model.document_scripts(lesson.document)]
+    scripts = [s.path for s in model.document_scripts(lesson.document) if s.is_python]
     early = _imported_early(site, scripts, files)
     files = {path: data for path, data in files.items() if path not in scripts or path in early}
     room, included = _MAX_SIZE, {}

@@ -25,6 +25,7 @@ from coursebuild.api import (
     did_you_mean,
     document_scripts,
     find_blocks,
+    is_run,
     parse_json,
 )
 from coursebuild.core.model import CodeBlock, Heading, Mode, ThematicBreak
@@ -39,17 +40,17 @@ from coursebuild.features.quiz.schema import QuizFile
 
 def check_quizzes(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Report output questions of some documents about scripts that nothing runs."""
-    norun = {s.path: s.norun for document in course.documents for s in document_scripts(document)}
+    scripts = {s.path: s for document in course.documents for s in document_scripts(document)}
     for document in documents:
         for quiz in find_blocks(document, Quiz):
             for question in quiz.output_questions():
                 script, place = question.script, question.script_span
-                if script not in norun:
+                if script not in scripts:
                     message = f"no lesson has a script `{script}`"
-                    help = did_you_mean(script, norun)
+                    help = did_you_mean(script, scripts)
                     yield diagnose("quiz-output", place, message, help=help)
-                elif norun[script]:
-                    message = f"`{script}` is marked `norun`, so it has no output"
+                elif not is_run(course, scripts[script]):
+                    message = f"`{script}` is not run, so it has no output"
                     yield diagnose("quiz-output", place, message)
 
 
