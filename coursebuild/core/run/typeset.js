@@ -40,11 +40,22 @@ const typeset = (() => {
     [/\\begin\{eqnarray\*?\}/g, () => '\\begin{array}{rcl}'],
     [/\\end\{eqnarray\*?\}/g, () => '\\end{array}'],
     [/\\(begin|end)\{flalign(\*?)\}/g, (_, edge, star) => `\\${edge}{align${star}}`],
+    [/\\(begin|end)\{split\}/g, (_, edge) => `\\${edge}{aligned}`], // which may also stand in a line
     [/\\(?:begin|end)\{(?:math|displaymath)\}|\\(?:require|vspace\*?)\{[^{}]*\}/g, () => ''],
     [/(\\begin\{array\})(?:\[[tcb]\])?\{((?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}/g, (_, begin, columns) => `${begin}{${plainColumns(columns)}}`],
     [/([_^])\s*\\(rm|bf|it|sf|tt|cal)\s*(?=\{)/g, (_, mark, font) => `${mark}\\math${font}`],
     [/([_^])\s*(\\(?:arg|deg|det|dim|exp|gcd|inf|ker|lim|ln|log|max|min|Pr|sup|sin|cos|tan))(?![A-Za-z])/g, (_, mark, name) => `${mark}{${name}}`],
-    [/\\(?:mbox|text(?:tt|rm|sf|bf|it)?)\{[^{}$\\]*\}/g, (text) => text.replaceAll('_', '\\_')],
+    // In a text these are characters; but `#1` in the text of a macro is what it is given.
+    [
+      /\\(?:mbox|text(?:tt|rm|sf|bf|it)?)\{(?:[^{}$\\]|\\[^A-Za-z])*\}/g,
+      (text, _, tex) => {
+        const mark = /\\(?:def|[a-z]*command)(?![A-Za-z])/.test(tex) ? /\\.|_|#(?![1-9])/g : /\\.|_|#/g
+        return text.replace(mark, (sign) => (sign.length > 1 ? sign : `\\${sign}`))
+      },
+    ],
+    // Temml takes a bracket of a fixed size for half of a pair, though any other may close it.
+    [/(\\[bB]igg?[lm]?)\s*\(/g, (_, size) => `${size}\\lparen `],
+    [/(\\[bB]igg?[lm]?)\s*\[/g, (_, size) => `${size}\\lbrack `],
   ]
 
   /** The columns of an array without the spaces, widths and commands of LaTeX's `array` package; `*{3}{c}` is `ccc`. */

@@ -28,7 +28,7 @@ from coursebuild.features.importer.source_files import Segment
 
 _CALLOUTS = {
     **{name: name for name in CALLOUTS},
-    **dict.fromkeys(("hint",), "tip"),
+    "hint": "tip",
     **dict.fromkeys(("attention", "failure", "bug"), "caution"),
     **dict.fromkeys(("danger", "error"), "warning"),
     **dict.fromkeys(("seealso", "info", "abstract", "summary", "quote", "topic"), "note"),

@@ -15,7 +15,9 @@ from coursebuild.features.importer.source_files import Segment, read_yaml
 _OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULTILINE)
 """An option of a cell, as Quarto and as MyST write it."""
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
-_WINDOW = re.compile(r"^([ \t]*)(?:plt|(?:\w+\.)?pyplot)\.show\([^()\n]*\)[ \t;]*$", re.MULTILINE)
+_WINDOW = re.compile(
+    r"^([ \t]*)(?:display\()?(?:plt|(?:\w+\.)?pyplot)\.show\([^()\n]*\)+[ \t;]*$", re.MULTILINE
+)
 """What opens a window where there is none."""
 _FIGURE = re.compile(r"\b(?:plt|pyplot|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
@@ -74,7 +76,9 @@ def _name_of_pyplot(code: str) -> str:
     return whole if whole in code else ""
 
 
-_DRAWN_TITLE = re.compile(r"\.(?:set_)?(?:sup)?title\(\s*[rf]?([\"'])((?:(?!\1).)+)\1")
+_DRAWN_TITLE = re.compile(
+    r"\.(?:set_)?(?:sup)?title\(\s*(?:r|f(?!.*\{))?([\"'])((?:(?!\1).)+)\1"  # none is computed
+)
 
 
 def _draws(cell: Segment, code: str) -> bool:

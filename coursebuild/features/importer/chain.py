@@ -123,7 +123,7 @@ class Chain:
                     case _:
                         continue
                 if any(f"{name}.".startswith(f"{m}.") for name in modules for m in self.modules):
-                    names |= {a.asname or a.name.split(".")[0] for a in statement.names}
+                    names |= _bound_names(ast.unparse(statement))
                     first, last = statement.lineno - 1, statement.end_lineno or statement.lineno
                     lines[first:last] = [""] * (last - first)
             if (new := "\n".join(lines)) != code:

@@ -23,6 +23,7 @@ from coursebuild.features.importer.source_files import (
     SourceFiles,
     read_yaml,
     title_of_file,
+    value_at,
 )
 
 _NOT_LESSONS = ("readme", "license", "licence", "changelog", "contributing", "code_of_conduct")
@@ -44,16 +45,16 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     """
     names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
     myst, quarto, _, mkdocs = settings = [_read_settings(name, files) for name in names]
-    titles = [_get(mapping, *path, "title") for mapping in settings for path in _TITLE_PATHS]
-    titles.append(_get(mkdocs, "site_name"))
+    titles = [value_at(mapping, *path, "title") for mapping in settings for path in _TITLE_PATHS]
+    titles.append(value_at(mkdocs, "site_name"))
     title = next((" ".join(text.split()) for text in titles if isinstance(text, str)), "")
     parts = [
         *_read_parts(_read_settings("_toc.yml", files), files),
-        *_read_parts(_get(myst, "project"), files),
-        *_read_parts(_get(quarto, "book", "chapters"), files),
-        *_read_parts(_get(quarto, "website", "sidebar"), files),
-        *_read_parts(_get(quarto, "book", "appendices"), files),
-        *_read_nav(_get(mkdocs, "nav"), str(_get(mkdocs, "docs_dir") or "docs"), files),
+        *_read_parts(value_at(myst, "project"), files),
+        *_read_parts(value_at(quarto, "book", "chapters"), files),
+        *_read_parts(value_at(quarto, "website", "sidebar"), files),
+        *_read_parts(value_at(quarto, "book", "appendices"), files),
+        *_read_nav(value_at(mkdocs, "nav"), str(value_at(mkdocs, "docs_dir") or "docs"), files),
     ]
     outline = None if parts else read_outline(files)
     if outline is not None:
@@ -97,18 +98,9 @@ def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
     return value if isinstance(value, dict) else {"chapters": value}
 
 
-_SETTINGS = (
-    "bibtex_bibfiles",
-    "bibliography",
-    "appendices",
-    "title",
-    "site_name",
-    "nav",
-    "docs_dir",
-    "toc",
-    "chapters",
-    "sidebar",
-    "root",
+_SETTINGS = frozenset(
+    "appendices bibliography bibtex_bibfiles chapters docs_dir nav root sidebar site_name title "
+    "toc".split()
 )
 """Keys of settings that are read."""
 
@@ -119,13 +111,6 @@ def _lost_keys(settings: Mapping[str, Any]) -> Iterator[str]:
             yield from (f"{key}.{inner}" for inner in _lost_keys(value))
         elif key not in _SETTINGS:
             yield key
-
-
-def _get(settings: object, *path: str) -> object:
-    """Return the value at a path of nested keys; `None` where there is none."""
-    for key in path:
-        settings = settings.get(key) if isinstance(settings, Mapping) else None
-    return settings
 
 
 def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:

@@ -26,7 +26,7 @@ from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext, script_path_of, to_anchor
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.jsx import is_mdx
-from coursebuild.features.importer.prose import find_anchors, find_references
+from coursebuild.features.importer.prose import find_anchors
 from coursebuild.features.importer.references import complete_texts
 from coursebuild.features.importer.source_files import (
     TEXTS,
@@ -114,6 +114,14 @@ def _plan_empty_lessons(
     return replace(course, levels=tuple(levels))
 
 
+_FRAGMENT = re.compile(
+    r"<mujocoinclude\b|\A(?!.*<(?:worldbody|include)\b)"
+    r".*<(?:actuator|contact|equality|keyframe|sensor|tendon)\b",
+    re.DOTALL,
+)
+"""What is about bodies, and has none."""
+
+
 def _find_models(files: SourceFiles) -> Mapping[str, str]:
     """Return the new paths of models, and of the files that they are made of, by their paths."""
     models: dict[str, str] = {}
@@ -135,9 +143,10 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
     for path in texts:
         if path in included:
             files.account.changed["fragment of a model", "beside the models that include it"] += 1
-        elif re.search(r"<mujocoinclude\b", texts[path]):
+        elif _FRAGMENT.search(texts[path]):
             message = "a fragment of a model, which none includes: it is compiled with none"
             files.leave(path, message, "fragment of a model")
+            models.pop(path, None)
     return models
 
 
@@ -177,7 +186,9 @@ def _place_models(root: str, names: set[str], models: dict[str, str]) -> None:
             models[name] = new
 
 
-_WORK = re.compile(r"^[ \t]*@(?!comment|preamble)(\w+)[ \t]*\{[ \t]*([^,\s{}=]+)", re.M | re.I)
+_WORK = re.compile(
+    r"(?:^|(?<=\}))[ \t]*@(?!comment|preamble)(\w+)[ \t]*\{[ \t]*([^,\s{}=]+)", re.M | re.I
+)
 
 
 def _works(files: SourceFiles) -> Iterator[tuple[str, str]]:
@@ -309,7 +320,9 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     context = replace(
         context,
         references=frozenset(
-            label for segment in text.segments for label in find_references(segment.text)
+            label.casefold()
+            for segment in text.segments
+            for label in re.findall(r"^[ >]*\[(?!\^)([^\[\]\n]+)\]:", segment.text, re.MULTILINE)
         ),
         script_path=script_path_of(text.path),
         title=text.title,

@@ -95,10 +95,10 @@ class _Reader:
         """Return the fields of an object, by their names here; of these, `names` are expected."""
         if not isinstance(value, dict):
             raise UsageError("course.json: a level or a lesson is not an object")
-        fields = {_field_name(key): item for key, item in value.items()}
+        fields = {_FIELD_NAMES.get(key) or key: item for key, item in value.items()}
         owner = _read_text(fields, "id") or _read_text(fields, "title")
         for key, item in value.items():
-            name = _field_name(key)
+            name = _FIELD_NAMES.get(key) or key
             items = item if isinstance(item, list) else [item]
             is_text = all(isinstance(part, str) for part in items)
             if name in names and (is_text or name in _GROUPS):
@@ -147,10 +147,6 @@ class _Reader:
             if id and pattern.match(posixpath.basename(stem_of(path))):
                 matches.append(path)
         return matches[0] if matches else ""
-
-
-def _field_name(key: str) -> str:
-    return _FIELD_NAMES.get(key, key)
 
 
 def _read_texts(fields: dict[str, Any], name: str) -> tuple[str, ...]:
@@ -257,15 +253,7 @@ def _read_file(
         if not text.file.endswith(".ipynb"):
             source = expand_includes(source, text.file, files)
         if text.file.endswith(".qmd"):  # there a tag need not be apart from a block
-            source = re.sub(
-                r"^([ \t]*</?[a-z][^<>\n]*>)[ \t]*\n(?=[ \t]*`{3})",
-                r"\1\n\n",
-                source,
-                flags=re.MULTILINE,
-            )
-            source = re.sub(
-                r"^([ \t]*`{3,}[ \t]*\n)(?=[ \t]*</)", r"\1\n", source, flags=re.MULTILINE
-            )
+            source = _TAG_BESIDE_BLOCK.sub(r"\g<0>\n", source)
         if has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
             files.account.changed["hidden lines of Rust", "dropped: readers did not see them"] += 1
             source = visible_text
@@ -292,6 +280,9 @@ def _read_file(
     return replace(text, id=id or page, slug=slug, title=title, path=path)
 
 
+_TAG_BESIDE_BLOCK = re.compile(
+    r"^[ \t]*</?[a-z][^<>\n]*>[ \t]*\n(?=[ \t]*`{3})|^[ \t]*`{3,}[ \t]*\n(?=[ \t]*</)", re.MULTILINE
+)
 _ROLE = re.compile(r"\{[a-z][\w:-]*\}`([^`]*?)(?:\s*<[^`<>]*>)?`")
 """A role of MyST, of which the map, where titles are plain, keeps the words."""
 

@@ -192,7 +192,7 @@ def _write_file(directive: Directive, context: LessonContext, kind: str) -> str:
     if directive.name == "include":
         return directive.nested(text)
     language = options.get("language") or path.rpartition(".")[2]
-    language = {"py": "python", "cpp": "cpp", "txt": "text", "yml": "yaml"}.get(language, language)
+    language = {"py": "python", "yml": "yaml"}.get(language, language)
     return marks.fence(
         language if language in highlighted_languages() else "text", text.strip("\n")
     )

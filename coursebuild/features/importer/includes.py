@@ -10,7 +10,7 @@ from __future__ import annotations
 import posixpath
 import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from coursebuild.features.importer.source_files import TOO_MUCH, SourceFiles
 
@@ -86,11 +86,9 @@ def _part_of(text: str, part: str, *, by_lines: bool) -> str | None:
     Marks of anchors are left out. `None`: there is no such anchor.
     """
     text = text if text.endswith("\n") else f"{text}\n"
-    if by_lines and (lines := re.fullmatch(r"(\d*)(:?)(\d*)", part)) is not None and part:
-        first = int(lines[1] or 1)
-        last = int(lines[3]) if lines[3] else None if lines[2] else first
-        text = "".join(text.splitlines(keepends=True)[first - 1 : last])
-        part = ""
+    lines = text.splitlines(keepends=True)
+    if by_lines and part and (numbers := _read_range(part, ":", lines)) is not None:
+        text, part = "".join(lines[numbers.start : numbers.stop]), ""
     if not part:
         return re.sub(_SECTION, "", re.sub(_ANCHOR, "", text, flags=re.M), flags=re.M)
     for pattern in (_ANCHOR, _SECTION):
@@ -99,6 +97,16 @@ def _part_of(text: str, part: str, *, by_lines: bool) -> str | None:
             end = marks[1].start() if len(marks) > 1 else len(text)
             return _part_of(text[marks[0].end() : end], "", by_lines=False)
     return None
+
+
+def _read_range(words: str, mark: str, lines: Sequence[str]) -> range | None:
+    """Return the indices of the lines that numbers with a mark between them choose."""
+    bounds = re.fullmatch(rf"\s*(\d*)\s*({mark}?)\s*(\d*)\s*", words)
+    if bounds is None:
+        return None
+    first = int(bounds[1] or 1)
+    last = int(bounds[3]) if bounds[3] else len(lines) if bounds[2] else first
+    return range(first - 1, min(last, len(lines)))
 
 
 def lines_of(text: str, options: Mapping[str, str]) -> str:
@@ -121,12 +129,9 @@ def lines_of(text: str, options: Mapping[str, str]) -> str:
     if selection := options.get("lines", ""):
         numbers = list[int]()
         for part in selection.split(","):
-            if bounds := re.fullmatch(r"\s*(\d*)\s*(-?)\s*(\d*)\s*", part):
-                first = int(bounds[1] or 1)
-                last = int(bounds[3]) if bounds[3] else len(lines) if bounds[2] else first
-                if len(numbers) < _MOST_LINES:
-                    numbers += range(first, min(last, len(lines)) + 1)
-        lines = [lines[number - 1] for number in numbers if number <= len(lines)]
+            if (indices := _read_range(part, "-", lines)) and len(numbers) < _MOST_LINES:
+                numbers += indices
+        lines = [lines[number] for number in numbers]
     text = "\n".join(lines)
     return textwrap.dedent(text) if "dedent" in options else text
 

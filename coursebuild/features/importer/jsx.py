@@ -26,7 +26,7 @@ _PART = re.compile(
     rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)>",
     re.MULTILINE | re.DOTALL,
 )
-_COMPUTED = re.compile(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
+_COMPUTED = re.compile(rf"\s+[\w-]+={_BRACES}")
 _LABEL = re.compile(r"\s(?:label|title|value)=[\"']([^\"']*)[\"']")
 
 
@@ -54,10 +54,5 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
             context.leave("component", f"the component `<{name}>`; what it holds is shown")
         label = _LABEL.search(attributes)
         return f"**{label[1]}**" if label else ""
-    attributes = _COMPUTED.sub(
-        lambda computed: (
-            re.sub(r"=.*", f'="{computed["number"]}"', computed[0]) if computed["number"] else ""
-        ),
-        attributes,
-    )
+    attributes = _COMPUTED.sub("", re.sub(r"=\{(\d+)\}", r'="\1"', attributes))
     return f"<{part['end']}{name}{attributes.replace('className=', 'class=')}>"

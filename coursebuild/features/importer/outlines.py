@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from msgspec import Struct
 
+from coursebuild.features.importer.segments import read_front_matter
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedLevel,
@@ -22,6 +23,7 @@ from coursebuild.features.importer.source_files import (
     read_yaml,
     stem_of,
     title_of_file,
+    value_at,
 )
 
 
@@ -38,15 +40,19 @@ class Outline(Struct, frozen=True, kw_only=True):
 
 def read_outline(files: SourceFiles) -> Outline | None:
     """Return the map of a folder; `None` where it has none of these."""
-    book = read_toml(files.read_text("book.toml")) if "book.toml" in files else None
-    settings = (book or {}).get("book")
-    settings = settings if isinstance(settings, Mapping) else {}
-    folder = str(settings.get("src") or "src") if book is not None else ""
-    places = (posixpath.join(folder, "SUMMARY.md"), "SUMMARY.md", "docs/SUMMARY.md")
+    is_mdbook, settings = "book.toml" in files, None
+    if is_mdbook:
+        settings = value_at(read_toml(files.read_text("book.toml")), "book")
+    elif "book.json" in files:  # of GitBook; JSON is YAML
+        settings = read_yaml(files.read_text("book.json"))
+    key, usual = ("src", "src") if is_mdbook else ("root", "")
+    folder = str(value_at(settings, key) or usual)
+    name = str(value_at(settings, "structure", "summary") or "SUMMARY.md")
+    places = (posixpath.join(folder, name), "SUMMARY.md", "docs/SUMMARY.md")
     path = next((path for path in map(posixpath.normpath, places) if path in files), "")
     if path:
         files.account.changed["map", "content/course.toml"] += 1
-        return _read_summary(path, str(settings.get("title") or ""), files, book is not None)
+        return _read_summary(path, str(value_at(settings, "title") or ""), files, is_mdbook)
     config = next((p for p in files if re.fullmatch(r"docusaurus\.config\.[cm]?[jt]s", p)), "")
     if not config:
         return None
@@ -248,17 +254,12 @@ def _read_folder(folder: str, files: SourceFiles) -> Iterator[ImportedText | Imp
 
 
 def _category(folder: str, files: SourceFiles) -> Mapping[str, object]:
-    for name in ("_category_.json", "_category_.yml", "_category_.yaml"):
-        if (path := f"{folder}/{name}") in files:
-            value = read_yaml(files.read_text(path))  # JSON is YAML
-            return value if isinstance(value, dict) else {}
-    return {}
+    paths = (f"{folder}/_category_.{end}" for end in ("json", "yml", "yaml"))
+    path = next((path for path in paths if path in files), "")
+    value = read_yaml(files.read_text(path)) if path else None  # JSON is YAML
+    return value if isinstance(value, dict) else {}
 
 
 def _front_matter(path: str, files: SourceFiles) -> Mapping[str, object]:
-    if not path.endswith((".md", ".mdx")):
-        return {}
-    text = files.read(path).decode("utf-8-sig", "replace")
-    match = re.match(r"---[ \t]*\n(.*?\n)---[ \t]*(?:\n|\Z)", text.replace("\r\n", "\n"), re.DOTALL)
-    value = read_yaml(match[1]) if match else None
-    return value if isinstance(value, dict) else {}
+    text = files.read(path).decode("utf-8-sig", "replace").replace("\r\n", "\n")
+    return read_front_matter(text)[0] if path.endswith((".md", ".mdx")) else {}

@@ -6,10 +6,7 @@ not recognized here.
 
 from __future__ import annotations
 
-import posixpath
 import re
-from collections.abc import Iterator
-from urllib.parse import urlsplit
 
 from coursebuild.features.importer.context import (
     LessonContext,
@@ -27,6 +24,8 @@ _ATTRIBUTES = (
 )
 _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
 """Attributes of Pandoc or of Python's Markdown, which follow what they belong to."""
+_KEY = r"\w(?:[\w.:/+-]*\w)?"
+"""The key of a source."""
 _PLACE = r"(?:[^()\s]|\([^()\s]*\))+"
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
 # A formula holds no beginning of another: so each character is looked at a few times, not once for
@@ -34,10 +33,10 @@ _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
 _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`))"
-    rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?:{_LINK_TITLE})?\)"
+    rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?:{_LINK_TITLE})?[ \t]*\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
-    rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?\))"
+    rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
@@ -45,11 +44,13 @@ _LINE = re.compile(
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]\[(?P<path>[A-Za-z_]\w*(?:\.\w+)+)?\])"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
     r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
-    r"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@\w[\w:./-]*(?:[;,\s][^\[\]\n]*)?\])"
-    r"|(?P<substitution>\{\{[^{}\n]*\}\})"
+    rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
+    r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
+    r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
+    r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^{}\n]*%\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
-    rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?\)))"  # its text began a line above
+    rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:)"
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>[a-z][a-z0-9-]*(?:\+[a-z0-9-]+)*)\+\+(?![\w+]))"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
@@ -60,7 +61,9 @@ _LINE = re.compile(
 )
 _ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
 _DISPLAY = re.compile(
-    r"\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\})?",
+    r"\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$"
+    r"(?:[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\}))?"
+    r"(?:[ \t]*<br[ ]*/?>)*(?P<behind>[ \t]*(?=[^\s.,;:]|[.,;:][ \t]*\S))?",
     re.DOTALL,
 )
 _ENVIRONMENT = re.compile(
@@ -72,8 +75,11 @@ _ENVIRONMENT = re.compile(
 )
 """A formula between dollar signs, or one that its environment alone makes one."""
 _BRACKETS = re.compile(
-    r"^[ \t]*\\\[(?P<tex>(?>(?:(?!\\[\[\]]).)+))\\\][ \t]*$", re.DOTALL | re.MULTILINE
+    r"^(?P<lead>[ \t]*)(?:\\\[(?P<tex>(?>(?:(?!\\[\[\]]).)+))\\\]"
+    r"|\$(?P<lines>[ \t]*\n(?:(?!\n[ \t]*\n)[^$])+)\$)[ \t]*$",
+    re.DOTALL | re.MULTILINE,
 )
+"""A formula between brackets, or below a line that holds nothing but a dollar sign."""
 _TARGET = re.compile(
     r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE
 )
@@ -89,18 +95,18 @@ _MEANING = re.compile(
 )
 """A term in a paragraph of its own, and the mark of what it means."""
 _LABEL = re.compile(r"\\label\{([^{}]*)\}")
+_LEAD = re.compile(r"\n[ \t>]*\Z")
+"""What stands before the mark that ends a formula, on a line of its own."""
+_WORDS_BEFORE = re.compile(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
-_FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
-"""The first or last line of a block of code in a quotation or a list."""
+_EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
+"""The first or last line of code in a quotation or a list, or the first of a comment or formula."""
+_ENDS = {"<!--": "-->", "$$": "$$"}
 _COMMENT = re.compile(r"^(?:%[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE)
 """A comment of MyST, or its break between two cells."""
 _COMMENT_AS_HEADING = re.compile(
     r"^(#{1,6})[ \t]+<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$", re.MULTILINE
 )
-_ACTIVE = re.compile(
-    r"^[ ]{0,3}<(?P<name>style|script)\b.*?</(?P=name)>[ \t]*\n?", re.DOTALL | re.M | re.I
-)
-"""What changes how a page looks or what it does."""
 _CONTENTS = re.compile(
     r'<div class="toc">.*?</div>|^(?:\[TOC\]|\[\[_?TOC_?\]\])[ \t]*$', re.DOTALL | re.M
 )
@@ -121,8 +127,10 @@ _KEPT = {
 _OVER_LINES = re.compile(
     r"(?<![\w$\\])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
+    r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
+    r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
 )
-"""A role or a note that goes on in the next line."""
+"""A role, a note, a citation or the address of a link that goes on in the next line."""
 _FIGURE = re.compile(
     r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"
     r"\{#fig-(?P<label>[\w-]+)(?:[^{}\n]*?fig-alt=\"(?P<alternative>[^\"\n]*)\")?[^{}\n]*\}(?=\n|\Z)"
@@ -140,6 +148,7 @@ _KINDS = {
     "note": ("footnote", "stands at the end of the lesson"),
     "cross": ("cross-reference", "a link"),
     "cite": ("citation", "in the words of BibTeX's keys"),
+    "pair": ("pair of tags", "what it holds, without a frame"),
     "substitution": ("substitution", "dropped: it changes no word"),
     "mention": ("mention of a lesson", "its new number"),
     "route": ("link", "its new address"),
@@ -165,12 +174,6 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
     account = context.files.account
-    for active in _ACTIVE.finditer(text):
-        message = (
-            f"`<{active['name'].lower()}>`, which a page cannot have: use a theme or a feature"
-        )
-        context.leave("tag of HTML", message)
-    text = _ACTIVE.sub("", text)
     for pattern, kind in ((_CONTENTS, "table of contents"), (_COMMENT, "comment of MyST")):
         text, count = pattern.subn("", text)
         if count:
@@ -196,11 +199,13 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         account.changed["caption of a table", "stands above it"] += count
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
-        fence_line = _FENCE.match(line)
-        if fence_line is None and not mark:
+        edge = _EDGE.match(line)
+        if edge is None and not mark:
             line = _rewrite_line(line, context.line_below(number))
-        elif fence_line is not None and fence_line[1].startswith(mark):
-            mark = "" if mark else fence_line[1]
+        elif mark in _ENDS:
+            mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
+        elif edge is not None and edge[1].startswith(mark):
+            mark = "" if mark else edge[1]
         out.append(line)
     return _FIGURE.sub(_write_figure, "\n".join(out))
 
@@ -232,7 +237,7 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
 
 def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
-    text = _BRACKETS.sub(lambda m: f"$${m['tex']}$$", text)
+    text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
     text = _ENVIRONMENT.sub(lambda m: f"$${m['tex']}$$" if m["tex"] else m[0], text)
     return _DISPLAY.sub(_label_formula, text)
 
@@ -255,9 +260,13 @@ def _label_formula(match: re.Match[str]) -> str:
     bare = _WHOLE_ENVIRONMENT.sub("", tex)
     if re.search(r"(?<!\\)&", bare):  # MyST aligns at `&`, and needs no environment
         tex = f"\n\\begin{{aligned}}\n{tex.strip()}\n\\end{{aligned}}\n"
-    if not label:
-        return f"$${tex}$$"
-    return f"$${tex}$$ {{#eq:{formula_anchor(label)}}}"
+    opening, closing = "", match["behind"] or ""
+    if lead := _LEAD.search(match["tex"]):  # a mark beside a text could be that of another formula
+        line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]
+        opening = lead[0] if _WORDS_BEFORE.match(line) else ""
+        closing = lead[0] if match["behind"] is not None else ""
+    braces = f" {{#eq:{formula_anchor(label)}}}" if label else ""
+    return f"{opening}$${tex}$${braces}{closing}"
 
 
 _FIGURE_NAME = re.compile(
@@ -265,12 +274,6 @@ _FIGURE_NAME = re.compile(
     r"(?:[ \t]*(?::(?!name|label)[\w-]+:|---|(?!name)\w+:)[^\n]*\n)*"
     r"[ \t]*:?(?:name|label):[ \t]*(?P<name>\S+)"
 )
-
-
-def find_references(text: str) -> Iterator[str]:
-    """Yield the labels of links by reference that a text defines, in lower case."""
-    for label in re.findall(r"^[ >]*\[(?!\^)([^\[\]\n]+)\]:", text, re.MULTILINE):
-        yield label.casefold()
 
 
 def find_anchors(text: str) -> set[str]:
@@ -321,7 +324,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if not text and not re.match("#|lesson:|page:", address):  # its tool knows a title
                 text = title_of_file(re.split("[:#]", match["address"])[-1])
             return write_link(_rewrite_line(text, context), address, match["title"] or "")
-        case "anchor":
+        case "anchor" | "icon":
             return ""
         case "object":
             called = match["called"]
@@ -341,6 +344,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 whole if _WORD.search(whole) else _TIGHT.sub(lambda m: f"${m[1].strip()}$", whole)
             )
         case "code":
+            if match.string.lstrip().startswith("|") and context.path.endswith(".qmd"):
+                whole = re.sub(r"(?<!\\)\|", r"\\|", whole)  # it ends a cell, but for Pandoc
             return convert_code(whole, context)
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
@@ -360,10 +365,12 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "cite":
             keys = _CITED_KEY.findall(whole)
             if keys and context.are_sources(keys):
-                return whole
+                return re.sub(",(?=[ ]*@)", ";", whole.replace("-@", "@"))
             message = f"`{whole}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave("citation", message)
             return f"`{whole}`"
+        case "pair":
+            return _rewrite_line(match["held"], context)
         case "substitution":
             if re.fullmatch(r"\{\{<\s*pagebreak\s*>\}\}", whole):
                 return ""
@@ -375,8 +382,6 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
-        case "icon":
-            return ""
         case "keys":
             return "+".join(key.capitalize() for key in match["stroke"].split("+"))
         case "route":
@@ -387,10 +392,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             address = match["named"]
             return whole.removesuffix(address) + (context.resolve_link(address) or GONE)
         case "tag":
-            is_in_link = match.string.rfind("<a ", 0, match.start()) > match.string.rfind(
-                "</a", 0, match.start()
-            )
-            return _convert_tag(whole, is_in_link, context)
+            return _convert_tag(whole, context)
         case "markdown":  # a tag whose text is Markdown, as it always is here
             return match["before"]
         case "attributes":
@@ -410,31 +412,22 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return whole
 
 
-def _convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
-    """Return a tag of HTML with the new address of the file that it names."""
-    attribute, name = _ATTRIBUTE.search(tag), tag[1:].split()[0].lower()
-    if attribute is None:
+def _convert_tag(tag: str, context: LessonContext) -> str:
+    """Return a tag of HTML with the new address of the file of the folder that it names."""
+    attribute = _ATTRIBUTE.search(tag)
+    if attribute is None or re.match(r"[a-z][a-z+.-]*:|//|#", attribute[3]):
         return tag
     address, alt = attribute[3], re.search(r"\s(?i:alt)=[\"']([^\"']*)", tag)
-    words = alt[1] if alt else ""
-    if re.match(r"[a-z][a-z+.-]*:|//|#", address):
-        if name not in ("img", "source") or not re.match("https?://|//", address):
-            return tag
-        message = f"a picture from another host, `{address}`; it is a link now"
-        context.leave("tag of HTML", message)
-        words = words or posixpath.basename(urlsplit(address).path)
-        link = words if is_in_link else f'<a href="{address}">{words}</a>'
-        return link if name == "img" else ""
     before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
     if new_address := context.resolve_file(address):
         return before + new_address + after
     context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
-    if name == "img":
-        return words
+    if re.match("<img", tag, re.IGNORECASE):
+        return alt[1] if alt else ""
     return tag[: attribute.start()].rstrip() + after[1:]
 
 
-_CITED_KEY = re.compile(r"(?<![\w@])@([\w][\w:./-]*\w|\w)")
+_CITED_KEY = re.compile(rf"(?<![\w@])@({_KEY})")
 _TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
 """A formula with blanks at its ends, which some tools allow."""
 _WORD = re.compile(r"(?<![\\A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from textwrap import shorten
 from unicodedata import normalize
-from urllib.parse import unquote
+from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct
 
@@ -59,16 +59,18 @@ def complete_texts(
     for link, text in read.items():
         edits = {edit.span.start: edit for edit in _edit_links(link, read, resolve_label)}
         edits |= {edit.span.start: edit for edit in _carry_macros(text.document)}
-        yield _GONE.sub("", apply_edits(text.document.source.text, edits.values()))
+        yield _GONE.sub("", apply_edits(text.document.source.text, edits.values())).lstrip("\n")
 
 
 _PASSES = 3
 """How often HTML is dropped: an end whose beginning was dropped is seen the next time."""
 _MEDIA = re.compile(
-    r"<(?:img\b[^<>]*>|(?P<name>video|audio)\b[^<>]*(?:/>|>(?:.*?</(?P=name)\s*>)?))",
+    r"<(?:(?:img|source)\b[^<>]*>(?:</img>)?"
+    r"|(?P<name>video|audio)\b[^<>]*(?:/>|>(?:.*?</(?P=name)\s*>)?))",
     re.DOTALL | re.IGNORECASE,
 )
 _ELSEWHERE = re.compile("https?://|//")
+_ELSEWHERE_NOTE = "a {} from another host, `{}`; it is a link now"
 _WITH_CONTENT = re.compile(r"<(script|style)\b.*?(?:</\1\s*>|\Z)", re.DOTALL | re.IGNORECASE)
 
 
@@ -104,8 +106,7 @@ def _read(
                 is_in_link = any(at.start < place.start and place.end < at.end for at in links)
                 new = f"[{'' if image.alt else name}{place.text.removeprefix('![')}"
                 edits[place.start] = Edit(place, (image.alt or name) if is_in_link else new)
-                message = f"a picture from another host, `{image.url}`; it is a link now"
-                leave(link, "picture", message)
+                leave(link, "picture", _ELSEWHERE_NOTE.format("picture", image.url))
         if not edits:
             break
         text = apply_edits(text, _without_overlaps(edits))
@@ -130,10 +131,14 @@ def _link_to_picture(
     if element is None:
         return {}
     end, tag = element.end(), element[0]
-    leave(link, *_left_tag(tag))
+    kind = "recording" if element["name"] else "picture"
+    leave(link, "tag of HTML", _ELSEWHERE_NOTE.format(kind, address.text))
     alt = re.search(r"\salt=[\"']([^\"']+)", tag)
-    words = alt[1] if alt else address.text.rpartition("/")[2]
-    return {start: Edit(Span(source, start, end), f'<a href="{address.text}">{words}</a>')}
+    words = alt[1] if alt else urlsplit(address.text).path.rpartition("/")[2]
+    before = source.text[:start].lower()
+    is_in_link = before.rfind("<a ") > before.rfind("</a")
+    new = words if is_in_link else f'<a href="{address.text}">{words}</a>'
+    return {start: Edit(Span(source, start, end), "" if tag.startswith("<source") else new)}
 
 
 def _left_tag(tag: str) -> tuple[str, str]:

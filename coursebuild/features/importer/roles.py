@@ -50,13 +50,9 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             return words or ("" if ":" in body or "!" in body else body)
         case "download":
             return write_link(words or target, context.resolve_link(target))
-        case "term":
-            return words or target
-        case "abbr" | "kbd" | "sub" | "sup":
-            return body
         case _ if name.rpartition(":")[2] in _CODE_ROLES:
             return f"`{words or target}`"
-        case "guilabel" | "menuselection" | "dfn" | "rfc" | "pep" | "span" | "raw":
+        case _ if name in _WORD_ROLES:
             return words or body
         case _:
             message = f"the role `{{{name}}}`, whose text is code now: write what it stands for"
@@ -68,6 +64,7 @@ _CODE_ROLES = frozenset(
     "code file command program option envvar samp func function class mod module meth method attr "
     "attribute data const exc exception obj object type".split()
 )
+_WORD_ROLES = frozenset("abbr dfn guilabel kbd menuselection pep raw rfc span sub sup term".split())
 _INLINE_RUN = re.compile(r"`(?:\{(?:python|r|julia)\}|r)[ ]+([^`]+)`")
 
 

@@ -73,17 +73,15 @@ def read_segments(text: str, name: str) -> ReadText:
             language = str(kernel.get("language") or info.get("name") or "python").lower()
             cells = list(notebook["cells"])
             first = _join_lines(cells[0].get("source", "")) if cells else ""
-            match = _FRONT_MATTER.match(f"{first}\n")  # of MyST and Quarto, in a cell of its own
-            if match is not None and isinstance(value := _read_front_matter(match), dict):
-                metadata = {**metadata, **value}
-                cells[0] = {**cells[0], "source": first[match.end() :]}
+            front, size = read_front_matter(f"{first}\n")  # of MyST, Quarto, in a cell of its own
+            if size:
+                metadata = {**metadata, **front}
+                cells[0] = {**cells[0], "source": first[size:]}
             segments, pictures = _read_cells(cells, language)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             raise UsageError(f"{name} is not a notebook of format 4") from None
     else:
-        match, size = _FRONT_MATTER.match(text), 0
-        if match is not None and isinstance(value := _read_front_matter(match), dict):
-            metadata, size = value, match.end()
+        metadata, size = read_front_matter(text)
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
     # The first heading of level 1, and the segments without it; from the next on, all go down by 1
     titles: list[str] = []
@@ -142,10 +140,14 @@ def lower_titles(text: str) -> str:
     return _TITLE.sub(lambda heading: f"## {heading['line'] or heading['text']}", text)
 
 
-def _read_front_matter(match: re.Match[str]) -> Any:
-    if match["toml"] is None:
-        return read_yaml(match["yaml"] or "{}")
-    return read_toml(match["toml"])
+def read_front_matter(text: str) -> tuple[Mapping[str, Any], int]:
+    """Return the front matter that begins a text, and its length; 0 where it has none."""
+    match = _FRONT_MATTER.match(text)
+    if match is None:
+        return {}, 0
+    is_yaml = match["toml"] is None
+    value = read_yaml(match["yaml"] or "{}") if is_yaml else read_toml(match["toml"])
+    return (value, match.end()) if isinstance(value, dict) else ({}, 0)
 
 
 def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[Segment]:
@@ -285,9 +287,12 @@ def _read_cells(
                 source = source.replace(f"attachment:{picture}", f"attachment:{number}-{picture}")
                 attachments[f"{number}-{picture}"] = data
             segments += read_markdown(source, place=place)
-        elif cell.get("cell_type") == "code" and source.strip() and "python" not in language:
-            segments.append(Segment(kind="block", place=place, text=source, head=f"{{{language}}}"))
-        elif cell.get("cell_type") == "code" and source.strip():
+        elif not source.strip():
+            continue
+        elif cell.get("cell_type") != "code" or "python" not in language:
+            head = f"{{{language}}}" if cell.get("cell_type") == "code" else "text"
+            segments.append(Segment(kind="block", place=place, text=source, head=head))
+        else:
             outputs = cell.get("outputs") or ()
             tags = " ".join((cell.get("metadata") or {}).get("tags") or ())
             values = [o for o in outputs if o.get("output_type") == "execute_result"]
@@ -308,8 +313,6 @@ def _read_cells(
                 else None,
             )
             segments.append(cell_segment)
-        elif source.strip():
-            segments.append(Segment(kind="block", place=place, text=source, head="text"))
     return segments, attachments
 
 

@@ -145,6 +145,13 @@ def read_toml(text: str) -> Mapping[str, Any] | None:
         return None
 
 
+def value_at(settings: object, *path: str) -> object:
+    """Return the value at a path of nested keys; `None` where there is none."""
+    for key in path:
+        settings = settings.get(key) if isinstance(settings, Mapping) else None
+    return settings
+
+
 def stem_of(path: str) -> str:
     """A file's path without its extension."""
     return posixpath.splitext(path)[0]
@@ -160,15 +167,7 @@ def title_of_file(path: str) -> str:
 
 TEXTS = (".md", ".qmd", ".ipynb", ".mdx", ".myst")
 """Extensions of the files that can be lessons."""
-_SKIPPED = (
-    "_build",
-    "_site",
-    "_book",
-    "node_modules",
-    "site-packages",
-    "__pycache__",
-    "public",
-)
+_SKIPPED = frozenset("__pycache__ _book _build _site node_modules public site-packages".split())
 """Names of folders that tools write."""
 _MAX_SIZE = 256 << 20
 """Bytes of a file."""

@@ -45,6 +45,7 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
             f"{above}/meshes/m.obj": MESH,
             "other/arm.xml": "<mujoco model='other'/>",
             "loose/part.xml": "<mujocoinclude><asset/></mujocoinclude>",
+            "loose/keys.xml": "<mujoco><keyframe><key qpos='1 2'/></keyframe></mujoco>",
         },
     )
     for path, data in course.files.items():
@@ -55,7 +56,9 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
     assert sorted(model.nmesh for model in models) == [0, 1]
     account = account_of(course)
     assert "- fragment of a model: beside the models that include it (1 time)" in account
-    assert "a fragment of a model, which none includes" in account
+    fragments = "a fragment of a model, which none includes: it is compiled with none\n"
+    assert f"{fragments}  - loose/keys.xml\n  - loose/part.xml\n" in account
+    assert not any("loose" in path or "keys" in path for path in course.files)
     assert "used by no text" not in account
 
 
@@ -115,6 +118,23 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         ("```js{1,3}\nf()\n```\n", "```js\nf()\n```\n"),
         ("- a\n\n  ```js\n  `${x}`\n  }\n  ```\n", "- a\n\n  ```js\n  `${x}`\n  }\n  ```\n"),
         ("Code `\\a{b}` and\n`c` here.\n", "Code `\\a{b}` and\n`c` here.\n"),
+        ("{% file %}run.sh{% endfile %}\n\nText.\n", "run.sh\n\nText.\n"),
+        ('Text {% include "a.html" %}.\n', 'Text `{% include "a.html" %}`.\n'),
+        (
+            "<!-- ```{note}\nA.\n``` -->\n\nPress {kbd}`a`.\n",
+            "<!-- ```{note}\nA.\n``` -->\n\nPress a.\n",
+        ),
+        ("A [text](https://example.org/\n) here.\n", "A [text](https://example.org/)\n here.\n"),
+        ("So\n$\na\n=\nb\n$\n\nand $c$.\n", "So\n$$\na\n=\nb\n$$\n\nand $c$.\n"),
+        (
+            "So:<br>\n$$\na\n$$<br />\nand $b$:<br>\n$$\nc\n$$\n",
+            "So:<br>\n$$\na\n$$\nand $b$:<br>\n$$\nc\n$$\n",
+        ),
+        (
+            "- Let $$\n  a\n  $$ and\n- let $$\n  b\n  $$\n- $$\n  c\n  $$\n",
+            "- Let \n  $$\n  a\n  $$\n  and\n- let \n  $$\n  b\n  $$\n- $$\n  c\n  $$\n",
+        ),
+        ("$$\n\\text{In}\\text{: }x \\\\\ny\n$$\n", "$$\n\\text{In}\\text{: }x \\\\\ny\n$$\n"),
     ],
     ids=[
         "script",
@@ -126,6 +146,14 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         "lines",
         "fence in a list",
         "code over lines",
+        "pair of tags",
+        "tag",
+        "fence in a comment",
+        "address over lines",
+        "formula over lines",
+        "break behind a formula",
+        "formula behind a text",
+        "lines of a formula",
     ],
 )
 def test_a_text_of_another_tool_keeps_all_that_readers_see(
@@ -160,3 +188,36 @@ lines](two.md 'The next') and ![](far.svg 'gone').
     link = "(lesson:1.2 'The next')"
     assert text == f"{pictures}, [below]{link},\n[over\nlines]{link} and .\n"
     assert "the picture `far.svg`, which is not in the folder" in account_of(course)
+
+
+def test_sources_of_quarto_are_cited_whatever_separates_them(tmp_path: Path) -> None:
+    text = """# One
+
+As in [@Hertz+:1894;
+@Lanczos:1949] and in [@Hertz+:1894, -@Lanczos:1949].
+
+| sign    | meaning |
+| ------- | ------- |
+| `a\\|\\|b` | or |
+"""
+    works = "@book{Hertz+:1894, title = {A}} @book{Lanczos:1949,\n  title = {B}\n}\n"
+    texts = {"one.qmd": text.replace("\\|", "|"), "works.bib": works}
+    course = convert_files(tmp_path, texts)
+    cited = text.replace("[@Hertz+:1894;\n@Lanczos:1949]", "[@Hertz+:1894; @Lanczos:1949]\n")
+    cited = cited.replace(", -@Lanczos", "; @Lanczos").removeprefix("# One\n\n")
+    assert course.files["content/lessons/1.1-one.md"].decode() == cited
+    bibliography = course.files["content/references.bib"].decode()
+    assert "{Hertz+:1894," in bibliography and "{Lanczos:1949," in bibliography
+
+
+def test_a_computed_title_is_no_caption_and_a_shown_window_no_code(tmp_path: Path) -> None:
+    code = """import matplotlib.pyplot as plt
+plt.plot([1, 2])
+plt.title(f"min {max(2, 3)}")
+plt.suptitle(f"$y$ over $x$")
+display(plt.show())
+"""
+    course = convert_files(tmp_path, {"one.qmd": f"# One\n\n```{{python}}\n{code}```\n"})
+    lesson = course.files["content/lessons/1.1-one.md"].decode()
+    assert "Figure: ![y over x](l1-1-one-1.svg) $y$ over $x$\n" in lesson
+    assert "show()" not in lesson

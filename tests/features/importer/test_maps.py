@@ -46,6 +46,19 @@ def test_titles_are_the_words_of_the_roles_in_them(tmp_path: Path) -> None:
     assert titles == ["NumPy", "Use of run and `{x}`"]
 
 
+def test_a_book_of_gitbook_says_where_its_summary_is(tmp_path: Path) -> None:
+    files = {
+        "book.json": '{"root": "./texts/", "structure": {"summary": "README.md"}}',
+        "texts/README.md": "# Contents\n\n- [Second](b/README.md)\n- [First](a/README.md)\n",
+        "texts/a/README.md": "",
+        "texts/b/README.md": "",
+        "notes/outline.md": "",
+    }
+    outline, _, left = import_map(tmp_path, files)
+    assert [titles for _, titles in outline] == [["Second", "First"]]
+    assert [message[:14] for message in left] == ["not taken for "]
+
+
 SUMMARY = r"""# Summary
 
 [Before](before.md)

@@ -306,10 +306,8 @@ def _record_outputs(
 
 def _describe_changes(changes: Sequence[Change]) -> str:
     recorded, printed = (
-        f"`{text}`" if text else "nothing"
-        for text in (
-            shorten(t, 60, placeholder="…") for t in (changes[0].recorded, changes[0].printed)
-        )
+        f"`{shorten(text, 60, placeholder='…')}`" if text else "nothing"
+        for text in (changes[0].recorded, changes[0].printed)
     )
     rest = f", and {plural(len(changes) - 1, 'more difference')}" if changes[1:] else ""
     return (
@@ -352,9 +350,8 @@ def _mark_varying(
         comparison = course.comparison_of(recording)
         results = [compare(recording, comparison, text).changes for text in texts]
         is_borne_out = not all(results)
-        if texts[0] == texts[1] or not any(results) or recording.comparison is not None:
-            continue
-        if isinstance(recording.body, Table):
+        is_said = recording.comparison is not None or isinstance(recording.body, Table)
+        if texts[0] == texts[1] or not any(results) or is_said:
             continue
         pattern = varying_pattern(*texts)
         at = recording.body_span.start - 1  # the end of the line that opens the fence
