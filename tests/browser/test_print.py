@@ -35,22 +35,24 @@ def nasty(sites: Mapping[str, Site]) -> str:
 
 
 def printed(page: Page) -> list[str]:
-    reader = PdfReader(io.BytesIO(page.pdf(format="A4")))
-    return [sheet.extract_text() for sheet in reader.pages]
+    return [sheet.extract_text() for sheet in PdfReader(io.BytesIO(page.pdf(format="A4"))).pages]
 
 
 def words(text: str) -> str:
     return re.sub(r"\s+", " ", text)
 
 
+def text_on_paper(page: Page) -> str:
+    return words(" ".join(printed(page)))
+
+
 FURNITURE = re.compile(r"\d+ / \d+|.*· Simulation with MuJoCo|")
-HEADINGS = ".prose :is(h2, h3), .callout-head, .lab-title"
 
 
 def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
     page.goto(sites["real"].url(REAL))
     wait_until_settled(page)
-    headings = page.locator(HEADINGS).evaluate_all(
+    headings = page.locator(".prose :is(h2, h3), .callout-head, .lab-title").evaluate_all(
         "all => all.map(h => h.innerText.replace('#', '').trim())"
     )
     assert len(headings) > 20
@@ -60,9 +62,10 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
     for number, sheet in enumerate(sheets, 1):
         assert f"{number} / {len(sheets)}" in sheet
         assert ("Mass and inertia · Simulation with MuJoCo" in sheet) == (number > 1)
-        lines = [line.strip() for line in sheet.splitlines()]
-        lines = [line for line in lines if not FURNITURE.fullmatch(line)]
-        assert words(lines[-1]).casefold() not in known_headings, f"a heading ends sheet {number}"
+        lines = [line for line in sheet.splitlines() if not FURNITURE.fullmatch(line.strip())]
+        assert words(lines[-1].strip()).casefold() not in known_headings, (
+            f"a heading ends sheet {number}"
+        )
     text = words(" ".join(sheets))
     for removed_text in ("On this page", "Course map", "Copy", "Download", "Mark as read"):
         assert removed_text not in text, removed_text
@@ -71,20 +74,23 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
     )
 
 
-def test_a_further_section_is_printed_if_it_is_open(sites: Mapping[str, Site], page: Page) -> None:
-    page.goto(sites["real"].url(REAL))
-    wait_until_settled(page)
-    phrase = "a triangular factor"
-    text = words(" ".join(printed(page)))
-    assert phrase not in text and "Inertias, estimated from motion" in text
-    page.locator(".further-text > summary").last.click()
-    assert phrase in words(" ".join(printed(page)))
+def test_what_is_long_is_printed_if_it_is_open(sites: Mapping[str, Site], page: Page) -> None:
+    for lesson, fold, phrase in (
+        (REAL, ".further-text > summary >> nth=-1", "a triangular factor"),
+        ("lessons/8.4-impedance.html", "summary:text('lines 1–104')", "spring presses against"),
+    ):
+        page.goto(sites["real"].url(lesson))
+        wait_until_settled(page)
+        text = text_on_paper(page)
+        assert phrase not in text and page.locator(fold).inner_text() in text
+        page.locator(fold).click()
+        assert phrase in text_on_paper(page)
 
 
 def test_a_lab_on_paper_says_where_it_runs(sites: Mapping[str, Site], page: Page) -> None:
     page.goto(sites["full"].url("lessons/A.1-models-and-questions.html"))
     wait_until_settled(page)
-    text = "".join(printed(page)).replace(" ", "").replace("\n", "")
+    text = text_on_paper(page).replace(" ", "")
     assert "example.org/constructs/lessons/A.1-models-and-questions.html#" in text
 
 
@@ -92,7 +98,7 @@ def test_what_is_folded_is_open_and_links_say_where_they_lead(nasty: str, page: 
     page.set_viewport_size({"width": 1440, "height": 900})
     page.goto(nasty)
     wait_until_settled(page)
-    text = words(" ".join(printed(page)))
+    text = text_on_paper(page)
     for visible_text in (
         "Hidden at first.",
         "return one(x) + 13",

@@ -1,9 +1,7 @@
 /**
  * Prepares for print: sets the running title, puts the answers of questions behind the text, and opens folds for browsers in which
- * style sheets cannot. A further section that is closed is not printed.
+ * style sheets cannot. A further section that is closed is not printed, nor is a folded listing of more than sixty lines.
  */
-
-const CLOSED = '.further-text:not([open])'
 
 /** A text as a string of CSS. */
 export function cssString(text) {
@@ -16,15 +14,13 @@ export function openForPrint(window) {
   let putBack = () => {}
   window.addEventListener('beforeprint', () => {
     document.documentElement.style.setProperty('--running-title', cssString(document.title))
-    openedFolds = [...document.querySelectorAll('details:not([open], .further-text)')]
+    openedFolds = [...document.querySelectorAll('details:not([open], .further-text, .fold:has([id]:nth-child(61)))')]
     for (const details of openedFolds) details.open = true
     putBack = moveAnswers(document)
   })
   window.addEventListener('afterprint', () => {
     putBack()
-    putBack = () => {}
     for (const details of openedFolds) details.open = false
-    openedFolds = []
   })
 }
 
@@ -36,7 +32,7 @@ function moveAnswers(document) {
   const places = []
   for (const quiz of text?.querySelectorAll('.quiz') ?? []) {
     const answers = [...quiz.querySelectorAll('.question > .answer:not(.is-empty)')]
-    if (answers.length === 0 || quiz.closest(CLOSED) !== null) continue
+    if (answers.length === 0 || quiz.closest('.further-text:not([open])') !== null) continue
     const title = document.createElement('p')
     title.className = 'quiz-title'
     title.textContent = quiz.getAttribute('aria-label')
