@@ -79,7 +79,7 @@ def check_bindings(
             diagnostics.append(_with_likely_scripts(document, binding, outputs, diagnostic))
         at = tuple(address for place in places if (address := place.address) is not None)
         if at and len(at) == len(places):
-            addresses[value] = at
+            addresses[value] = tuple(dict.fromkeys(at))
     for verdict in outputs.of_document(document):
         rows = row_values(document, verdict.recording, verdict.comparison.filters)
         places_of_rows = zip(rows, verdict.row_addresses, strict=False)

@@ -5,7 +5,7 @@
 2. Where several lines have the same words, the numbers of the heading and those that the line
    begins with name it, as few as suffice. Such a name counts only as long as none was replaced by
    another: `0.1` may be a setting, which stays, or a result that another line has by chance now.
-3. Lines that nothing tells apart have no address.
+3. Lines that nothing tells apart have one address, where they have the same number at its place.
 4. The label of a number is what is printed right before it, or the title of its column. Numbers of
    two labels, or below two headings, are different quantities.
 """
@@ -131,13 +131,14 @@ class PrintedPlace(Struct, frozen=True):
 
     @property
     def address(self) -> Address | None:
-        """`None` where nothing tells their line from others."""
+        """`None` where nothing tells their line from others, which have other numbers there."""
         heading, words = self.output.heading(self.at), self.output.words(self.at)
         for depth in range(-1, self.first + 1):
             name, names = self.output.names(self.at, depth)
             if names.count(name) == 1:
                 return Address(words, self.first, heading, name, names if name else ())
-        return None
+        address = Address(words, self.first, heading)
+        return address if self.output.find(address, len(self.numbers)) else None
 
     @property
     def span(self) -> Span | None:
@@ -255,10 +256,12 @@ class PrintedText:
             is_intact = {*names} <= {*address.names} or {*names} >= {*address.names}
             pairs = zip(lines, names, strict=True)
             lines = [at for at, name in pairs if is_intact and name == address.name]
-        if len(lines) != 1:
-            return None
-        numbers = self.lines[lines[0]].numbers[address.place : address.place + count]
-        return PrintedPlace(self, lines[0], numbers) if len(numbers) == count else None
+        end = address.place + count
+        places = [
+            PrintedPlace(self, at, self.lines[at].numbers[address.place : end]) for at in lines
+        ]
+        is_certain = len({place.text for place in places}) == 1
+        return places[0] if is_certain and len(places[0].numbers) == count else None
 
     def _numbers(self, at: int) -> tuple[str, ...]:
         numbers = self.lines[at].numbers if at >= 0 else ()
