@@ -154,11 +154,7 @@ class SymbolComparison:
     def mixes_turns(self) -> bool:
         """Whether cycles stand beside angles: `f = 50 rad/s`, but not `2\\pi f = 314 rad/s`."""
         pairs = zip(self.sides, self.expressions, strict=True)
-        whole = [
-            side
-            for side, expression in pairs
-            if expression.kind == "symbol" or (side.is_numeric and read_numeral(expression))
-        ]
+        whole = (side for side, e in pairs if e.kind == "symbol" or read_numeral(e))
         units = self._units(*whole)
         return {"angle", "cycle"} <= {name for unit in units for name, _ in unit.powers}
 
