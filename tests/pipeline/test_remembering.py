@@ -74,6 +74,22 @@ def test_a_line_that_is_gone_is_told_and_nothing_is_written(make: Make) -> None:
     assert '`78.5 min`{out="mean of tau"}' in cups(folder)
 
 
+def test_lines_that_nothing_tells_apart_are_one_place_while_they_agree(make: Make) -> None:
+    script = """scale, second = 1.0, 1.0
+for ball, factor in (("one ball", 1.0), ("another ball", second)):
+    print(f"{ball}, 3 g\\nweaker gravity {scale * factor:.3f} ms")
+print("step 1.000 s")"""
+    script = f"```python file=examples/a.py\n{script}\n```\n\n```output\n```"
+    folder = make(f"{script}\n\nIt is `1.000`{{out}} ms.\n")
+    assert folder.main("update").status == 0
+    folder.replace(folder.lesson(), "scale, second = 1.0", "scale, second = 2.0")
+    assert folder.main("update").status == 0
+    assert "It is `2.000`{out} ms." in folder.text(folder.lesson())
+    folder.replace(folder.lesson(), "second = 2.0, 1.0", "second = 2.0, 1.5")
+    assert folder.main("update").status != 0
+    assert "It is `2.000`{out} ms." in folder.text(folder.lesson())
+
+
 def test_explain_says_where_the_numbers_of_a_line_come_from(make: Make) -> None:
     folder = make_cups(make)
     lines = folder.text(folder.lesson()).split("\n")

@@ -14,7 +14,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from decimal import Context, Decimal
-from typing import TypeAlias
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -79,7 +78,7 @@ def check_bindings(
             diagnostics.append(_with_likely_scripts(document, binding, outputs, diagnostic))
         at = tuple(address for place in places if (address := place.address) is not None)
         if at and len(at) == len(places):
-            addresses[value] = at
+            addresses[value] = tuple(dict.fromkeys(at))
     for verdict in outputs.of_document(document):
         rows = row_values(document, verdict.recording, verdict.comparison.filters)
         places_of_rows = zip(rows, verdict.row_addresses, strict=False)
@@ -126,10 +125,7 @@ def _with_likely_scripts(
     return finding
 
 
-_Finding: TypeAlias = tuple[Diagnostic | None, Sequence[PrintedPlace]]
-
-
-def _check(bound: BoundNumber) -> _Finding:
+def _check(bound: BoundNumber) -> tuple[Diagnostic | None, Sequence[PrintedPlace]]:
     """What is wrong with a binding, and where it holds: nowhere if it is unchecked, or a text."""
     binding, run, verdicts = bound.binding, bound.run, bound.verdicts
     if bound.path not in bound.outputs.scripts:
@@ -309,8 +305,7 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     outputs = bound.groups[-1]
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
     with_point = BoundText.of(pointed)
-    bare, stray, label = replace(bound_text, before="", after=""), bound_text.stray, ""
-    notes: list[Note] = []
+    bare, stray, label = bound_text.bare, bound_text.stray, ""
     message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"
     if not bound_text.numbers:
         message = f"`{binding.text}` is not in the output of `{path}`"
@@ -327,15 +322,12 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
         help = Fix(f"write `{pointed}`", pointed)
     else:
         label, help = _nearest(bound_text, outputs), ""
-    return diagnose(
-        "binding-mismatch", binding.text_span, message, label=label, help=help, notes=notes
-    )
+    return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)
 
 
 def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     """The diagnostic of a binding at whose address stands another number now, or none."""
     binding, text = bound.binding, bound.text
-    bare = replace(text, before="", after="")
     places_now = next(filter(None, map(bound.look_up, bound.groups)), [])
     places_now.sort(key=lambda place: _distance(text.numbers, place.numbers))
     if len({text.rewrite(place) for place in places_now}) > 1:
@@ -352,7 +344,7 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         are = "are" if len(text.numbers) > 1 else "is"
         label = f"{place.text} {are} printed there now, in `{plain_text(place.line.text)}`"
         help = Fix(f"write `{better}`", better, safe=True) if better else ""
-        rivals = [] if bound.addresses else bare.shown_places([place.output])
+        rivals = [] if bound.addresses else text.bare.shown_places([place.output])
         notes = [place_note(binding, rival, places_now) for rival in rivals[:_MAX_NOTES]]
         return diagnose(
             "binding-mismatch", binding.text_span, message, label=label, help=help, notes=notes

@@ -65,6 +65,11 @@ class BoundText(Struct, frozen=True):
         before, after = text[: numbers[0].start], text[numbers[-1].end :]
         return cls(text, plain_text(before), numbers, plain_text(after))
 
+    @property
+    def bare(self) -> BoundText:
+        """Its numbers without the words around them."""
+        return replace(self, before="", after="")
+
     def shows(self, place: PrintedPlace) -> bool:
         """Whether the printed numbers, rounded, are those of the binding."""
         return all(map(shows, self.numbers, place.numbers))

@@ -272,8 +272,7 @@ class BoundNumber(Struct, frozen=True, dict=True):
         if self.addresses or not places or all(map(self.text.shows, places)):
             return False
         unsigned = [re.sub("[-−+]", "", t) for t in (self.text.text, self.text.rewrite(places[0]))]
-        bare = replace(self.text, before="", after="")
-        return unsigned[0] == unsigned[1] or bare.is_in(outputs)
+        return unsigned[0] == unsigned[1] or self.text.bare.is_in(outputs)
 
     def search(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers that it may mean: a proposal, until one that it shows is remembered."""

@@ -181,6 +181,7 @@ class CanonicalText(Struct, frozen=True):
         return self.numbers[first : first + len(part.numbers)]
 
 
+@lru_cache(maxsize=8192)
 def canonicalize(text: str, offset: int = 0) -> CanonicalText:
     """The skeleton and the numbers of a text that stands at `offset` of its line."""
     numbers = scan(text)

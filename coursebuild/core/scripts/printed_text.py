@@ -5,7 +5,7 @@
 2. Where several lines have the same words, the numbers of the heading and those that the line
    begins with name it, as few as suffice. Such a name counts only as long as none was replaced by
    another: `0.1` may be a setting, which stays, or a result that another line has by chance now.
-3. Lines that nothing tells apart have no address.
+3. Lines that nothing tells apart have one address, where they have the same number at its place.
 4. The label of a number is what is printed right before it, or the title of its column. Numbers of
    two labels, or below two headings, are different quantities.
 """
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import accumulate
 from typing import TypeAlias
 
@@ -131,13 +131,14 @@ class PrintedPlace(Struct, frozen=True):
 
     @property
     def address(self) -> Address | None:
-        """`None` where nothing tells their line from others."""
+        """`None` where nothing tells their line from others, which have other numbers there."""
         heading, words = self.output.heading(self.at), self.output.words(self.at)
         for depth in range(-1, self.first + 1):
             name, names = self.output.names(self.at, depth)
             if names.count(name) == 1:
                 return Address(words, self.first, heading, name, names if name else ())
-        return None
+        address = Address(words, self.first, heading)
+        return address if self.output.find(address, len(self.numbers)) else None
 
     @property
     def span(self) -> Span | None:
@@ -151,7 +152,8 @@ class PrintedText:
 
     def __init__(self, lines: Iterable[PrintedLine]) -> None:
         self.lines = tuple(lines)
-        self._labels: dict[int, tuple[str, ...]] = {}
+        self.labels = cache(self._read_labels)
+        self._contexts = cache(self._read_contexts)
         self._headings: list[int] = []
         """The index of the heading of each line; -1 for none."""
         heading = -1
@@ -217,17 +219,15 @@ class PrintedText:
         unit = unit_of_printed(self.lines[at].text, number, above)
         return unit if unit or title is None else title.unit
 
-    def labels(self, at: int) -> tuple[str, ...]:
+    def _read_labels(self, at: int) -> tuple[str, ...]:
         """The labels of the numbers of a line: what follows the one before with its unit."""
-        if at not in self._labels:
-            text, start, labels = self.lines[at].text, 0, []
-            for number in self.lines[at].numbers:
-                labels.append(f"{text[start : number.start]} {self.title(at, number)}".strip())
-                start = number.end
-                if unit_behind(text, start):
-                    start = len(text) - len(text[start:].lstrip().partition(" ")[2])
-            self._labels[at] = tuple(labels)
-        return self._labels[at]
+        text, start, labels = self.lines[at].text, 0, []
+        for number in self.lines[at].numbers:
+            labels.append(f"{text[start : number.start]} {self.title(at, number)}".strip())
+            start = number.end
+            if unit_behind(text, start):
+                start = len(text) - len(text[start:].lstrip().partition(" ")[2])
+        return tuple(labels)
 
     # --- addresses
 
@@ -256,10 +256,12 @@ class PrintedText:
             is_intact = {*names} <= {*address.names} or {*names} >= {*address.names}
             pairs = zip(lines, names, strict=True)
             lines = [at for at, name in pairs if is_intact and name == address.name]
-        if len(lines) != 1:
-            return None
-        numbers = self.lines[lines[0]].numbers[address.place : address.place + count]
-        return PrintedPlace(self, lines[0], numbers) if len(numbers) == count else None
+        end = address.place + count
+        places = [
+            PrintedPlace(self, at, self.lines[at].numbers[address.place : end]) for at in lines
+        ]
+        is_certain = len({place.text for place in places}) == 1
+        return places[0] if is_certain and len(places[0].numbers) == count else None
 
     def _numbers(self, at: int) -> tuple[str, ...]:
         numbers = self.lines[at].numbers if at >= 0 else ()
@@ -281,7 +283,7 @@ class PrintedText:
         return [
             place
             for place in self.places(count)
-            if any(_ends_with(context, sought) for context in self._contexts(place))
+            if any(_ends_with(context, sought) for context in self._contexts(place.at, place.first))
         ]
 
     def places(self, count: int) -> Iterator[PrintedPlace]:
@@ -298,10 +300,10 @@ class PrintedText:
         rival_places = [
             p for p in rivals or self.places(1) if (p.at, p.first) != (place.at, place.first)
         ]
-        contexts = [c for p in rival_places for c in p.output._contexts(p)]
+        contexts = [c for p in rival_places for c in p.output._contexts(p.at, p.first)]
         in_heading = len(_split(self.heading(place.at)))
         choices: list[str] = []
-        for context in self._contexts(place):
+        for context in self._contexts(place.at, place.first):
             numbers = [at for at, (_, is_number) in enumerate(context) if is_number]
             plain_words = ["#" if is_number else word for word, is_number in context]
             row_words = [*plain_words]
@@ -320,15 +322,17 @@ class PrintedText:
                         break
         return min(choices, key=lambda words: ("#" in words, words.count(" ")), default="")
 
-    def _contexts(self, place: PrintedPlace) -> list[_Words]:
-        """All words before numbers, also the heading's, and again with the title of the column.
+    def _read_contexts(self, at: int, first: int) -> list[_Words]:
+        """All words before a number, also the heading's, and again with the title of the column.
 
         The title may stand right behind what its row begins with.
         """
-        heading, title = self.heading(place.at), self.title(place.at, place.numbers[0])
-        before, line = f"{heading} {place.before}", place.line
+        line = self.lines[at]
+        number = line.numbers[first]
+        heading, title = self.heading(at), self.title(at, number)
+        before = f"{heading} {line.text[: number.start]}"
         texts = [before, f"{before} {title}"] if title else [before]
-        if title and place.first > 0:
+        if title and first > 0:
             end = line.numbers[0].end + len(unit_behind(line.text, line.numbers[0].end).text) + 1
             texts.append(f"{heading} {line.text[:end]} {title}")
         return list(map(_split, texts))

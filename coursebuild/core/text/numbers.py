@@ -13,6 +13,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from decimal import Context, Decimal
 
@@ -109,6 +110,7 @@ def has_groups(text: str) -> bool:
     return "," in text and _DIGIT_COMMA.search(_GROUPS.sub("", text)) is None
 
 
+@functools.lru_cache(maxsize=8192)
 def scan(text: str, is_grouped: bool = False) -> tuple[Number, ...]:
     """The numbers of a text, in order; if it is grouped, `1,234.5` is one."""
     numbers: list[Number] = []

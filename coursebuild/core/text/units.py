@@ -119,6 +119,12 @@ class Unit(Struct, frozen=True):
         powers = multiply(self.powers, factor.powers, exponent)
         return Unit(self.size * size, powers, self.pi + int(pi))
 
+    def in_radians(self) -> Unit:
+        """The same unit, of 2π radians in place of each of its cycles."""
+        cycles = dict(self.powers).get("cycle", Fraction(0))
+        one_radian = Unit(Fraction(2), (("angle", Fraction(1)), ("cycle", Fraction(-1))), pi=1)
+        return self.times(one_radian, cycles) or self
+
     def is_same(self, unit: Unit) -> bool:
         """Whether it has the size of another unit and measures the same; angles may be left out."""
         turns = [{name for name, _ in side.powers} & {*_TURNS} for side in (self, unit)]

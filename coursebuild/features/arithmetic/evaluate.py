@@ -124,25 +124,32 @@ def find_reading(unit: Expression, readings: Readings) -> Unit:
     return units[0]
 
 
-def unit_readings(*expressions: Expression) -> Iterator[Readings]:
-    """Yield all readings of the units in some expressions.
+def unit_readings(*sides: Expression) -> Iterator[Readings]:
+    """Yield all readings of the units in both sides of a relation.
 
     A unit with several sizes has the same one in all places; a temperature of a scale may be one,
-    or a difference, in each.
+    or a difference, in each. A number of cycles beside an angle is one of 2π radians each.
     """
     choices: dict[int | str, tuple[Unit, ...]] = {}
-    is_sum = any(expression.has("+", "-") for expression in expressions)
-    for part in (part for expression in expressions for part in expression.walk()):
+    numbers = [side for side in sides if read_numeral(side) is not None]
+    is_sum = any(side.has("+", "-") for side in sides)
+    for part in (part for side in sides for part in side.walk()):
         units = find_units(part.text) if part.kind == "unit" else ()
         if units and units[0].zero:
             readings = (units[0], replace(units[0], zero=Fraction(0)))
             choices[part.start] = readings[::-1] if is_sum else readings
-        elif len(units) > 1:
+        elif units:
             choices[part.text] = units
-    if len(choices) > _MAX_CHOICES:
-        raise expressions[-1].not_understood("its units have too many readings")
+    if sum(len(units) > 1 for units in choices.values()) > _MAX_CHOICES:
+        raise sides[-1].not_understood("its units have too many readings")
     for units in itertools.product(*choices.values()):
-        yield dict(zip(choices, units, strict=True))
+        readings_of_units = dict(zip(choices, units, strict=True))
+        is_mixed = {"angle", "cycle"} <= {name for unit in units for name, _ in unit.powers}
+        if not is_mixed or len(numbers) < len(sides):
+            yield readings_of_units
+        of_cycles = {key for key, unit in readings_of_units.items() if "cycle" in dict(unit.powers)}
+        if is_mixed and any(part.text in of_cycles for side in numbers for part in side.walk()):
+            yield {key: unit.in_radians() for key, unit in readings_of_units.items()}
 
 
 def agrees(numeral: Numeral, value: Real, relation: str) -> bool | None:

@@ -34,7 +34,7 @@ from coursebuild.features.arithmetic.evaluate import (
 )
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.real import ONE, Real
-from coursebuild.features.arithmetic.statements import Statement
+from coursebuild.features.arithmetic.statements import FormulaSide, Statement
 from coursebuild.features.arithmetic.tex import CONSTANTS
 
 
@@ -98,7 +98,7 @@ class SymbolComparison:
             if not self.has_readings:
                 raise
         else:
-            if mistake is None or not self.has_readings:
+            if not self.mixes_turns and (mistake is None or not self.has_readings):
                 return mistake
         raise self.expressions[1].not_understood("a unit in it has two readings")
 
@@ -149,6 +149,14 @@ class SymbolComparison:
         texts |= {symbol.unit_text for symbol in self.known.values()}
         units = map(find_units, texts)
         return any(len(group) > 1 or any(unit.zero for unit in group) for group in units)
+
+    @property
+    def mixes_turns(self) -> bool:
+        """Whether cycles stand beside angles: `f = 50 rad/s`, but not `2\\pi f = 314 rad/s`."""
+        pairs = zip(self.sides, self.expressions, strict=True)
+        whole = (side for side, e in pairs if e.kind == "symbol" or read_numeral(e))
+        units = self._units(*whole)
+        return {"angle", "cycle"} <= {name for unit in units for name, _ in unit.powers}
 
     def _is_of_zeros(self) -> bool:
         r"""Whether the chain says that all its sides are zero: `\dot x = x = 0`."""
@@ -216,7 +224,7 @@ class SymbolComparison:
     ) -> FormulaComparison | None:
         sizes = [ONE]
         if bare is not None:
-            units = [self.unit] if self.unit is not None else [*self._chain_units()]
+            units = [self.unit] if self.unit is not None else [*self._units(*self.chain.sides)]
             sizes = [measure(u) for u in units if u.dimension == dimensions[1 - bare]]
             sizes += [] if self.unit is not None else [ONE]
         numerals = {i: n for i in (0, 1) if (n := self._numeral(i)) is not None}
@@ -254,9 +262,9 @@ class SymbolComparison:
         message += ", not this" if result else ""
         return FormulaComparison("wrong", side.start, side.end, message, help=help, result=result)
 
-    def _chain_units(self) -> Iterator[Unit]:
-        """Yield the units that the chain names."""
-        for side in self.chain.sides:
+    def _units(self, *sides: FormulaSide) -> Iterator[Unit]:
+        """Yield the units that sides of the chain name."""
+        for side in sides:
             if not isinstance(side.expression, Expression):
                 continue
             alone = self.symbols.get(side.expression.text) if not side.expression.parts else None

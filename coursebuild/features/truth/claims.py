@@ -60,6 +60,7 @@ _DECIMAL = re.compile(r"\d\.\d")
 _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
 """Every formula with claims matches this."""
 _DIGIT = re.compile("[0-9]")
+_VECTOR = re.compile(r"\s*[(\[](?:[-+\d.,;\s]|\\[,;: ])+[)\]]\s*")
 
 
 class StatedNumber(Struct, frozen=True):
@@ -272,8 +273,8 @@ class _Counter:
     def give(self, source: str, mark: Span, claims: Iterable[StatedNumber]) -> None:
         """Give claims their source; a part of the course is kept with each of them."""
         names = tuple(name.strip() for name in source.split(","))
-        claims = tuple(claims)
-        self.inputs |= {value for claim in claims for value, _ in claim.values[:1]}
+        claims = tuple(claim for claim in claims if claim.values)
+        self.inputs |= {claim.values[0][0] for claim in claims}
         if all(map(_PART.fullmatch, names)):
             claims = claims or (StatedNumber(mark, ""),)
             self.sourced += (replace(claim, sources=names, mark=mark) for claim in claims)
@@ -344,12 +345,11 @@ class _Counter:
             for side in statement.sides:
                 is_numeral = source is not None and side.is_numeric
                 if is_numeral or _is_claim(side, tex.text):
-                    claims.append(_side_claim(side, tex))
+                    claims += _side_claims(side, tex, self.comma)
         if source is None:
             self.open += claims
         else:
-            compared = [claim for claim in claims if claim.values]
-            self.give(source, Span(span.source, tex.span().end, span.end), compared)
+            self.give(source, Span(span.source, tex.span().end, span.end), claims)
 
 
 def find_numbers(text: str, comma: bool = False) -> Iterator[Number]:
@@ -401,18 +401,24 @@ def _claim(number: Number, span: Span, unit_text: str = "") -> StatedNumber:
     return StatedNumber(span, number.text, ((value, step), ((value + zero) * size, step * size)))
 
 
-def _side_claim(side: FormulaSide, tex: Excerpt) -> StatedNumber:
+def _side_claims(side: FormulaSide, tex: Excerpt, comma: bool) -> Iterator[StatedNumber]:
+    """Yield the number that a side is, or those of a vector such as `(0.2, 0, -0.5)`."""
     part = tex.text[side.start : side.end]
+    if _VECTOR.fullmatch(part):
+        for number in find_numbers(part, comma):
+            yield _claim(number, tex.span(side.start + number.start, side.start + number.end))
+        return
     place = tex.span(side.end - len(part.lstrip()), side.start + len(part.rstrip()))
     expression = side.expression if side.is_numeric else None
     numeral = None
     with suppress(NotUnderstood):  # a unit may be a word
         numeral = read_numeral(expression) if isinstance(expression, Expression) else None
     if numeral is None:
-        return StatedNumber(place, place.text)
+        yield StatedNumber(place, place.text)
+        return
     step, size = float(numeral.step), float(numeral.unit_size)
-    value = float(numeral.express(numeral.value))
-    return StatedNumber(place, place.text, ((value, step / size), (float(numeral.value), step)))
+    values = ((float(numeral.express(numeral.value)), step / size), (float(numeral.value), step))
+    yield StatedNumber(place, place.text, values)
 
 
 def _is_claim(side: FormulaSide, tex: str) -> bool:
