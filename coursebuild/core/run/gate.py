@@ -219,7 +219,10 @@ def finish(
 
 @functools.cache
 def working_folder() -> str:
-    """The private folder in which processes work that write nothing; it ends with this process."""
+    """A private folder, for processes that write nothing and for temporary files.
+
+    It ends with this process; if that is killed, with the next command.
+    """
     resources = contextlib.ExitStack()
     folder = resources.enter_context(temporary_folder())
     owner = os.getpid()

@@ -163,7 +163,7 @@ class Mjbench:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # it is closed with the process
         self._process = gate.start(
             gate.module_command("mjbench", "jobs", python_path=python_path),
-            gate.environment(*gate.COMPUTING),
+            gate.environment(*gate.COMPUTING, TMPDIR=gate.working_folder()),
             stdin=gate.PIPE,
             stdout=gate.PIPE,
             stderr=self._errors,
