@@ -7,7 +7,6 @@ of the course's scripts and labs print something else with changed files.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import tempfile
 from collections.abc import Callable, Mapping
@@ -112,14 +111,10 @@ class Mjbench:
 
     def __exit__(self, *_: object) -> None:
         process, self._process = self._process, None
-        if process is None:
-            return
-        process.kill()
-        process.wait()
-        for file in (process.stdin, process.stdout, self._errors):
-            if file is not None:
-                with contextlib.suppress(BrokenPipeError):
-                    file.close()
+        if process is not None:
+            gate.end(process)
+        if self._errors is not None:
+            self._errors.close()
 
     def facts(self) -> Facts:
         """Say what is here."""
@@ -153,9 +148,9 @@ class Mjbench:
         status = process.wait()
         assert self._errors is not None
         self._errors.seek(0)
-        lines = self._errors.read().decode("utf-8", "replace").strip().splitlines()
+        words = gate.last_line(self._errors.read())
         self.__exit__()
-        return lines[-1] if lines else f"with status {status}"
+        return words or f"with status {status}"
 
     def _start(self) -> gate.Process:
         require("mjbench", "measure", self._purpose)
