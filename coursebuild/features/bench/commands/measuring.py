@@ -186,8 +186,7 @@ class Mjbench:
         if run.outcome is Outcome.TIMEOUT:
             failure = f"it takes longer than {question.seconds:g} s"
         elif run.outcome is not Outcome.OK:
-            lines = run.stderr.strip().splitlines()
-            failure = lines[-1] if lines else run.outcome.value
+            failure = gate.last_line(run.stderr.encode()) or run.outcome.value
         return {"output": run.stdout, "failure": failure}
 
     def _browser_speed(self, key: int | None, duration: float) -> float | None:
