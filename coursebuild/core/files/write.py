@@ -405,7 +405,7 @@ def _remove(file: Path, path: str, old: bytes | None) -> None:
         file.rename(aside)
         try:
             check_unchanged(aside, path, old)
-        except FileChangedError:
+        except EffectError:
             try:
                 _move(str(aside), file, path, new=True)
             except FileChangedError:  # it was saved twice, here and in the file's place
