@@ -11,7 +11,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from coursebuild.core import model as model
-from coursebuild.core.engine.lifetime import end_with_parent as end_with_parent
 from coursebuild.core.engine.store import Store as Store
 from coursebuild.core.engine.tool import step_key as step_key
 from coursebuild.core.features import API as API

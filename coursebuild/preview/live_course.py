@@ -149,7 +149,8 @@ class FolderWatcher:
             status = (self._root / path).stat()
         except OSError:
             return ()
-        return status.st_mtime_ns, status.st_size, status.st_ino, status.st_mode
+        # With the time of the last change of any kind, as a tool may set the other one back.
+        return status.st_mtime_ns, status.st_ctime_ns, status.st_size, status.st_ino
 
     def _watch(self, folders: tuple[Path, ...]) -> Iterator[frozenset[str]]:
         """Yield changes in these folders; an empty set at first, and now and then."""

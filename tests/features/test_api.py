@@ -62,7 +62,6 @@ SUBJECTS = {
         "report",
     ),
     "Work in other processes": (
-        "core.engine.lifetime",
         "core.engine.store",
         "core.files.course_root",
         "core.files.locks",

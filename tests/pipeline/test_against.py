@@ -295,6 +295,7 @@ import os, sys
 pip, install, alone, option, target, progress, *words = sys.argv[1:]
 assert [pip, install, option, progress] == ["pip", "install", "--python", "--no-progress"]
 assert alone == "--no-config"
+assert "/coursebuild.tmp." in os.environ["TMPDIR"], "the next command removes it"
 os.execv(sys.executable, [sys.executable, "-m", pip, option, target, install, *words])
 """
 """A stand-in that installs as uv would."""

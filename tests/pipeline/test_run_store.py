@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -353,6 +354,23 @@ def test_result_is_not_kept_where_something_was_saved_while_the_script_ran(tmp_p
         desk.run(trace, during=lambda act=act, desk=desk: act(desk))
         assert desk.rerun_reason() == reason
         assert (desk.find_run() is not None) is (reason == ""), number
+
+
+def test_a_clock_that_is_set_back_while_a_script_runs_hides_no_save(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is the system's, where the course's store is set aside."""
+    desk.write(".coursebuild/from-elsewhere", b"")
+    tomorrow = time.time_ns() + 86_400_000_000_000
+
+    def set_back() -> None:
+        monkeypatch.undo()
+        desk.write("models/a.xml", b"<mujoco model='b'/>")
+
+    monkeypatch.setattr(time, "time_ns", lambda: tomorrow)
+    desk.run(MODEL_TRACE, during=set_back)
+    assert desk.rerun_reason() == "the clock was set back while it ran"
+    assert desk.find_run() is None
 
 
 def test_a_module_that_appeared_while_the_script_ran_was_not_seen_by_it(desk: Desk) -> None:

@@ -13,7 +13,7 @@ from coursebuild.cli.commands import known_commands
 from support.editor import Editor
 from support.local_cluster import install_plugin
 from support.scratch_course import Folder, kill_at_end, processes
-from support.traps import COMMANDS, TrapFolder, tool, variables
+from support.traps import COMMANDS, OF_MJBENCH, TrapFolder, mjbench, tool, variables
 
 STARTED_IN_TESTS_OF_THEIR_OWN = {"lsp", "serve"}
 EACH = [
@@ -30,10 +30,10 @@ def traps(tmp_path: Path, stores: Path) -> TrapFolder:
 
 
 def run(
-    traps: TrapFolder, *command: str, **more_variables: str
+    traps: TrapFolder, command: list[str], **more_variables: str
 ) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        tool(*command),
+        command,
         cwd=traps.folder.root,
         env=traps.folder.environment(variables(**more_variables)),
         stdin=subprocess.DEVNULL,
@@ -49,18 +49,24 @@ def test_every_command_is_tried() -> None:
 @pytest.mark.site
 @pytest.mark.parametrize("command", EACH)
 def test_no_trap_runs(traps: TrapFolder, command: tuple[str, ...]) -> None:
-    result = run(traps, *command)
+    result = run(traps, tool(*command))
     assert (traps.marks(), "Traceback" in result.stderr) == ([], False), result.stderr
     if command[0] in ("build", "check") and "--against" not in command:
         assert result.stdout.endswith("everything holds\n")  # all that a course needs was started
+
+
+@pytest.mark.parametrize("words", OF_MJBENCH, ids=" ".join)
+def test_no_trap_runs_as_a_model_is_measured(traps: TrapFolder, words: tuple[str, ...]) -> None:
+    result = run(traps, mjbench(*words))
+    assert (traps.marks(), result.returncode) == ([], 0), result.stderr
 
 
 @pytest.mark.long
 def test_no_trap_runs_on_a_cluster(traps: TrapFolder, tmp_path: Path) -> None:
     (tmp_path / "packages").mkdir()
     path = install_plugin(tmp_path / "packages")
-    command = ("check", "--cluster", "local")
-    result = run(traps, *command, PYTHONPATH=path, PYTHONWARNINGS="ignore")
+    command = tool("check", "--cluster", "local")
+    result = run(traps, command, PYTHONPATH=path, PYTHONWARNINGS="ignore")
     assert (traps.marks(), result.stdout.endswith("everything holds\n")) == ([], True), (
         result.stderr
     )

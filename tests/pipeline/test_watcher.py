@@ -20,6 +20,15 @@ from support.waiting import wait_until
 pytestmark = pytest.mark.site
 
 LESSON = "content/lessons/1.1-one.md"
+
+
+def keep_size_and_time(path: Path) -> None:
+    """Save another text, as a tool does that sets times back to those of its archive."""
+    before = path.stat()
+    path.write_text(path.read_text().upper())
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+
+
 CHANGES: dict[str, Callable[[Path], object]] = {
     "written": lambda path: path.write_text("new"),
     "gone": Path.unlink,
@@ -27,6 +36,8 @@ CHANGES: dict[str, Callable[[Path], object]] = {
     "replaced": lambda path: Path(shutil.copy(path, f"{path}~")).replace(path),
     "closed": lambda path: path.chmod(0o400),
     "emptied": lambda path: os.truncate(path, 0),
+    "of old": keep_size_and_time,
+    "of tomorrow": lambda path: os.utime(path, (2**32, 2**32)),
 }
 CHANGED_PAGES = [
     f"{folder}{name}.md" for folder in ("content/lessons/", "docs/", "") for name in CHANGES

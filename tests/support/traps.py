@@ -57,6 +57,8 @@ COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "update": (("update",),),
 }
 """Each command with the options by which it does something else."""
+OF_MJBENCH = (("--help",), ("models/box.xml", "--quick"), ("diet", "models/box.xml", "--quick"))
+"""Commands of mjbench, which are given without a course as well."""
 LESSON = f"""{GOOD}
 Text with `numpy.sqrt`, `mujoco.mj_step` and $x^2$, about the [box](model:box).
 
@@ -193,3 +195,8 @@ def variables(**more_variables: str) -> dict[str, str]:
 def tool(*arguments: str) -> list[str]:
     """A command as users give it: by the script that an installer makes."""
     return [str(Path(sys.executable).with_name("coursebuild")), *arguments]
+
+
+def mjbench(*arguments: str) -> list[str]:
+    """The same of mjbench; the script of an installer only begins it."""
+    return [sys.executable, "-P", "-m", "mjbench", *arguments]

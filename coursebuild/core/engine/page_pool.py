@@ -37,11 +37,8 @@ _MOST_WAITING = 32
 
 
 def can_fork() -> bool:
-    """Whether this process can be forked: it has one thread, and nothing that forking breaks."""
-    if sys.platform == "darwin":
-        return False
-    # A fork copies only the thread that forks, and MuJoCo has some of its reserved.
-    return threading.active_count() == 1 and "mujoco" not in sys.modules
+    """Whether this process can be forked: a copy has only the thread that forks."""
+    return sys.platform != "darwin" and threading.active_count() == 1
 
 
 class _Task(Struct, frozen=True, eq=False):

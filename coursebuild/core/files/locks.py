@@ -231,12 +231,8 @@ def _remove_abandoned(place: str) -> None:
 
 def remove_folder(folder: str) -> None:
     """Remove a temporary folder, even if a script has removed permissions in it."""
-    with contextlib.suppress(OSError):
-        os.rmdir(folder)  # noqa: PTH106 (mostly it is empty)
-        return
     shutil.rmtree(folder, ignore_errors=True)
-    if Path(folder).exists():
-        with contextlib.suppress(OSError):
-            for parent, _, _ in os.walk(folder):
-                Path(parent).chmod(0o700)
-        shutil.rmtree(folder, ignore_errors=True)
+    with contextlib.suppress(OSError):
+        for parent, _, _ in os.walk(folder):
+            Path(parent).chmod(0o700)
+    shutil.rmtree(folder, ignore_errors=True)

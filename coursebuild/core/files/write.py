@@ -400,15 +400,17 @@ def _remove(file: Path, path: str, old: bytes | None) -> None:
     aside, where it is looked at once more; what is saved from then on is a new file.
     """
     aside = file.with_name(f"{PREFIX}{os.urandom(6).hex()}")
-    file.rename(aside)
-    try:
-        check_unchanged(aside, path, old)
-    except FileChangedError:
+    with file.open("rb") as moved_file:
+        try_lock(moved_file.fileno())  # or another command might take it for a killed one's
+        file.rename(aside)
         try:
-            _move(str(aside), file, path, new=True)
-        except FileChangedError:  # it was saved twice, here and in the file's place
-            aside.replace(file.with_name(f"{file.name}~"))
-        else:
-            aside.unlink(missing_ok=True)
-        raise
-    aside.unlink()
+            check_unchanged(aside, path, old)
+        except EffectError:
+            try:
+                _move(str(aside), file, path, new=True)
+            except FileChangedError:  # it was saved twice, here and in the file's place
+                aside.replace(file.with_name(f"{file.name}~"))
+            else:
+                aside.unlink(missing_ok=True)
+            raise
+        aside.unlink()

@@ -106,15 +106,10 @@ class JsonChild:
         process, self._process = self._process, None
         if process is None:
             return
-        process.kill()
-        process.wait()
+        gate.end(process)
         if self._watch is not None:
             self._watch.close()
             self._watch = None
-        for pipe in (process.stdin, process.stdout, process.stderr):
-            if pipe is not None:
-                with contextlib.suppress(BrokenPipeError):
-                    pipe.close()
 
     def interrupt(self) -> None:
         """From another thread: end the child and refuse all further requests."""
@@ -159,8 +154,7 @@ class JsonChild:
             if not is_ready or not number:
                 self.stop()
                 errors.seek(0)
-                lines = errors.read().decode("utf-8", "replace").strip().splitlines()
-                cause = self._excess or (lines[-1] if lines else "the import crashed")
+                cause = self._excess or gate.last_line(errors.read()) or "the import crashed"
                 raise EffectError(f"MuJoCo cannot be loaded: {cause}")
         with contextlib.suppress(AttributeError, OSError):  # only Linux can
             limits = [(resource.RLIMIT_DATA, self.memory << 20), (resource.RLIMIT_CORE, 0)]

@@ -337,6 +337,7 @@ def _run(command: Sequence[str]) -> tuple[int, str]:
     # What says where to install would disturb an installer that is told so.
     places = ("PIP_TARGET", "PIP_PREFIX", "PIP_PYTHON", "UV_PYTHON", "UV_SYSTEM_PYTHON")
     ours = {"PIP_USER": "0", "PIP_DISABLE_PIP_VERSION_CHECK": "1", "LC_ALL": "C.UTF-8"}
+    ours["TMPDIR"] = gate.working_folder()  # killed, pip leaves there what it was unpacking
     # Wheels need no program but one that knows passwords; pip would start `rustc` for its version.
     ours["PATH"] = os.path.dirname(gate.find_program("keyring") or "")  # noqa: PTH120
     variables = {"PIP_RETRIES": "1", **gate.environment(*gate.INSTALLERS), **ours}

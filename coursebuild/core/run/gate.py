@@ -93,8 +93,12 @@ class Completed(Struct, frozen=True):
 
     def last_line(self) -> str:
         """The last line of its errors; empty where it has none."""
-        lines = self.errors.decode("utf-8", "replace").strip().splitlines()
-        return lines[-1] if lines else ""
+        return last_line(self.errors)
+
+
+def last_line(errors: bytes) -> str:
+    """The last line that a process wrote; empty where there is none."""
+    return next(reversed(errors.decode("utf-8", "replace").strip().splitlines()), "")
 
 
 def find_program(name: str) -> str | None:
@@ -193,33 +197,43 @@ def finish(
         TimeoutError: it took longer than these seconds.
     """
     with contextlib.ExitStack() as resources:
-        process = resources.enter_context(
-            start(
-                command,
-                environment,
-                folder=folder or resources.enter_context(temporary_folder()),
-                stdin=PIPE,
-                stdout=PIPE,
-                stderr=stderr,
-                bound=bound,
-                enclose=enclose,
-            )
+        process = start(
+            command,
+            environment,
+            folder=folder or resources.enter_context(temporary_folder()),
+            stdin=PIPE,
+            stdout=PIPE,
+            stderr=stderr,
+            bound=bound,
+            enclose=enclose,
         )
         try:
             output, errors = process.communicate(stdin, seconds)
         except subprocess.TimeoutExpired:
             raise TimeoutError(f"it takes longer than {seconds:g} s") from None
         finally:
-            if process.returncode is None:
-                with contextlib.suppress(OSError):
-                    os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
+            end(process)
     return Completed(process.returncode, output, errors or b"")
+
+
+def end(process: Process) -> None:
+    """Kill a process with all that it started, unless it was waited for, and close its pipes."""
+    if process.returncode is None:
+        with contextlib.suppress(OSError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    for pipe in (process.stdin, process.stdout, process.stderr):
+        with contextlib.suppress(BrokenPipeError):
+            if pipe is not None:
+                pipe.close()
 
 
 @functools.cache
 def working_folder() -> str:
-    """The private folder in which processes work that write nothing; it ends with this process."""
+    """A private folder, for processes that write nothing and for temporary files.
+
+    It ends with this process; if that is killed, with the next command.
+    """
     resources = contextlib.ExitStack()
     folder = resources.enter_context(temporary_folder())
     owner = os.getpid()

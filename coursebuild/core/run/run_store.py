@@ -235,6 +235,8 @@ class RunStore:
         since = self._started.get(inputs.path)
         if since is None:
             return "its starting time is unknown"
+        if self._clock.now() < since:
+            return "the clock was set back while it ran"
         for dependency in dependencies:
             match dependency.kind:
                 case Kind.FILE | Kind.LISTING:

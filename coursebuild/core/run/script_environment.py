@@ -276,12 +276,9 @@ def cpu_name() -> str:
 
 def find_cpu_name(text: str) -> str:
     """The name in a text such as that of `/proc/cpuinfo`; empty where there is none."""
-    fields = [line.partition(":") for line in text.splitlines()]
-    for name in _NAMES:
-        for key, _, value in fields:
-            if key.strip() == name and value.strip():
-                return _tidy(value)
-    return ""
+    rows = (line.partition(":") for line in reversed(text.splitlines()))  # the first one counts
+    fields = {key.strip(): _tidy(value) for key, _, value in rows if value.strip()}
+    return next((fields[name] for name in _NAMES if name in fields), "")
 
 
 def _read(path: Path) -> str:

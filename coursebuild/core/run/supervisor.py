@@ -193,7 +193,9 @@ class _Supervisor:
                     shutil.copytree(
                         content, writable, symlinks=True, ignore=_special_names, dirs_exist_ok=True
                     )
-                folder = _make_temporary_folder(job["scratch"])
+                os.makedirs(job["scratch"], 0o700, exist_ok=True)  # noqa: PTH103 (in a sandbox)
+                folder = f"{job['scratch']}/{os.getpid()}-{next(_COUNTER)}"
+                os.mkdir(folder, 0o700)  # noqa: PTH102
                 parent = os.getppid()  # now, since a script may end it as soon as it runs
                 script = self._launch(job, environment | {"TMPDIR": folder})
             except (OSError, ValueError) as error:  # a ValueError: an argument has a null character
@@ -358,20 +360,6 @@ def missing_modules(names: Sequence[str], folders: Sequence[str], library: str) 
         return True
 
     return [name for name in names if not is_importable(name)]
-
-
-def _make_temporary_folder(scratch: str) -> str:
-    """Make a fresh folder in `scratch`, which another supervisor may have removed as empty."""
-    while True:
-        folder = f"{scratch}/{os.getpid()}-{next(_COUNTER)}"
-        try:
-            os.mkdir(folder, 0o700)  # noqa: PTH102
-            return folder
-        except FileExistsError:
-            continue
-        except FileNotFoundError:
-            with contextlib.suppress(FileExistsError):
-                Path(scratch).mkdir(mode=0o700, parents=True)
 
 
 def _report_unstartable(text: str) -> bytes:

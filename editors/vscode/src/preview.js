@@ -2,6 +2,7 @@
 
 const { spawn } = require('node:child_process');
 const fs = require('node:fs');
+const os = require('node:os');
 const path = require('node:path');
 const vscode = require('vscode');
 const { addressIn, courseOf, pageOf } = require('./course');
@@ -19,7 +20,7 @@ class Preview {
       { viewColumn: vscode.ViewColumn.Beside, preserveFocus: true },
       { enableScripts: true, retainContextWhenHidden: true },
     );
-    this.process = spawn(command, ['-C', folder, 'serve', '--port', '0', ...EMBED]);
+    this.process = spawn(command, ['-C', folder, 'serve', '--port', '0', ...EMBED], { cwd: os.homedir() });
     this.panel.onDidDispose(() => this.process.kill('SIGINT'));
     this.process.on('error', (error) => output.appendLine(String(error)));
     this.process.on('close', (code) => {

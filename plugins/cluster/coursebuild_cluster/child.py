@@ -1,6 +1,6 @@
 """The process beside a worker that does the work: it can be ended at any time, and costs no worker.
 
-`python -m coursebuild_cluster.child FOLDER PARENT` answers requests that come at its input, each as
+`python -m coursebuild_cluster.child FOLDER` answers requests that come at its input, each as
 8 bytes of length and a `Request`, until the input ends. It keeps its copy of the course and a
 `ScriptServer` warm. What it prints goes to its standard error.
 """
@@ -31,7 +31,6 @@ from coursebuild.api import (
     States,
     Store,
     dependencies_of,
-    end_with_parent,
     find_sandbox,
 )
 from coursebuild_cluster.course_copy import BlobStore, CourseFolder
@@ -149,8 +148,7 @@ def _end(number: int, frame: object) -> NoReturn:
 
 def main() -> None:
     """Answer requests until the input ends."""
-    folder, parent = sys.argv[1:]
-    end_with_parent(int(parent))
+    (folder,) = sys.argv[1:]
     signal.signal(signal.SIGTERM, _end)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the command
     output = os.fdopen(os.dup(1), "wb")

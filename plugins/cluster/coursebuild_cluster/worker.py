@@ -7,7 +7,6 @@ others are called directly. Each thread of a worker has a process beside it (`ch
 from __future__ import annotations
 
 import contextlib
-import os
 import select
 import signal
 import threading
@@ -78,8 +77,7 @@ class _Child:
     """A process that answers requests."""
 
     def __init__(self, folder: Path) -> None:
-        module = "coursebuild_cluster.child"
-        command = gate.module_command(module, str(folder), str(os.getpid()))
+        command = gate.module_command("coursebuild_cluster.child", str(folder))
         # A session of its own: Ctrl-C in the terminal of a worker is for the worker.
         self._process = gate.start(
             command,
@@ -87,7 +85,6 @@ class _Child:
             stdin=gate.PIPE,
             stdout=gate.PIPE,
             stderr=gate.OWN,
-            bound=False,
         )
 
     def ask(self, request: bytes, is_unwanted: Callable[[], bool]) -> bytes | None:

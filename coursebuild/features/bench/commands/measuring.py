@@ -7,7 +7,6 @@ of the course's scripts and labs print something else with changed files.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import tempfile
 from collections.abc import Callable, Mapping
@@ -112,14 +111,10 @@ class Mjbench:
 
     def __exit__(self, *_: object) -> None:
         process, self._process = self._process, None
-        if process is None:
-            return
-        process.kill()
-        process.wait()
-        for file in (process.stdin, process.stdout, self._errors):
-            if file is not None:
-                with contextlib.suppress(BrokenPipeError):
-                    file.close()
+        if process is not None:
+            gate.end(process)
+        if self._errors is not None:
+            self._errors.close()
 
     def facts(self) -> Facts:
         """Say what is here."""
@@ -153,9 +148,9 @@ class Mjbench:
         status = process.wait()
         assert self._errors is not None
         self._errors.seek(0)
-        lines = self._errors.read().decode("utf-8", "replace").strip().splitlines()
+        words = gate.last_line(self._errors.read())
         self.__exit__()
-        return lines[-1] if lines else f"with status {status}"
+        return words or f"with status {status}"
 
     def _start(self) -> gate.Process:
         require("mjbench", "measure", self._purpose)
@@ -163,7 +158,7 @@ class Mjbench:
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # it is closed with the process
         self._process = gate.start(
             gate.module_command("mjbench", "jobs", python_path=python_path),
-            gate.environment(*gate.COMPUTING),
+            gate.environment(*gate.COMPUTING, TMPDIR=gate.working_folder()),
             stdin=gate.PIPE,
             stdout=gate.PIPE,
             stderr=self._errors,
@@ -191,8 +186,7 @@ class Mjbench:
         if run.outcome is Outcome.TIMEOUT:
             failure = f"it takes longer than {question.seconds:g} s"
         elif run.outcome is not Outcome.OK:
-            lines = run.stderr.strip().splitlines()
-            failure = lines[-1] if lines else run.outcome.value
+            failure = gate.last_line(run.stderr.encode()) or run.outcome.value
         return {"output": run.stdout, "failure": failure}
 
     def _browser_speed(self, key: int | None, duration: float) -> float | None:
