@@ -118,7 +118,7 @@ def read_segments(text: str, name: str) -> ReadText:
 
 _GATES = re.compile(
     r"^(?P<mark>`{3,}|~{3,}|:{3,})\{(?P<name>exercise|solution)-start\}"
-    r"(?P<head>.*\n(?:[ \t]*:.*\n)*)"
+    r"(?P<head>[^\n]*\n(?:[ \t]*:[^\n]*\n)*)"
     r"(?P=mark)[ \t]*\n(?P<body>.*?)^(?P=mark)\{(?P=name)-end\}[ \t]*\n(?P=mark)[ \t]*$",
     re.MULTILINE | re.DOTALL,
 )
