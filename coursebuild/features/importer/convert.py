@@ -260,7 +260,9 @@ def _convert_texts(
     models: Mapping[str, str],
     files: SourceFiles,
 ) -> tuple[dict[str, bytes], LessonContext]:
-    targets = {stem_of(text.file): text.link for text in texts if text.file}
+    routes = ((text.substitutions.get("slug", "").strip("/"), text.link) for text in texts)
+    targets = {route: link for route, link in routes if route}
+    targets |= {stem_of(text.file): text.link for text in texts if text.file}
     texts = [text for text in texts if text.path]
     context = LessonContext(
         targets=targets,
@@ -275,6 +277,7 @@ def _convert_texts(
         models=models,
         sources=frozenset(key for key, _ in _works(files)),
         camera_is_position=course.camera_is_position,
+        substitutions=course.substitutions,
     )
     new = {}
     for text in texts:
@@ -312,6 +315,7 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
             label for segment in text.segments for label in find_references(segment.text)
         ),
         script_path=script_path_of(text.path),
+        substitutions={**course_context.substitutions, **text.substitutions},
         title=text.title,
         parts=[],
         figures=[],

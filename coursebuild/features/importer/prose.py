@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import posixpath
 import re
+import textwrap
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 from coursebuild.features.importer.context import (
+    PROOF_LABELS,
     LessonContext,
     formula_anchor,
     label_anchor,
@@ -27,14 +29,14 @@ _ATTRIBUTES = (
 )
 _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
 """Attributes of Pandoc or of Python's Markdown, which follow what they belong to."""
-_PLACE = r"(?:[^()\s]|\([^()\s]*\))+"
+_PLACE = r"(?:<[^<>\n]+>|(?:[^()\s<]|\([^()\s]*\))(?:[^()\s]|\([^()\s]*\))*)"
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
 # A formula holds no beginning of another: so each character is looked at a few times, not once for
 # each beginning before it.
 _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`))"
-    rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?:{_LINK_TITLE})?\)"
+    rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?P<hover>{_LINK_TITLE})?\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
     rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?\))"
@@ -44,9 +46,16 @@ _LINE = re.compile(
     r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]\[(?P<path>[A-Za-z_]\w*(?:\.\w+)+)?\])"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
-    r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
+    rf"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst|{'|'.join(PROOF_LABELS)})"
+    r"-(?P<label>\w+(?:-\w+)*)\]?)"
+    r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
+    r"|(?<!\^)\^[^\s\^\[\]]+\^(?!\^))"
+    r"|(?P<change>\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
+    r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
+    r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
+    r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{[^{}\n]*\})"
     r"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@\w[\w:./-]*(?:[;,\s][^\[\]\n]*)?\])"
-    r"|(?P<substitution>\{\{[^{}\n]*\}\})"
+    r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?\)))"  # its text began a line above
@@ -72,7 +81,8 @@ _ENVIRONMENT = re.compile(
 )
 """A formula between dollar signs, or one that its environment alone makes one."""
 _BRACKETS = re.compile(
-    r"^[ \t]*\\\[(?P<tex>(?>(?:(?!\\[\[\]]).)+))\\\][ \t]*$", re.DOTALL | re.MULTILINE
+    r"^[ \t]*\\{1,2}\[(?P<tex>(?>(?:(?!\\{1,2}[\[\]]).)+))\\{1,2}\][ \t]*$",
+    re.DOTALL | re.MULTILINE,
 )
 _TARGET = re.compile(
     r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE
@@ -85,15 +95,20 @@ _CAPTION = re.compile(
 )
 """A caption of Quarto, below its table."""
 _MEANING = re.compile(
-    r"^(?<![^\n]\n)(?![|:#>\s<]|[-*+][ ])([^\n]*[^\s\n:])[ \t]*\n:[ \t]+(?=\S)", re.MULTILINE
+    r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
+    r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
+    re.MULTILINE,
 )
-"""A term in a paragraph of its own, and the mark of what it means."""
+"""A term in a paragraph of its own, and what it means, once or more, each behind a colon."""
+_ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
 _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
 """The first or last line of a block of code in a quotation or a list."""
-_COMMENT = re.compile(r"^(?:%[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE)
-"""A comment of MyST, or its break between two cells."""
+_COMMENT = re.compile(
+    r"%%[^%\n]+%%|^(?:%(?!%)[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE
+)
+"""A comment of MyST or Obsidian, or the break of MyST between two cells."""
 _COMMENT_AS_HEADING = re.compile(
     r"^(#{1,6})[ \t]+<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$", re.MULTILINE
 )
@@ -140,7 +155,12 @@ _KINDS = {
     "note": ("footnote", "stands at the end of the lesson"),
     "cross": ("cross-reference", "a link"),
     "cite": ("citation", "in the words of BibTeX's keys"),
-    "substitution": ("substitution", "dropped: it changes no word"),
+    "substitution": ("substitution", "the words that it stands for"),
+    "marked": ("marked words", "a tag of HTML"),
+    "change": ("suggested change", "as if it had been accepted"),
+    "wiki": ("link", "its new address"),
+    "auto": ("link", "its new address"),
+    "latex": ("command of LaTeX", "dropped: it changes no word"),
     "mention": ("mention of a lesson", "its new number"),
     "route": ("link", "its new address"),
     "tail": ("link", "its new address"),
@@ -188,7 +208,11 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     text, count = _TARGET.subn(write_target, text)
     if count:
         account.changed["label", "an anchor"] += count
-    text, count = _MEANING.subn(r"**\1**: ", text)
+    for abbreviation in _ABBREVIATION.finditer(text):
+        message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
+        context.leave("abbreviation", message)
+    text = _ABBREVIATION.sub("", text)
+    text, count = _MEANING.subn(_write_meanings, text)
     if count:
         account.changed["definition", "behind its term, which is bold"] += count
     text, count = _CAPTION.subn(_move_caption, text)
@@ -209,6 +233,14 @@ def _join_lines(match: re.Match[str]) -> str:
     """Return a role or note on one line, and behind it the line ends that stood in it."""
     lines = match[0].split("\n")
     return " ".join(line.strip() for line in lines) + "\n" * (len(lines) - 1)
+
+
+def _write_meanings(match: re.Match[str]) -> str:
+    """Return what a term means, as paragraphs of which the first begins with the term."""
+    meanings = re.split(r"^:[ \t]+", match["meanings"].lstrip("\n"), flags=re.MULTILINE)[1:]
+    parts = (textwrap.dedent(f"    {part.lstrip()}").strip() for part in meanings)
+    lines = (re.sub(r"^[ ]{2,4}", "", part, flags=re.MULTILINE) for part in parts)
+    return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
 
 
 def _write_figure(match: re.Match[str]) -> str:
@@ -278,10 +310,12 @@ def find_anchors(text: str) -> set[str]:
     labelled = [*_FIGURE_NAME.finditer(text)]
     figures = {label_anchor(m["name"]) for m in labelled if m["kind"] == "figure"}
     figures |= {to_anchor(match["label"]) for match in _FIGURE.finditer(text)}
-    cells = re.findall(r"^#\|[ \t]*label:[ \t]*fig-([\w-]+)", text, re.MULTILINE)
+    cells = re.findall(r"^(?:#\|[ \t]*label:[ \t]*|!\[[^\n]*\{#)fig-([\w-]+)", text, re.MULTILINE)
     figures |= {to_anchor(label) for label in cells}
     anchors = {to_anchor(match["name"]) for match in _TARGET.finditer(text)}
-    anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)\}", text)}
+    anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)", text)}
+    proofs = re.findall(rf"#((?:{'|'.join(PROOF_LABELS)})-[\w-]+)", text)
+    anchors |= {to_anchor(name) for name in proofs}
     for match in _DISPLAY.finditer(normalize_formulas(text)):
         anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", _label_formula(match)))
     labels = re.findall(r"^\s*:(?:label|name):[ \t]*(\S+)", text, re.MULTILINE)
@@ -300,24 +334,24 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return convert_role(match["name"], match["body"], context)
         case "image":
             alt = match["alt"]
-            source = match["source"]
+            source = match["source"].strip("<>")
+            if source.endswith("#only-dark"):  # a page makes its pictures dark itself
+                return ""
             if re.match("[a-z]+://|//", source):
                 message = f"a picture from another host, `{source}`; it is a link now"
                 context.leave("picture", message)
                 text, end = match.string, match.end()
                 is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
                 return (alt or source) if is_in_link else f"[{alt or source}]({source})"
-            name, path = source.removeprefix("attachment:"), context.resolve_path(source)
-            dressing = match["dressing"] or ""
+            dressing, hover = match["dressing"] or "", match["hover"] or ""
+            hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             label = dressing if dressing.startswith("{#fig-") else ""
-            if name in context.pictures:
-                return f"![{alt}]({context.add_picture(name)}){label}"
-            if path in context.files:
-                return f"![{alt}]({context.add_file(path)}){label}"
+            if address := context.resolve_picture(source):
+                return f"![{alt}]({address}{hover}){label}"
             context.leave("picture", f"the picture `{source}`, which is not in the folder")
             return alt
         case "link":
-            text, address = match["text"], context.resolve_link(match["address"])
+            text, address = match["text"], context.resolve_link(match["address"].strip("<>"))
             if not text and not re.match("#|lesson:|page:", address):  # its tool knows a title
                 text = title_of_file(re.split("[:#]", match["address"])[-1])
             return write_link(_rewrite_line(text, context), address, match["title"] or "")
@@ -341,7 +375,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 whole if _WORD.search(whole) else _TIGHT.sub(lambda m: f"${m[1].strip()}$", whole)
             )
         case "code":
-            return convert_code(whole, context)
+            is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
+            code = convert_code(whole, context)
+            return re.sub(r"(?<!\\)\|", r"\\|", code) if is_cell else code
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":
@@ -349,6 +385,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             label = match["label"]
             if kind == "eq":
                 return write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
+            if kind in PROOF_LABELS:
+                words = PROOF_LABELS[kind].capitalize()
+                return write_link(words, context.resolve_anchor(f"{kind}-{to_anchor(label)}"))
             if kind == "sec":
                 return write_link("this section", context.resolve_anchor(f"sec-{to_anchor(label)}"))
             kind = kind.replace("tbl", "tab")
@@ -359,19 +398,57 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return {"fig": "the figure", "tab": "the table", "lst": "the listing"}[kind]
         case "cite":
             keys = _CITED_KEY.findall(whole)
+            if any(key.partition("-")[0] in _CROSS_KINDS for key in keys):
+                return _rewrite_line(whole[1:-1], context)
             if keys and context.are_sources(keys):
                 return whole
             message = f"`{whole}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave("citation", message)
             return f"`{whole}`"
         case "substitution":
-            if re.fullmatch(r"\{\{<\s*pagebreak\s*>\}\}", whole):
+            title = re.search(r"(?:title|caption)=\"([^\"]*)\"", whole)
+            name, *arguments = whole.strip("{}<> %").split() or [""]
+            address = "".join(arguments[:1])
+            if name in ("tab", "code") and title:
+                return f"**{title[1]}**"
+            if name == "video" or (name == "embed" and whole[1] == "%"):
+                address = address.removeprefix("url=").strip('"')
+                return f"[{title[1] if title else address}]({address})"
+            if name.removeprefix("end") in _FRAMES and name != "embed":
                 return ""
+            if name == "kbd" and arguments:
+                return arguments[-1]
+            key = address if name in ("var", "meta") else name
+            if (value := context.substitutions.get(key)) is not None:
+                return value
             message = (
                 f"`{whole}`, which its tool replaces; it is code now: write what it stands for"
             )
             context.leave("substitution", message)
             return f"`{whole}`"
+        case "marked":
+            is_marked = whole[:2] == "==" or context.has_marks
+            tag = _MARKS[whole[:2] if whole[:2] in _MARKS else whole[0]]
+            words = whole[2:-2] if whole[:2] in _MARKS else whole[1:-1]
+            return f"<{tag}>{_rewrite_line(words, context)}</{tag}>" if is_marked else whole
+        case "change":
+            words, mark = whole[3:-3], whole[1:3]
+            if not context.has_marks:
+                return whole
+            return "" if mark in ("--", ">>") else _rewrite_line(words.rpartition("~>")[2], context)
+        case "wiki":
+            page, part, shown = match["page"].strip(), match["part"] or "", match["shown"]
+            if whole[0] == "!" and (address := page and context.resolve_picture(page)):
+                return f"![{title_of_file(page)}]({address})"
+            if page and context.resolve_path(f"{page}.md") not in context.files:
+                return whole
+            address = context.resolve_link(f"{page}.md{part}" if page else part)
+            return write_link(shown or page or part.lstrip("#"), address)
+        case "auto":
+            address = context.resolve_link(whole[1:-1])
+            return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
+        case "latex":
+            return "" if context.has_marks else whole
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
@@ -382,7 +459,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "route":
             return context.resolve_link(whole) or whole
         case "tail":
-            return f"]({context.resolve_link(match['rest']) or GONE}"
+            return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":
             address = match["named"]
             return whole.removesuffix(address) + (context.resolve_link(address) or GONE)
@@ -415,7 +492,10 @@ def _convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
     attribute, name = _ATTRIBUTE.search(tag), tag[1:].split()[0].lower()
     if attribute is None:
         return tag
-    address, alt = attribute[3], re.search(r"\s(?i:alt)=[\"']([^\"']*)", tag)
+    address, alt = (
+        attribute[3].removeprefix("attachment:"),
+        re.search(r"\s(?i:alt)=[\"']([^\"']*)", tag),
+    )
     words = alt[1] if alt else ""
     if re.match(r"[a-z][a-z+.-]*:|//|#", address):
         if name not in ("img", "source") or not re.match("https?://|//", address):
@@ -426,7 +506,7 @@ def _convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
         link = words if is_in_link else f'<a href="{address}">{words}</a>'
         return link if name == "img" else ""
     before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
-    if new_address := context.resolve_file(address):
+    if new_address := context.resolve_picture(address) or context.resolve_file(address):
         return before + new_address + after
     context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
     if name == "img":
@@ -434,6 +514,10 @@ def _convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
     return tag[: attribute.start()].rstrip() + after[1:]
 
 
+_MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
+_FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split()
+"""Names between braces that only place or mark what stands between them."""
+_CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = re.compile(r"(?<![\w@])@([\w][\w:./-]*\w|\w)")
 _TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
 """A formula with blanks at its ends, which some tools allow."""

@@ -37,11 +37,14 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
                 message = f"a link to `{target}`, which no text sets"
                 context.leave(f"role `{{{name}}}`", message)
             if ":" in address.rpartition("#")[2]:  # what has a number is called by it
-                return write_link("" if "%s" in words else words, address)
+                rest = words.partition("%s")[2] if "%s" in words else ""
+                return write_link("" if "%s" in words else words, address) + rest
             return write_link(words.replace("%s", "").strip() or title_of_file(target), address)
         case _ if name.partition(":")[0] in ("cite", "citep", "citet"):
             keys = [key.strip() for key in body.split(",")]
             if context.are_sources(keys):
+                if name.partition(":")[2] == "t" or name == "citet":
+                    return " and ".join(f"@{key}" for key in keys)
                 return f"[{'; '.join(f'@{key}' for key in keys)}]"
             message = f"`{body}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave(f"role `{{{name}}}`", message)
@@ -52,8 +55,13 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             return write_link(words or target, context.resolve_link(target))
         case "term":
             return words or target
-        case "abbr" | "kbd" | "sub" | "sup":
+        case "kbd" | "sub" | "sup" | "u" | "underline" | "del" | "strike":
+            tag = {"underline": "u", "strike": "del"}.get(name, name)
+            return f"<{tag}>{body}</{tag}>"
+        case "abbr" | "sc" | "smallcaps" | "chem":
             return body
+        case "button":
+            return write_link(words or target, context.resolve_link(target))
         case _ if name.rpartition(":")[2] in _CODE_ROLES:
             return f"`{words or target}`"
         case "guilabel" | "menuselection" | "dfn" | "rfc" | "pep" | "span" | "raw":
@@ -69,13 +77,15 @@ _CODE_ROLES = frozenset(
     "attribute data const exc exception obj object type".split()
 )
 _INLINE_RUN = re.compile(r"`(?:\{(?:python|r|julia)\}|r)[ ]+([^`]+)`")
+_LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)\w+[ ]+")
+"""The language of code in a line, as MkDocs marks it."""
 
 
 def convert_code(whole: str, context: LessonContext) -> str:
     """Return code in a line, without the mark of a tool that replaces it by its value."""
     run = _INLINE_RUN.fullmatch(whole)
     if run is None:
-        return whole
+        return _LANGUAGE.sub(r"\1", whole)
     cure = "print it in a script, and bind the number by `{out}`"
     message = f"{whole}, whose value its tool shows: {cure}"
     context.leave("code in a line", message)

@@ -156,7 +156,7 @@ lines](two.md 'The next') and ![](far.svg 'gone').
     texts = {"one.md": lines, "two.md": "# Two\n\nText.\n"}
     course = convert_files(tmp_path, {**texts, "springs(2).svg": drawing, "two.svg": drawing})
     text = course.files["content/lessons/1.1-one.md"].decode()
-    pictures = "![A spring](../files/springs(2).svg), ![two](../files/two.svg)"
+    pictures = '![A spring](../files/springs(2).svg), ![two](../files/two.svg "both")'
     link = "(lesson:1.2 'The next')"
     assert text == f"{pictures}, [below]{link},\n[over\nlines]{link} and .\n"
     assert "the picture `far.svg`, which is not in the folder" in account_of(course)
