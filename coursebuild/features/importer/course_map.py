@@ -283,7 +283,8 @@ def _read_file(
     lost = {**read.lost, **({} if id or not read.summary else {"description": read.summary})}
     for name, value in lost.items():
         words = shorten(value if isinstance(value, str) else json.dumps(value, default=str), 100)
-        message = f"`{name}` of its metadata ({words}), which a {'lesson' if id else 'page'} does not have"
+        kind = "lesson" if id else "page"
+        message = f"`{name}` of its metadata ({words}), which a {kind} does not have"
         files.leave(text.file, message, "metadata of a text")
     files.account.changed["text", "a lesson" if id else "a page"] += 1
     if has_own_titles and title and read.title and title.casefold() != read.title.casefold():

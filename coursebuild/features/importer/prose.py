@@ -6,11 +6,9 @@ not recognized here.
 
 from __future__ import annotations
 
-import posixpath
 import re
 import textwrap
 from collections.abc import Iterator
-from urllib.parse import urlsplit
 
 from coursebuild.features.importer.context import (
     PROOF_LABELS,
@@ -19,7 +17,15 @@ from coursebuild.features.importer.context import (
     label_anchor,
     to_anchor,
 )
-from coursebuild.features.importer.roles import convert_code, convert_role, write_link
+from coursebuild.features.importer.roles import (
+    convert_code,
+    convert_cross_reference,
+    convert_role,
+    convert_substitution,
+    convert_tag,
+    convert_wiki_link,
+    write_link,
+)
 from coursebuild.features.importer.source_files import title_of_file
 
 _ATTRIBUTES = (
@@ -67,7 +73,6 @@ _LINE = re.compile(
     rf"|(?P<attributes>(?:(?<=[^\s$])|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
     rf"|(?P<span>\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
-_ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
 _DISPLAY = re.compile(
     r"\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\})?",
     re.DOTALL,
@@ -381,21 +386,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":
-            kind = match["kind"]
-            label = match["label"]
-            if kind == "eq":
-                return write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
-            if kind in PROOF_LABELS:
-                words = PROOF_LABELS[kind].capitalize()
-                return write_link(words, context.resolve_anchor(f"{kind}-{to_anchor(label)}"))
-            if kind == "sec":
-                return write_link("this section", context.resolve_anchor(f"sec-{to_anchor(label)}"))
-            kind = kind.replace("tbl", "tab")
-            if address := context.resolve_anchor(f"{kind}:{to_anchor(label)}"):
-                return write_link("", address)
-            message = f"the reference `{whole}` to what no text labels: write what is meant"
-            context.leave("cross-reference", message)
-            return {"fig": "the figure", "tab": "the table", "lst": "the listing"}[kind]
+            return convert_cross_reference(whole, match["kind"], match["label"], context)
         case "cite":
             keys = _CITED_KEY.findall(whole)
             if any(key.partition("-")[0] in _CROSS_KINDS for key in keys):
@@ -406,26 +397,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             context.leave("citation", message)
             return f"`{whole}`"
         case "substitution":
-            title = re.search(r"(?:title|caption)=\"([^\"]*)\"", whole)
-            name, *arguments = whole.strip("{}<> %").split() or [""]
-            address = "".join(arguments[:1])
-            if name in ("tab", "code") and title:
-                return f"**{title[1]}**"
-            if name == "video" or (name == "embed" and whole[1] == "%"):
-                address = address.removeprefix("url=").strip('"')
-                return f"[{title[1] if title else address}]({address})"
-            if name.removeprefix("end") in _FRAMES and name != "embed":
-                return ""
-            if name == "kbd" and arguments:
-                return arguments[-1]
-            key = address if name in ("var", "meta") else name
-            if (value := context.substitutions.get(key)) is not None:
-                return value
-            message = (
-                f"`{whole}`, which its tool replaces; it is code now: write what it stands for"
-            )
-            context.leave("substitution", message)
-            return f"`{whole}`"
+            return convert_substitution(whole, context)
         case "marked":
             is_marked = whole[:2] == "==" or context.has_marks
             tag = _MARKS[whole[:2] if whole[:2] in _MARKS else whole[0]]
@@ -437,13 +409,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 return whole
             return "" if mark in ("--", ">>") else _rewrite_line(words.rpartition("~>")[2], context)
         case "wiki":
-            page, part, shown = match["page"].strip(), match["part"] or "", match["shown"]
-            if whole[0] == "!" and (address := page and context.resolve_picture(page)):
-                return f"![{title_of_file(page)}]({address})"
-            if page and context.resolve_path(f"{page}.md") not in context.files:
-                return whole
-            address = context.resolve_link(f"{page}.md{part}" if page else part)
-            return write_link(shown or page or part.lstrip("#"), address)
+            page, part = match["page"].strip(), match["part"] or ""
+            return convert_wiki_link(whole, page, part, match["shown"] or "", context)
         case "auto":
             address = context.resolve_link(whole[1:-1])
             return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
@@ -467,7 +434,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             is_in_link = match.string.rfind("<a ", 0, match.start()) > match.string.rfind(
                 "</a", 0, match.start()
             )
-            return _convert_tag(whole, is_in_link, context)
+            return convert_tag(whole, is_in_link, context)
         case "markdown":  # a tag whose text is Markdown, as it always is here
             return match["before"]
         case "attributes":
@@ -487,36 +454,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return whole
 
 
-def _convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
-    """Return a tag of HTML with the new address of the file that it names."""
-    attribute, name = _ATTRIBUTE.search(tag), tag[1:].split()[0].lower()
-    if attribute is None:
-        return tag
-    address, alt = (
-        attribute[3].removeprefix("attachment:"),
-        re.search(r"\s(?i:alt)=[\"']([^\"']*)", tag),
-    )
-    words = alt[1] if alt else ""
-    if re.match(r"[a-z][a-z+.-]*:|//|#", address):
-        if name not in ("img", "source") or not re.match("https?://|//", address):
-            return tag
-        message = f"a picture from another host, `{address}`; it is a link now"
-        context.leave("tag of HTML", message)
-        words = words or posixpath.basename(urlsplit(address).path)
-        link = words if is_in_link else f'<a href="{address}">{words}</a>'
-        return link if name == "img" else ""
-    before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
-    if new_address := context.resolve_picture(address) or context.resolve_file(address):
-        return before + new_address + after
-    context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
-    if name == "img":
-        return words
-    return tag[: attribute.start()].rstrip() + after[1:]
-
-
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
-_FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split()
-"""Names between braces that only place or mark what stands between them."""
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = re.compile(r"(?<![\w@])@([\w][\w:./-]*\w|\w)")
 _TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")

@@ -1,10 +1,17 @@
-"""Roles of MyST and Sphinx, and inline code that its tool runs, as Markdown of coursebuild."""
+"""What stands in a line and names something, as Markdown of coursebuild.
+
+It is a role of MyST and Sphinx, a reference of Quarto, a link of Obsidian, a name that its tool
+replaces, or code that its tool runs.
+"""
 
 from __future__ import annotations
 
+import posixpath
 import re
+from urllib.parse import urlsplit
 
 from coursebuild.features.importer.context import (
+    PROOF_LABELS,
     LessonContext,
     formula_anchor,
     label_anchor,
@@ -90,3 +97,86 @@ def convert_code(whole: str, context: LessonContext) -> str:
     message = f"{whole}, whose value its tool shows: {cure}"
     context.leave("code in a line", message)
     return f"`{run[1]}`"
+
+
+def convert_cross_reference(whole: str, kind: str, label: str, context: LessonContext) -> str:
+    """Return a reference of Quarto, as `@fig-label`, as a link."""
+    if kind == "eq":
+        return write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
+    if kind in PROOF_LABELS:
+        words = PROOF_LABELS[kind].capitalize()
+        return write_link(words, context.resolve_anchor(f"{kind}-{to_anchor(label)}"))
+    if kind == "sec":
+        return write_link("this section", context.resolve_anchor(f"sec-{to_anchor(label)}"))
+    kind = kind.replace("tbl", "tab")
+    if address := context.resolve_anchor(f"{kind}:{to_anchor(label)}"):
+        return write_link("", address)
+    message = f"the reference `{whole}` to what no text labels: write what is meant"
+    context.leave("cross-reference", message)
+    return {"fig": "the figure", "tab": "the table", "lst": "the listing"}[kind]
+
+
+_FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split()
+"""Names between braces that only place or mark what stands between them."""
+
+
+def convert_substitution(whole: str, context: LessonContext) -> str:
+    """Return what stands for a name between braces; or the whole as code, which is left."""
+    title = re.search(r"(?:title|caption)=\"([^\"]*)\"", whole)
+    name, *arguments = whole.strip("{}<> %").split() or [""]
+    address = "".join(arguments[:1])
+    if name in ("tab", "code") and title:
+        return f"**{title[1]}**"
+    if name == "video" or (name == "embed" and whole[1] == "%"):
+        address = address.removeprefix("url=").strip('"')
+        return write_link(title[1] if title else address, context.resolve_link(address))
+    if name.removeprefix("end") in _FRAMES and name != "embed":
+        return ""
+    if name == "kbd" and arguments:
+        return arguments[-1]
+    key = address if name in ("var", "meta") else name
+    if (value := context.substitutions.get(key)) is not None:
+        return value
+    message = f"`{whole}`, which its tool replaces; it is code now: write what it stands for"
+    context.leave("substitution", message)
+    return f"`{whole}`"
+
+
+def convert_wiki_link(whole: str, page: str, part: str, words: str, context: LessonContext) -> str:
+    """Return a link or picture of Obsidian; as it is where the folder has no such file."""
+    if whole[0] == "!" and (address := page and context.resolve_picture(page)):
+        return f"![{title_of_file(page)}]({address})"
+    if page and context.resolve_path(f"{page}.md") not in context.files:
+        return whole
+    address = context.resolve_link(f"{page}.md{part}" if page else part)
+    return write_link(words or page or part.lstrip("#"), address)
+
+
+_ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
+
+
+def convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
+    """Return a tag of HTML with the new address of the file that it names."""
+    attribute, name = _ATTRIBUTE.search(tag), tag[1:].split()[0].lower()
+    if attribute is None:
+        return tag
+    address, alt = (
+        attribute[3].removeprefix("attachment:"),
+        re.search(r"\s(?i:alt)=[\"']([^\"']*)", tag),
+    )
+    words = alt[1] if alt else ""
+    if re.match(r"[a-z][a-z+.-]*:|//|#", address):
+        if name not in ("img", "source") or not re.match("https?://|//", address):
+            return tag
+        message = f"a picture from another host, `{address}`; it is a link now"
+        context.leave("tag of HTML", message)
+        words = words or posixpath.basename(urlsplit(address).path)
+        link = words if is_in_link else f'<a href="{address}">{words}</a>'
+        return link if name == "img" else ""
+    before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
+    if new_address := context.resolve_picture(address) or context.resolve_file(address):
+        return before + new_address + after
+    context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
+    if name == "img":
+        return words
+    return tag[: attribute.start()].rstrip() + after[1:]

@@ -37,7 +37,6 @@ from coursebuild.api import (
     model,
 )
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Table
 from coursebuild.core.model.results import Change, EffectKind, Sign
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
@@ -354,7 +353,7 @@ def _mark_varying(
         is_borne_out = not all(results)
         if texts[0] == texts[1] or not any(results) or recording.comparison is not None:
             continue
-        if isinstance(recording.body, Table):
+        if isinstance(recording.body, model.Table):
             continue
         pattern = varying_pattern(*texts)
         at = recording.body_span.start - 1  # the end of the line that opens the fence
