@@ -206,8 +206,9 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
             message = f"a block `{language}`, which is shown as JSON"
             context.leave(f"block of `{language}`", message)
             language = "json"
-    if (options := options_of(Segment(kind="block", place="", text=text))) and head[0] == "{":
-        text = code_for_readers(Segment(kind="block", place="", text=text))
+    cell = Segment(kind="block", place="", text=text)
+    if head.startswith("{") and (options := options_of(cell)):
+        text = code_for_readers(cell)
         caption = options.get("fig-cap") or options.get("lst-cap") or ""
         head += f' title="{caption}"' if caption else ""
     title = _TITLE.search(head)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import contextlib
 import json
 import re
 import textwrap
@@ -347,8 +348,8 @@ _LOST_KINDS = frozenset(
 def _recorded_picture(outputs: Iterable[Mapping[str, Any]]) -> tuple[str, bytes]:
     """Return the picture among the outputs of a cell, with its extension; empty for none."""
     data = {kind: text for output in outputs for kind, text in (output.get("data") or {}).items()}
-    if png := data.get("image/png"):
-        return ".png", base64.b64decode(_join_lines(png))
+    with contextlib.suppress(binascii.Error, KeyError):
+        return ".png", base64.b64decode(_join_lines(data["image/png"]))
     return ".svg", _join_lines(data.get("image/svg+xml") or "").encode()
 
 

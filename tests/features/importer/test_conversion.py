@@ -114,6 +114,7 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         ('=== ":simple-linux: Linux"\n\n    Text.\n', "**Linux**\n\nText.\n"),
         ("```js{1,3}\nf()\n```\n", "```js\nf()\n```\n"),
         ("- a\n\n  ```js\n  `${x}`\n  }\n  ```\n", "- a\n\n  ```js\n  `${x}`\n  }\n  ```\n"),
+        ("```\n:name: value\n```\n", "```\n:name: value\n```\n"),
         ("Code `\\a{b}` and\n`c` here.\n", "Code `\\a{b}` and\n`c` here.\n"),
     ],
     ids=[
@@ -125,6 +126,7 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         "icon",
         "lines",
         "fence in a list",
+        "block without a kind",
         "code over lines",
     ],
 )
