@@ -26,8 +26,8 @@ from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext, script_path_of, to_anchor
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.jsx import is_mdx
-from coursebuild.features.importer.prose import find_anchors, find_references
-from coursebuild.features.importer.references import complete_texts
+from coursebuild.features.importer.prose import find_anchors
+from coursebuild.features.importer.references import complete_texts, find_references
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedCourse,

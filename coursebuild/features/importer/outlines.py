@@ -187,7 +187,7 @@ _CAPTION = re.compile(r"^:?caption:[ \t]*[\"']?(.*?)[\"']?[ \t]*$", re.MULTILINE
 
 
 def _read_toctrees(
-    path: str, files: SourceFiles, seen: set[str]
+    path: str, files: SourceFiles, paths: set[str]
 ) -> Iterator[ImportedText | ImportedLevel]:
     """Yield what the trees of a text name, each with what its own trees name; each text once."""
     folder = posixpath.dirname(path)
@@ -206,10 +206,10 @@ def _read_toctrees(
             if not (file or names) and name != "self":
                 leave_entry(path, line.strip(), files)
             for child in [file] if file else names:
-                if child not in seen:
-                    seen.add(child)
+                if child not in paths:
+                    paths.add(child)
                     lessons.append(ImportedText(file=child, title=entry["title"] or ""))
-                    lessons += flatten(_read_toctrees(child, files, seen))
+                    lessons += flatten(_read_toctrees(child, files, paths))
         caption = _CAPTION.search(tree["body"])
         yield from _level(caption[1], lessons) if caption else lessons
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterator
 
 from coursebuild.features.importer.context import (
     PROOF_LABELS,
@@ -18,6 +17,7 @@ from coursebuild.features.importer.context import (
     to_anchor,
 )
 from coursebuild.features.importer.roles import (
+    convert_attributes,
     convert_code,
     convert_cross_reference,
     convert_role,
@@ -304,12 +304,6 @@ _FIGURE_NAME = re.compile(
 )
 
 
-def find_references(text: str) -> Iterator[str]:
-    """Yield the labels of links by reference that a text defines, in lower case."""
-    for label in re.findall(r"^[ >]*\[(?!\^)([^\[\]\n]+)\]:", text, re.MULTILINE):
-        yield label.casefold()
-
-
 def find_anchors(text: str) -> set[str]:
     """Return the anchors that a text of any dialect sets, `eq:name` of formulas among them."""
     labelled = [*_FIGURE_NAME.finditer(text)]
@@ -438,16 +432,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "markdown":  # a tag whose text is Markdown, as it always is here
             return match["before"]
         case "attributes":
-            line, before = match.string, match.string[: match.start()]
-            is_heading, is_whole = line.startswith("#"), whole == line.rstrip()
-            is_marked = whole.lstrip().startswith("{:")
-            is_behind = whole[0] == "{" and re.search(r"[`\]*>:\"]$|\]\([^()]*\)$", before)
-            if not (is_heading or is_whole or is_marked or is_behind):
-                return whole  # an index in a formula, a set, an argument
-            id = re.search(r"#([^\s{}\"'#]+)", whole)
-            if id is None or not (":" in id[1] or is_heading):
-                return ""
-            return whole if ":" in id[1] else f" {{#{to_anchor(id[1])}}}"
+            return convert_attributes(match)
         case "span":
             return _rewrite_line(match["words"], context)
         case _:

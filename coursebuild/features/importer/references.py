@@ -31,6 +31,12 @@ _REFERENCE = re.compile(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
 _COMMAND = re.compile(r"\\[A-Za-z]+")
 
 
+def find_references(text: str) -> Iterator[str]:
+    """Yield the labels of links by reference that a text defines, in lower case."""
+    for label in re.findall(r"^[ >]*\[(?!\^)([^\[\]\n]+)\]:", text, re.MULTILINE):
+        yield label.casefold()
+
+
 class _Text(Struct, frozen=True):
     """A new lesson or page."""
 

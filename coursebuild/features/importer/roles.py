@@ -180,3 +180,18 @@ def convert_tag(tag: str, is_in_link: bool, context: LessonContext) -> str:
     if name == "img":
         return words
     return tag[: attribute.start()].rstrip() + after[1:]
+
+
+def convert_attributes(match: re.Match[str]) -> str:
+    """Return attributes behind a heading or another part of a line: an anchor, or nothing."""
+    whole = match[0]
+    line, before = match.string, match.string[: match.start()]
+    is_heading, is_whole = line.startswith("#"), whole == line.rstrip()
+    is_marked = whole.lstrip().startswith("{:")
+    is_behind = whole[0] == "{" and re.search(r"[`\]*>:\"]$|\]\([^()]*\)$", before)
+    if not (is_heading or is_whole or is_marked or is_behind):
+        return whole  # an index in a formula, a set, an argument
+    id = re.search(r"#([^\s{}\"'#]+)", whole)
+    if id is None or not (":" in id[1] or is_heading):
+        return ""
+    return whole if ":" in id[1] else f" {{#{to_anchor(id[1])}}}"
