@@ -118,6 +118,8 @@ class DocumentInputs(Struct, frozen=True):
     citations: Citations = Citations()
     pictures: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     """See `Course.pictures`: those that the document shows."""
+    absent_files: frozenset[str] = frozenset()
+    """Paths of pictures that the document shows and the course does not have."""
     keyframes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the keyframes of models, by the model's name."""
     address: str = ""

@@ -95,6 +95,7 @@ def document_inputs(
         citations=citations(library, place, document),
         code_links=code_links(library, place, document),
         pictures={file: pictures[file] for file in files if file in pictures},
+        absent_files=frozenset(files) - {*library.course.files},
         keyframes={n: library.facts[n].keyframes for n in models if n in library.facts},
         address=urls.absolute(library.course.base_url, place.path),
     )

@@ -26,7 +26,8 @@ class DraftWriter(PageWriter, frozen=True):
     def _block(self, block: model.Block) -> str:
         if isinstance(block, model.Paragraph) and block.figure:
             images = (part for part in block.children if isinstance(part, model.Image))
-            block = replace(block, figure=not any(map(self._is_broken, images)))
+            broken = filter(self._is_broken, images)  # one that is not drawn yet says so itself
+            block = replace(block, figure=all(map(self.is_undrawn, broken)))
         if isinstance(block, model.HtmlBlock) and self._is_broken(block):
             html = str(self.code("html", block.html))
         else:

@@ -76,12 +76,19 @@ class PageWriter(PageContext, frozen=True):
             href=self.url(image.url),
             sides=self.sides(image.url),
             figure=recorded,
+            is_drawn=not self.is_undrawn(image),
             dark=recorded and recorded.has_dark and self.place.href(urls.dark_path(recorded.path)),
             anchor=recorded and model.listing_anchor(recorded.script),
             unrepeated=recorded and recorded.script in runs and runs[recorded.script].unrepeated,
             data=data and self.place.href(urls.file_path(data.path)),
         )
         return html + Markup("\n")
+
+    def is_undrawn(self, image: model.Image) -> bool:
+        """Whether an image is a script's figure that is not recorded yet."""
+        path = model.local_file(image.url, self.document.source.path)
+        figures = {figure.span for figure in recorded_figures(self.document)}
+        return path in self.inputs.absent_files and image.url_span in figures
 
     def code(self, language: str, text: str) -> Markup:
         """A code block that is only shown, not run."""

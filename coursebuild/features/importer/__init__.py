@@ -10,6 +10,7 @@ from coursebuild.api import Command, Feature
 
 FEATURE = Feature(
     name="importer",
+    needs=("lab",),
     commands=(
         Command(
             name="import",

@@ -13,8 +13,13 @@ from coursebuild.api import marks
 from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
-from coursebuild.features.importer.cells import write_cell
-from coursebuild.features.importer.context import LessonContext, to_anchor
+from coursebuild.features.importer.cells import (
+    code_for_readers,
+    options_of,
+    write_cell,
+    write_outputs,
+)
+from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.directives import (
     Directive,
     convert_directive,
@@ -25,6 +30,7 @@ from coursebuild.features.importer.jsx import without_jsx
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.segments import lower_titles, read_markdown
 from coursebuild.features.importer.source_files import Segment
+from coursebuild.features.lab.model import BUILT_IN_KINDS
 
 _CALLOUTS = {
     **{name: name for name in CALLOUTS},
@@ -33,13 +39,14 @@ _CALLOUTS = {
     **dict.fromkeys(("danger", "error"), "warning"),
     **dict.fromkeys(("seealso", "info", "abstract", "summary", "quote", "topic"), "note"),
     **dict.fromkeys(("admonition", "margin", "sidebar", "dropdown", "example"), "note"),
+    **dict.fromkeys(("aside", "details", "toggle", "todo"), "note"),
     **dict.fromkeys(("exercise", "question"), "try"),
     **dict.fromkeys(("answer", "success"), "solution"),
 }
 _MAX_DEPTH = 20
 """Blocks that may be around another."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
-_TITLE = re.compile(r"\b(?:title|tab|filename)=(?:\"([^\"]*)\"|'([^']*)')")
+_TITLE = re.compile(r"\b(?:title|tab|filename|lst-cap)=(?:\"([^\"]*)\"|'([^']*)')")
 _CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
 _QUOTED_KIND = re.compile(
@@ -61,7 +68,8 @@ def _convert(segment: Segment, context: LessonContext) -> str:
         return write_cell(segment, context)
     directive = _DIRECTIVE.fullmatch(segment.head)
     if directive is not None:
-        return _convert_directive(directive["name"], directive["argument"], text, context)
+        new = _convert_directive(directive["name"], directive["argument"], text, context)
+        return "\n\n".join((new, *write_outputs(segment, context)))
     match segment.mark[0]:
         case ":":
             return _convert_division(head, text, context)
@@ -82,7 +90,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             match name:
                 case "tab":
                     return _write_tab(title, text, context)
-                case "html" | "define" | "":
+                case "html" | "define" | "caption" | "":
                     return _convert_nested(text, context)
                 case _:
                     is_folded = name == "details"
@@ -115,7 +123,9 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     fold_mark = "-" if re.search(r"collapse=\"?true", head) else ""
     if callout is not None:
         title, text = (title, text) if title else _take_heading(text)
-        return _write_callout(callout[1], title, text, context, fold_mark=fold_mark)
+        label = re.search(r"#([\w-]+)", head)
+        mark = f'<a id="{to_anchor(label[1])}"></a>\n\n' if label else ""
+        return mark + _write_callout(callout[1], title, text, context, fold_mark=fold_mark)
     plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)
     if plain is not None:  # as Docusaurus and its likes write callouts
         if plain[1] == "details":
@@ -124,19 +134,22 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
             title = plain[2] or plain[3] or ""
             return _write_callout(plain[1].lower(), title, text, context)
     classes = re.findall(r"\.([\w-]+)", head)
-    proof = re.search(r"#(thm|lem|cor|prp|cnj|def|exm|exr|sol|rem|alg)-([\w-]+)", head)
+    proof = re.search(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", head)
     if proof is not None or (kind := next((c for c in classes if c in _PROOF_CLASSES), "")):
         title, text = (title, text) if title else _take_heading(text)
         if proof is None:
             return _write_callout(kind, title, text, context)
         anchor = f'<a id="{to_anchor(proof[0])}"></a>\n\n'
-        return anchor + _write_callout(_PROOF_LABELS[proof[1]], title, text, context)
-    if "content-visible" in classes or "content-hidden" in classes:
-        is_other = "html" not in head if "content-visible" in classes else "html" in head
-        if is_other:
+        return anchor + _write_callout(PROOF_LABELS[proof[1]], title, text, context)
+    if condition := re.search(r"content-(visible|hidden).*?(when|unless)-format=\W?(\w+)", head):
+        is_visible = (condition[1] == "visible") == (condition[2] == "when")
+        if is_visible != ("html" in condition[3]):
             words = " ".join(text.split()).replace("`", "")
             context.leave("division", f"what is for other forms than a site: `{words}`")
             return ""
+    if re.fullmatch(r"[A-Za-z_]\w*(?:\.\w+)+", head):
+        context.leave("division", f"documentation that its tool makes from the code of `{head}`")
+        return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
     _note_change(context, "division", "what it holds, without a frame")
     if figure := re.search(r"#fig-([\w-]+)", head):
         return f'<a id="fig-{to_anchor(figure[1])}"></a>\n\n{_convert_nested(text, context)}'
@@ -144,20 +157,6 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
 
 
 _PROOF_CLASSES = ("theorem", "lemma", "definition", "proof", "remark", "solution", "exercise")
-_PROOF_LABELS = {
-    "thm": "theorem",
-    "lem": "lemma",
-    "cor": "corollary",
-    "prp": "proposition",
-    "cnj": "conjecture",
-    "def": "definition",
-    "exm": "example",
-    "exr": "exercise",
-    "sol": "solution",
-    "rem": "remark",
-    "alg": "algorithm",
-}
-"""Kinds of callouts by the labels that Quarto numbers them by."""
 
 
 def _take_heading(text: str) -> tuple[str, str]:
@@ -179,6 +178,15 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         title = _TITLE.search(head)
         name = next(iter(re.findall(r"\b(?:type=[\"'])?([a-z]+)\b", head)[1:]), "note")
         return _write_callout(name, (title[1] or title[2] or "") if title else "", text, context)
+    if listing := re.search(r"\bfile=((?!examples/)\S+)", head) if kind == "python" else None:
+        context.files.account.changed["listing of a file", "its name, and its code, not run"] += 1
+        return f"**`{listing[1]}`**\n\n{marks.fence('python', text)}"
+    if (
+        kind == "lab"
+        and (name := head.partition(" ")[2].split(" ")[0])
+        and name not in BUILT_IN_KINDS
+    ):
+        return _write_absent_lab(name, text, context)
     if kind in ("lab", "quiz") and context.camera_is_position:
         text = _CAMERA.sub(_reverse_camera, text)
     if package := missing_package(kind):
@@ -198,6 +206,11 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
             message = f"a block `{language}`, which is shown as JSON"
             context.leave(f"block of `{language}`", message)
             language = "json"
+    cell = Segment(kind="block", place="", text=text)
+    if head.startswith("{") and (options := options_of(cell)):
+        text = code_for_readers(cell)
+        caption = options.get("fig-cap") or options.get("lst-cap") or ""
+        head += f' title="{caption}"' if caption else ""
     title = _TITLE.search(head)
     words = re.sub(r"(?<!\\)[_*`]", r"\\\g<0>", title[1] or title[2] or "") if title else ""
     if kind in ("output", "text") or package:  # of a block that is not run here
@@ -206,6 +219,21 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     new = marks.fence(language, text)
     context.convert(kind, "without what its tool adds", head, lambda: language)
     return (f"**{words}**\n\n" if words else "") + new
+
+
+def _write_absent_lab(kind: str, text: str, context: LessonContext) -> str:
+    """Return a card for a lab of a kind that there is none of here: its title, note and fields."""
+    context.leave(
+        "lab", f"a lab of the kind `{kind}`: write content/labs/{kind}.js, or choose another kind"
+    )
+    fields: dict[str, object] = {}
+    with contextlib.suppress(ValueError, RecursionError):
+        value = json.loads(text)
+        fields = value if isinstance(value, dict) else {}
+    words = [str(fields[key]) for key in ("title", "note", "caption") if fields.get(key)]
+    head = f"[!note] This lab is not here yet: {kind}"
+    parts = (*words, marks.fence("json" if fields else "text", text))
+    return marks.block_quote("\n\n".join((head, *parts)))
 
 
 def _convert_nested(text: str, context: LessonContext) -> str:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import ast
+import posixpath
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+
+from msgspec.structs import replace
 
 from coursebuild.api import marks
+from coursebuild.core.scripts.figures import prepare_figure
 from coursebuild.features.importer.context import LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment, read_yaml
 
-_OPTION = re.compile(r"^(?:#\|[ \t]*([\w-]+):|:([\w-]+):)[ \t]*(.*)\n?", re.MULTILINE)
-"""An option of a cell, as Quarto and as MyST write it."""
+_OPTION = re.compile(r"^(?:(?:#|//|%%)\|(.*)|:([\w-]+):[ \t]*(.*))\n?", re.MULTILINE)
+"""A line of options of a cell: YAML of Quarto, or one option of MyST."""
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
 _WINDOW = re.compile(
     r"^([ \t]*)(?:display\()?(?:plt|(?:\w+\.)?pyplot)\.show\([^()\n]*\)+[ \t;]*$", re.MULTILINE
@@ -29,15 +33,25 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     """Return a cell as a part of the lesson's script, with what it prints and draws; or as code."""
     context = context.at(cell.place)
     account = context.files.account
-    if is_styling(cell):
+    if re.search(r"\bHTML\([\"']+\s*<style|^\s*%%(?:javascript|js|css)\b|<style", cell.text):
         context.leave("cell", "a cell that changes the look of its page, which the site has itself")
         return ""
+    for kind in cell.lost:
+        context.leave("output of a cell", f"an output of the kind `{kind}`, which is not recorded")
     code = runnable_code(cell, context)
     if not code:
-        if (magic := re.match(r"\s*%%(\w+).*\n", cell.text)) is not None:
-            return marks.fence(magic[1], cell.text[magic.end() :].strip("\n"))
-        shown_code = code_for_readers(cell)
-        return marks.fence("python", shown_code) if shown_code else ""
+        magic = re.match(r"\s*%%(\w+).*\n", cell.text)
+        shown_code = code_for_readers(cell).strip("\n")
+        language = magic[1].lower() if magic is not None else "python"
+        if magic is not None:
+            shown_code = cell.text[magic.end() :].strip("\n")
+            if magic[1] == "writefile":
+                shown_code = f"# {magic[0].split()[-1]}\n{shown_code}"
+            language = {"writefile": "text", "script": "text"}.get(language, language)
+        if language == "html":
+            return rewrite_prose(shown_code, context)
+        blocks = [marks.fence(language, shown_code)] if shown_code else []
+        return "\n\n".join((*blocks, *write_outputs(cell, context)))
     code, figure = _with_new_paths(code, context), ""
     if _draws(cell, code):
         pyplot = next(filter(None, map(_name_of_pyplot, (*context.parts, code))), "")
@@ -46,6 +60,7 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
         else:
             message = "a figure: save it in the script, and name it by `figure=`"
             context.leave("figure of a cell", message)
+            figure = "\n\n".join(write_outputs(replace(cell, printed="", value=""), context))
     word = " part" if context.parts else ""
     context.parts.append(code)
     account.changed["cell", "a part of the lesson's script"] += 1
@@ -83,8 +98,8 @@ _DRAWN_TITLE = re.compile(
 
 def _draws(cell: Segment, code: str) -> bool:
     """Whether there is a figure below a cell, as it is recorded, or as its own statements say."""
-    if cell.has_picture is not None:
-        return cell.has_picture
+    if cell.picture is not None:
+        return bool(cell.picture[1])
     return any(
         _FIGURE.search(ast.unparse(statement))
         for statement in ast.parse(code).body
@@ -102,9 +117,8 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
     alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)
     label = options.get("label", "")
     mark = f" {{#fig:{to_anchor(label.removeprefix('fig-'))}}}" if label.startswith("fig-") else ""
-    stem = context.script_path.removeprefix("examples/").removesuffix(".py").replace("_", "-")
-    context.figures.append(f"{stem}-{len(context.figures) + 1}.svg")
-    name = context.figures[-1]
+    name = _keep_picture(cell, context) or f"{_picture_stem(context)}.svg"
+    context.figures.append(name)
     context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
     lines = code.rstrip("\n").split("\n")
     if lines[-1] == "pass":
@@ -113,20 +127,48 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
     return code, f"Figure: ![{alt}]({name}) {caption.rstrip()}{mark}"
 
 
+def write_outputs(cell: Segment, context: LessonContext) -> Iterator[str]:
+    """Yield what is recorded below code that is only shown: its text, its picture."""
+    if text := _ESCAPE.sub("", f"{cell.printed}{cell.value}").strip("\n"):
+        context.files.account.changed["output of code that is shown", "a block of text"] += 1
+        yield marks.fence("text", text)
+    if name := _keep_picture(cell, context):
+        yield f"![{context.title}]({name})"
+
+
+def _picture_stem(context: LessonContext) -> str:
+    stem = context.script_path.removeprefix("examples/").removesuffix(".py").replace("_", "-")
+    copies = map(posixpath.basename, context.copies)
+    pictures = [name for name in copies if re.fullmatch(rf"{re.escape(stem)}-\d+\.\w+", name)]
+    return f"{stem}-{len({*pictures, *context.figures}) + 1}"
+
+
+def _keep_picture(cell: Segment, context: LessonContext) -> str:
+    """Copy the picture that is recorded below a cell, and return its name; empty for none."""
+    extension, data = cell.picture or ("", b"")
+    picture = prepare_figure(f"x{extension}", data) if data else ""
+    if isinstance(picture, str):
+        return ""
+    name = f"{_picture_stem(context)}{extension}"
+    context.copies[f"{context.folder}/{name}"] = picture
+    return name
+
+
 def options_of(cell: Segment) -> Mapping[str, str]:
     """Return the options of a cell by their names, as Quarto and MyST write them."""
-    options = {quarto or myst: value.strip() for quarto, myst, value in _OPTION.findall(cell.text)}
-    if (head := _YAML_HEAD.match(cell.text)) is not None:
-        value = read_yaml(head[1])
+    lines = _OPTION.findall(cell.text)
+    options = {name: value.strip() for _, name, value in lines if name}
+    head = _YAML_HEAD.match(cell.text)
+    for text in ("\n".join(line for line, name, _ in lines if not name), head[1] if head else ""):
+        value = read_yaml(text)
         pending = [value] if isinstance(value, dict) else []
         while pending:
             for name, inner in pending.pop().items():
                 if isinstance(inner, dict):
                     pending.append(inner)
                 else:
-                    options[str(name)] = (
-                        " ".join(map(str, inner)) if isinstance(inner, list) else str(inner)
-                    )
+                    text = " ".join(map(str, inner)) if isinstance(inner, list) else str(inner)
+                    options[str(name)] = text.lower() if isinstance(inner, bool) else text
     return options
 
 
@@ -145,13 +187,6 @@ def _with_new_paths(code: str, context: LessonContext) -> str:
             lines[at] = line[:start] + f'"{path}"'.encode() + line[end:]
             context.files.account.changed["path in a cell", "the new place of the file"] += 1
     return b"\n".join(lines).decode()
-
-
-def is_styling(cell: Segment) -> bool:
-    """Whether a cell only changes the look of its page."""
-    return re.match(r"\s*%%(?:html|HTML|javascript|js|css)\b", cell.text) is not None or (
-        re.search(r"\bHTML\([\"']+\s*<style", cell.text) is not None
-    )
 
 
 def _without_host(text: str, context: LessonContext) -> str:

@@ -10,11 +10,18 @@ from __future__ import annotations
 import itertools
 import posixpath
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import Any
 
 from coursebuild.api import UsageError
-from coursebuild.features.importer.outlines import find_text, flatten, leave_entry, read_outline
+from coursebuild.features.importer.outlines import (
+    find_text,
+    flatten,
+    leave_entry,
+    left_setting,
+    read_outline,
+)
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedCourse,
@@ -66,10 +73,11 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         raise UsageError(message, help="; ".join(left))
     for name, mapping in zip(names, settings, strict=True):
         for key in _lost_keys(mapping):
-            message = f"the setting `{key}`, which a course does not have"
-            files.leave(name, message, "setting")
+            files.leave(name, left_setting(key, value_at(mapping, *key.split("."))), "setting")
     texts = [] if files.is_single else [part for part in parts if isinstance(part, ImportedText)]
     pages = [text for text in texts if _base_name(text.file) in _PAGES]
+    if len(pages) == len(parts):  # a course has a lesson
+        pages = []
     if outline is not None:
         pages = [*outline.pages]
     # A level for each group, and one for each run of lessons outside groups
@@ -81,10 +89,31 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
             levels += (part for part in run if isinstance(part, ImportedLevel))
     return ImportedCourse(
         title=title or title_of_file(files.name),
+        summary=outline.summary if outline is not None else "",
+        language=outline.language if outline is not None else "",
+        has_own_titles=True,
+        substitutions=_read_substitutions(settings, files),
         levels=tuple(levels),
         pages=tuple(pages),
         has_hidden_lines=outline is not None and outline.has_hidden_lines,
     )
+
+
+def _read_substitutions(
+    settings: Sequence[Mapping[str, Any]], files: SourceFiles
+) -> Mapping[str, str]:
+    """Return what names between braces stand for, as the settings of MyST, Quarto, MkDocs say."""
+    places = (("parse", "myst_substitutions"), ("extra",), ("project", "substitutions"), ("book",))
+    values = [value_at(mapping, *path) for mapping in settings for path in places]
+    if (name := "_variables.yml") in files:
+        values.append(read_yaml(files.read_text(name)))
+    return {
+        str(key): str(value)
+        for mapping in values
+        if isinstance(mapping, dict)
+        for key, value in mapping.items()
+        if isinstance(value, str | int | float)
+    }
 
 
 def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
@@ -128,6 +157,17 @@ def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | Im
         path = next((path for key in _FILE_KEYS if (path := find_text(value.get(key), files))), "")
         label = next((str(value[key]) for key in _TITLE_KEYS if value.get(key)), "")
         title = "" if find_text(label, files) else label
+        if url := value.get("url"):
+            leave_entry("the map", f"{title}: {url}", files)
+        if pattern := value.get("pattern"):
+            names = (name for name in files if fnmatchcase(name, str(pattern)))
+            inside += [ImportedText(file=name) for name in names if name.endswith(TEXTS)]
+        for level in inside:
+            if isinstance(level, ImportedLevel) and (
+                path or (title and not _COURSE_KEYS & value.keys())
+            ):
+                message = f"the part “{level.title}” within a part: its lessons are in that one"
+                files.leave("the map", message, "entry of the map")
         heads = [ImportedText(file=path, title=title)] if path else []
         if inside and (path or (title and not _COURSE_KEYS & value.keys())):
             lessons = tuple(flatten([*heads, *inside]))
@@ -148,7 +188,7 @@ def _read_nav(
             elif path := find_text(posixpath.join(folder, str(value)), files):
                 yield ImportedText(file=path, title=str(title))
             else:
-                leave_entry("mkdocs.yml", str(value), files)
+                leave_entry("mkdocs.yml", f"{title}: {value}" if title else str(value), files)
 
 
 def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:

@@ -37,6 +37,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """The folder of the new file, such as `content/lessons`."""
     place: str = ""
     """The place in the lesson that is converted, as `line 12` or `cell 3`."""
+    substitutions: Mapping[str, str] = {}
+    """What names between double braces stand for, as settings say."""
     is_mdx: bool = False
     """Whether tags of the lesson may be components of JavaScript."""
     depth: int = 0
@@ -89,9 +91,12 @@ class LessonContext(Struct, frozen=True, kw_only=True):
                 message = f"a link to `{address}`, a lesson that the map does not have"
                 self.leave("link", message)
             return "" if id is None else f"lesson:{id}{route[2] or ''}"
-        parts = urlsplit(address)
+        if re.match("(?:inv|xref):", address):
+            self.leave("link", f"a link to `{address}`, which its tool finds elsewhere")
+            return ""
+        parts = urlsplit(re.sub("^(?:project|path):", "", address))
         if parts.scheme or parts.netloc or not parts.path:
-            return address
+            return parts.geturl()
         path = self.resolve_path(parts.path)
         anchor = f"#{parts.fragment}" if parts.fragment else ""
         target = self.targets.get(stem_of(path)) or self.targets.get(path)
@@ -118,6 +123,19 @@ class LessonContext(Struct, frozen=True, kw_only=True):
             return ""
         return self.add_file(path)
 
+    @property
+    def has_marks(self) -> bool:
+        """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
+        return self.path.endswith(".qmd") or "mkdocs.yml" in self.files
+
+    def resolve_picture(self, source: str) -> str:
+        """Return the new address of a picture; empty where the folder and the file lack it."""
+        name = source.removeprefix("attachment:")
+        if name in self.pictures:
+            return self.add_picture(name)
+        path = self.resolve_path(urlsplit(source).path)
+        return self.add_file(path) if path in self.files and not path.endswith(TEXTS) else ""
+
     def resolve_anchor(self, anchor: str) -> str:
         """Return the address of an anchor; empty where no text of the course sets it."""
         target = self.labels.get(anchor)
@@ -128,7 +146,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
 
     def resolve_path(self, path: str) -> str:
         """Return a path that the lesson names, relative to the folder that is imported."""
-        path = unquote(path)
+        path = unquote(path.removeprefix("@site"))
         resolved = posixpath.normpath(posixpath.join(posixpath.dirname(self.path), path))
         if path.startswith("/"):
             resolved = posixpath.normpath(path.lstrip("/"))
@@ -164,6 +182,27 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         path = f"content/files/{name}"
         self.copies[path] = data
         return posixpath.relpath(path, self.folder).replace(" ", "%20")
+
+
+PROOF_LABELS = {
+    "thm": "theorem",
+    "lem": "lemma",
+    "cor": "corollary",
+    "prp": "proposition",
+    "cnj": "conjecture",
+    "def": "definition",
+    "exm": "example",
+    "exr": "exercise",
+    "sol": "solution",
+    "rem": "remark",
+    "alg": "algorithm",
+    "nte": "note",
+    "tip": "tip",
+    "wrn": "warning",
+    "imp": "important",
+    "cau": "caution",
+}
+"""Kinds of callouts by the labels that Quarto numbers them by."""
 
 
 def script_path_of(document: str) -> str:

@@ -271,7 +271,9 @@ def _convert_texts(
     models: Mapping[str, str],
     files: SourceFiles,
 ) -> tuple[dict[str, bytes], LessonContext]:
-    targets = {stem_of(text.file): text.link for text in texts if text.file}
+    routes = ((text.substitutions.get("slug", "").strip("/"), text.link) for text in texts)
+    targets = {route: link for route, link in routes if route}
+    targets |= {stem_of(text.file): text.link for text in texts if text.file}
     texts = [text for text in texts if text.path]
     context = LessonContext(
         targets=targets,
@@ -286,6 +288,7 @@ def _convert_texts(
         models=models,
         sources=frozenset(key for key, _ in _works(files)),
         camera_is_position=course.camera_is_position,
+        substitutions=course.substitutions,
     )
     new = {}
     for text in texts:
@@ -325,6 +328,7 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
             for label in re.findall(r"^[ >]*\[(?!\^)([^\[\]\n]+)\]:", segment.text, re.MULTILINE)
         ),
         script_path=script_path_of(text.path),
+        substitutions={**course_context.substitutions, **text.substitutions},
         title=text.title,
         parts=[],
         figures=[],

@@ -11,6 +11,7 @@ import json
 import posixpath
 import re
 from collections.abc import Iterator, Mapping
+from textwrap import shorten
 from typing import Any
 
 from msgspec.structs import replace
@@ -188,8 +189,14 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
 
     def read(text: ImportedText, id: str, used_ids: set[str] | None = None) -> ImportedText:
         try:
-            hides = course.has_hidden_lines
-            return _read_file(text, id, files, used_ids, has_hidden_lines=hides)
+            return _read_file(
+                text,
+                id,
+                files,
+                used_ids,
+                has_hidden_lines=course.has_hidden_lines,
+                has_own_titles=course.has_own_titles,
+            )
         except UsageError as error:
             errors.append(error)
             message = f"it {str(error).removeprefix(f'{text.file} ')}: a lesson without a text"
@@ -239,6 +246,7 @@ def _read_file(
     used_ids: set[str] | None = None,
     *,
     has_hidden_lines: bool = False,
+    has_own_titles: bool = False,
 ) -> ImportedText:
     """Read the file of a lesson with this id, or of a page, whose id is made from its title.
 
@@ -260,10 +268,16 @@ def _read_file(
         read = read_segments(source, text.file)
     except RecursionError:
         raise UsageError(f"{text.file} is nested too deeply") from None
-    for name in read.lost:
-        message = f"`{name}` of its metadata, which a lesson does not have"
+    lost = {**read.lost, **({} if id or not read.summary else {"description": read.summary})}
+    for name, value in lost.items():
+        words = shorten(value if isinstance(value, str) else json.dumps(value, default=str), 100)
+        kind = "lesson" if id else "page"
+        message = f"`{name}` of its metadata ({words}), which a {kind} does not have"
         files.leave(text.file, message, "metadata of a text")
     files.account.changed["text", "a lesson" if id else "a page"] += 1
+    if has_own_titles and title and read.title and title.casefold() != read.title.casefold():
+        files.account.changed["title in the map", "the title of the text itself"] += 1
+        title = read.title
     title = _ROLE.sub(r"\1", title or read.title) or title_of_file(text.file)
     title = " ".join(title.split())
     slug = slug_of(slug or title_of_file(text.file))
@@ -277,6 +291,7 @@ def _read_file(
         path = ""  # a title alone: it is planned
     text = replace(text, summary=text.summary or read.summary)
     text = replace(text, segments=read.segments, pictures=read.pictures)
+    text = replace(text, substitutions=read.substitutions)
     return replace(text, id=id or page, slug=slug, title=title, path=path)
 
 

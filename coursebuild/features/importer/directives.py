@@ -62,7 +62,8 @@ _PROOFS = frozenset(
     "criterion conjecture observation assumption".split()
 )
 _FRAMES = frozenset(
-    "div container grid grid-item tab-set card-carousel centered hlist rst-class table-of".split()
+    "div container grid grid-item tab-set tab-set-code "
+    "card-carousel centered hlist rst-class table-of".split()
 )
 """What only places what it holds."""
 _MAPS = frozenset(("tableofcontents", "toctree", "contents", "bibliography", "genindex"))
@@ -101,7 +102,11 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             language = argument if name != "parsed-literal" else ""
             caption = options.get("caption", "")
             head = f"**{rewrite_prose(caption, context)}**\n\n" if caption else ""
-            return head + marks.fence(language or "text", text) if text.strip() else ""
+            code = text.strip("\n")
+            return head + marks.fence(language or "text", code) if code else ""
+        case "code-cell":
+            context.leave(kind, f"a cell of `{argument}` is shown and not run")
+            return marks.fence(argument or "text", text.strip("\n"))
         case "literalinclude" | "include":
             return _write_file(directive, context, kind)
         case "list-table" | "csv-table" | "table":
@@ -120,7 +125,7 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             return ""
         case "rubric" | "centered":
             return f"**{rewrite_prose(argument, context)}**\n\n{directive.nested(text)}"
-        case "tab-item" | "grid-item-card" | "card":
+        case "tab-item" | "tabbed" | "grid-item-card" | "card":
             return _write_card(directive, context)
         case "iframe" | "youtube" | "video" | "button-link" | "button-ref":
             words = " ".join(text.split()) or argument.strip()
@@ -143,7 +148,7 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
         case "solution":  # its argument is the label of an exercise
             return directive.callout(name, "", text, True)
         case _ if name in callouts:
-            is_folded = "dropdown" in options.get("class", name)
+            is_folded = name in ("details", "toggle") or "dropdown" in options.get("class", name)
             title = argument if name in _TITLED else ""
             body = text if title else f"{argument}\n{text}"
             return directive.callout(name, title, body, is_folded)
@@ -173,7 +178,7 @@ def _write_figure(directive: Directive, context: LessonContext) -> str:
     label = f" {{#fig:{label_anchor(directive.label)}}}" if is_label else ""
     if not picture.startswith("!["):  # it is on another host, or nowhere
         anchor = f'<a id="fig-{to_anchor(directive.label)}"></a>\n\n' if label else ""
-        return f"{anchor}{picture}\n\n{caption}"
+        return anchor + (caption if picture == first else f"{picture}\n\n{caption}")
     if not first.strip() and not label:
         return picture
     return f"Figure: {picture} {first}{label}\n\n{rest}".strip()
@@ -193,7 +198,8 @@ def _write_file(directive: Directive, context: LessonContext, kind: str) -> str:
         return directive.nested(text)
     language = options.get("language") or path.rpartition(".")[2]
     language = {"py": "python", "yml": "yaml"}.get(language, language)
-    return marks.fence(
+    caption = rewrite_prose(options.get("caption", ""), context)
+    return (f"**{caption}**\n\n" if caption else "") + marks.fence(
         language if language in highlighted_languages() else "text", text.strip("\n")
     )
 
@@ -217,12 +223,15 @@ def _write_table(directive: Directive, context: LessonContext) -> str:
     if directive.name == "table":
         return caption + directive.nested(directive.text)
     if directive.name == "csv-table":
-        rows = [row for row in csv.reader(directive.text.strip().splitlines()) if row]
+        text, name = directive.text, directive.options.get("file", "")
+        if name and (path := context.resolve_path(name)) in context.files:
+            text = context.files.read_text(path)
+        rows = [row for row in csv.reader(text.strip().splitlines()) if row]
         if header := directive.options.get("header"):
             rows = [next(csv.reader([header], skipinitialspace=True)), *rows]
     else:
         rows = [
-            [cell.strip() for cell in re.split(r"(?:\A|\n)[ \t]*-(?:[ \t]|(?=\n|\Z))", row)[1:]]
+            [cell.strip() for cell in re.split(r"(?:\A|\n[ ]{,2})-(?:[ \t]|(?=\n|\Z))", row)[1:]]
             for row in re.split(r"(?:\A|\n)\*[ \t]", directive.text)[1:]
         ]
     width = max(map(len, rows), default=0)

@@ -7,6 +7,8 @@ options.
 
 from __future__ import annotations
 
+import ast
+import contextlib
 import posixpath
 import re
 import textwrap
@@ -22,6 +24,7 @@ _MARK = re.compile(
     r"(?P<escape>\\)?\{\{[ ]*#(?P<command>include|rustdoc_include|playground|title)[ ]+"
     r"(?P<mdbook>[^{}]*?)[ ]*\}\}"
     r"|\{\{<[ ]*include[ ]+(?P<quarto>\S+)[ ]*>\}\}"
+    r"|\{%-?[ ]*include(?:-markdown)?[ ]+[\"'](?P<markdown>[^\"'\n]+)[\"'][^%\n]*%\}"
     r"|\{!>?[ \t]*(?P<inclusion>[^{}!\s]+)[^{}!\n]*!\}"
     r"|^(?P<indent>[ \t]*)-{1,}8<-{1,}[ \t]+[\"'](?P<mkdocs>[^\"'\n]+)[\"'][ \t]*$",
     re.MULTILINE,
@@ -30,6 +33,25 @@ _ANCHOR = r"^.*?ANCHOR(?P<end>_END)?:[ \t]*(?P<name>[\w-]+).*\n?"
 _SECTION = (
     r"^.*?-{1,}8<-{1,}[ \t]*\[[ \t]*(?P<end>end|start)[ \t]*:[ \t]*(?P<name>[\w-]+)[ \t]*\].*\n?"
 )
+
+
+_IMPORT = re.compile(
+    r"^import[ ]+(?P<name>\w+)[ ]+from[ ]+['\"](?P<file>[^'\"\n]+\.(?:mdx?|png|svg|jpe?g|gif|webp))"
+    r"['\"];?[ \t]*(?:\n|\Z)",
+    re.MULTILINE,
+)
+"""What MDX imports from a text or a picture."""
+
+
+def _place_imports(text: str) -> str:
+    """Return a text of MDX that names texts and pictures where it uses what it imports."""
+    for name, file in _IMPORT.findall(text):
+        if file.endswith((".md", ".mdx")):
+            inclusion = f"{{!{file}!}}"
+            text = re.sub(rf"<{name}\b[^<>]*(?:/>|>[ \t]*</{name}>)", inclusion, text)
+        else:
+            text = text.replace(f"{{{name}}}", f'"{file}"')
+    return _IMPORT.sub("", text)
 
 
 def expand_includes(
@@ -47,6 +69,7 @@ def expand_includes(
             files.account.changed["title of the page", "the map has it"] += 1
             return ""
         name = mark["mdbook"] or mark["quarto"] or mark["mkdocs"] or mark["inclusion"]
+        name = name or mark["markdown"]
         line = f"line {text.count(chr(10), 0, mark.start()) + 1}"
         file, _, part = name.split()[0].partition(":")
         target = _find(file, path, files)
@@ -66,7 +89,7 @@ def expand_includes(
             return f"```rust\n{included}\n```"
         return textwrap.indent(included, mark["indent"] or "")
 
-    return _MARK.sub(expand, text)
+    return _MARK.sub(expand, _place_imports(text))
 
 
 def _find(name: str, path: str, files: SourceFiles) -> str:
@@ -112,6 +135,12 @@ def _read_range(words: str, mark: str, lines: Sequence[str]) -> range | None:
 def lines_of(text: str, options: Mapping[str, str]) -> str:
     """Return the lines of a text that the options of a directive of Sphinx choose."""
     lines = text.splitlines()
+    if name := options.get("pyobject"):
+        with contextlib.suppress(SyntaxError, ValueError):
+            for node in ast.walk(ast.parse(text)):
+                if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
+                    lines = lines[node.lineno - 1 : node.end_lineno]
+                    break
     for option in ("start-after", "start-at", "end-before", "end-at"):
         words = options.get(option)
         at = next((n for n, line in enumerate(lines) if words and words in line), None)

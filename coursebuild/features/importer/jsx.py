@@ -22,12 +22,15 @@ _PART = re.compile(
     r"(?P<code>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`))"
     rf"|(?P<statement>{_STATEMENT})"
     r"|(?P<comment>\{/\*.*?\*/\})"
+    r"|(?P<expression>(?<![\\$#\w{}^])\{(?!#)[^{}\n`]+\})"
     r"|<(?P<end>/?)(?P<name>[A-Za-z][\w.]*)"
     rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)>",
     re.MULTILINE | re.DOTALL,
 )
-_COMPUTED = re.compile(rf"\s+[\w-]+={_BRACES}")
-_LABEL = re.compile(r"\s(?:label|title|value)=[\"']([^\"']*)[\"']")
+_COMPUTED = re.compile(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
+_LABELS = [re.compile(rf"\s(?:{n})=[\"']([^\"']*)[\"']") for n in ("label|title", "value|alt")]
+_ADDRESS = re.compile(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
+"""The address of a picture where it is computed."""
 
 
 def is_mdx(text: str) -> bool:
@@ -37,6 +40,11 @@ def is_mdx(text: str) -> bool:
 
 def without_jsx(text: str, context: LessonContext) -> str:
     """Return prose without JavaScript."""
+    chunks = re.split(r"(</?[A-Z][^<>]*>)", text)  # what a component holds may be indented
+    text = "".join(
+        chunk if number % 2 else re.sub(r"(?<=\n\n)[ ]{4,}(?![ ]*[-*+`\d])", "", chunk)
+        for number, chunk in enumerate(chunks)
+    )
     return _PART.sub(lambda part: _convert_part(part, context), text)
 
 
@@ -48,11 +56,23 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
         if part["statement"]:
             message = f"`{part[0].strip().splitlines()[0]}`, which is JavaScript"
             context.leave("statement of JavaScript", message)
-        return ""
+        if expression := part["expression"]:
+            message = f"`{expression}`, whose value its tool shows; it is code now"
+            context.leave("expression of JavaScript", message)
+        return f"`{expression}`" if expression else ""
     if name[0].isupper():
         if not part["end"]:
             context.leave("component", f"the component `<{name}>`; what it holds is shown")
-        label = _LABEL.search(attributes)
-        return f"**{label[1]}**" if label else ""
-    attributes = _COMPUTED.sub("", re.sub(r"=\{(\d+)\}", r'="\1"', attributes))
+        label = next(filter(None, (pattern.search(attributes) for pattern in _LABELS)), None)
+        words = label[1] if label else ""
+        if picture := _ADDRESS.search(attributes):
+            return f"![{words}]({picture[1]})"
+        return f"**{words}**" if words else ""
+
+    def write_attribute(computed: re.Match[str]) -> str:
+        address = _ADDRESS.search(computed[0])
+        value = address[1] if address else computed["number"]
+        return f'{computed[0].partition("=")[0]}="{value}"' if value else ""
+
+    attributes = _COMPUTED.sub(write_attribute, attributes)
     return f"<{part['end']}{name}{attributes.replace('className=', 'class=')}>"

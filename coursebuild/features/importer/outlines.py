@@ -7,11 +7,16 @@ literal; where it is computed, or says so, the order is that of `sidebar_positio
 
 from __future__ import annotations
 
+import json
 import posixpath
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from fnmatch import fnmatchcase
+from textwrap import shorten
+from urllib.parse import unquote
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.features.importer.segments import read_front_matter
 from coursebuild.features.importer.source_files import (
@@ -32,6 +37,8 @@ class Outline(Struct, frozen=True, kw_only=True):
 
     title: str
     """Empty where nothing gives it."""
+    summary: str = ""
+    language: str = ""
     parts: tuple[ImportedText | ImportedLevel, ...]
     pages: tuple[ImportedText, ...] = ()
     has_hidden_lines: bool = False
@@ -52,11 +59,32 @@ def read_outline(files: SourceFiles) -> Outline | None:
     path = next((path for path in map(posixpath.normpath, places) if path in files), "")
     if path:
         files.account.changed["map", "content/course.toml"] += 1
-        return _read_summary(path, str(value_at(settings, "title") or ""), files, is_mdbook)
+        outline = _read_summary(path, str(value_at(settings, "title") or ""), files, is_mdbook)
+        if not is_mdbook:
+            return outline
+        for key, value in (settings if isinstance(settings, Mapping) else {}).items():
+            if key not in ("title", "src", "language", "description", "multilingual"):
+                files.leave("book.toml", left_setting(key, value), "setting")
+        words = (str(value_at(settings, key) or "") for key in ("description", "language"))
+        return replace(outline, **dict(zip(("summary", "language"), words, strict=True)))
+    if "conf.py" in files and "index.md" in files:
+        title = re.search(
+            r"^project\s*=\s*([\"'])(.+?)\1", files.read_text("conf.py"), re.MULTILINE
+        )
+        return Outline(
+            title=title[2] if title else "",
+            parts=tuple(_read_toctrees("index.md", files, {"index.md"})),
+            pages=(ImportedText(file="index.md"),),
+        )
     config = next((p for p in files if re.fullmatch(r"docusaurus\.config\.[cm]?[jt]s", p)), "")
     if not config:
         return None
-    title = re.search(r"^\s*title:\s*([\"'`])(.+?)\1", files.read_text(config), re.MULTILINE)
+    settings = {
+        key: text
+        for key, _, text in re.findall(
+            r"^\s*(title|tagline):\s*([\"'`])(.+?)\2", files.read_text(config), re.MULTILINE
+        )
+    }
     name = next((path for path in files if re.fullmatch(r"sidebars\.[cm]?[jt]s(?:on)?", path)), "")
     parts: list[ImportedText | ImportedLevel] = []
     if name:
@@ -68,7 +96,8 @@ def read_outline(files: SourceFiles) -> Outline | None:
         for sidebar in sidebars.values() if sidebars else ():
             parts += _read_sidebar(sidebar, name, files)
     parts = parts or [*_read_folder("docs", files)]
-    return Outline(title=title[2] if title else "", parts=tuple(parts))
+    title, summary = (settings.get(key, "") for key in ("title", "tagline"))
+    return Outline(title=title, summary=summary, parts=tuple(parts))
 
 
 def find_text(name: object, files: SourceFiles) -> str:
@@ -81,6 +110,12 @@ def find_text(name: object, files: SourceFiles) -> str:
     return next((path for end in TEXTS if (path := files.find(name + end))), "")
 
 
+def left_setting(key: str, value: object) -> str:
+    """The message that a setting of a course is left."""
+    words = value if isinstance(value, str | int | float) else json.dumps(value, default=str)
+    return f"the setting `{key}` ({shorten(str(words), 100)}), which a course does not have"
+
+
 def leave_entry(path: str, name: str, files: SourceFiles, place: str = "") -> None:
     """Note that a map names what is no text of the folder."""
     message = f"the map names `{name}`, which is not in the folder or no text"
@@ -91,7 +126,7 @@ def leave_entry(path: str, name: str, files: SourceFiles, place: str = "") -> No
 
 _ENTRY = re.compile(
     r"(?P<indent>[ \t]*)(?P<item>[-*+][ \t]+)?\[(?P<title>(?:[^\[\]\\]|\\.|\[[^\[\]]*\])*)\]"
-    r"\(<?(?P<file>[^()<>\s]*)>?(?:[ \t]+\"[^\"]*\")?\)[ \t]*"
+    r"\((?:<(?P<spaced>[^<>\n]*)>|(?P<file>[^()<>\s]*))(?:[ \t]+\"[^\"]*\")?\)[ \t]*"
 )
 _PART = re.compile(r"#{1,3}[ \t]+(.*?)[ \t]*#*[ \t]*")
 
@@ -113,10 +148,11 @@ def _read_summary(path: str, title: str, files: SourceFiles, is_mdbook: bool) ->
             is_first = False
         elif entry is not None:
             is_first = False
-            name = posixpath.join(posixpath.dirname(path), entry["file"].partition("#")[0])
-            file = find_text(name, files) if entry["file"] else ""
-            if entry["file"] and not file:
-                leave_entry(path, entry["file"], files, f"line {number}")
+            address = unquote(entry["spaced"] or entry["file"] or "")
+            name = posixpath.join(posixpath.dirname(path), address.partition("#")[0])
+            file = find_text(name, files) if address else ""
+            if address and not file:
+                leave_entry(path, address, files, f"line {number}")
             words = re.sub(r"\\(.)", r"\1", entry["title"]).replace("`", "")
             depth = len(entry["indent"].expandtabs(4)) if entry["item"] else -1
             groups[-1][1].append(_Entry(depth, ImportedText(file=file, title=words)))
@@ -147,6 +183,43 @@ def _group_by_depth(entries: Iterable[_Entry]) -> Iterator[ImportedText | Import
             yield ImportedLevel(title=first.title, lessons=(first, *sections))
         else:
             yield first
+
+
+# --- Sphinx
+
+_TOCTREE = re.compile(
+    r"^(?P<mark>`{3,}|:{3,})\{toctree\}[ \t]*\n(?P<body>.*?)^(?P=mark)[ \t]*$",
+    re.MULTILINE | re.DOTALL,
+)
+_CAPTION = re.compile(r"^:?caption:[ \t]*[\"']?(.*?)[\"']?[ \t]*$", re.MULTILINE)
+
+
+def _read_toctrees(
+    path: str, files: SourceFiles, paths: set[str]
+) -> Iterator[ImportedText | ImportedLevel]:
+    """Yield what the trees of a text name, each with what its own trees name; each text once."""
+    folder = posixpath.dirname(path)
+    for tree in _TOCTREE.finditer(files.read_text(path)):
+        lessons: list[ImportedText] = []
+        for line in re.sub(r"(?s)\A---\n.*?\n---\n", "", tree["body"]).split("\n"):
+            entry = re.fullmatch(
+                r"(?:(?P<title>.*\S)\s+<(?P<target>[^<>]+)>|(?P<name>\S.*))", line.strip()
+            )
+            if entry is None or line.lstrip().startswith((":", "#")):
+                continue
+            name = (entry["target"] or entry["name"]).lstrip("/")
+            pattern = posixpath.normpath(posixpath.join(folder, name))
+            names = [f for f in files if f.endswith(TEXTS) and fnmatchcase(stem_of(f), pattern)]
+            file = find_text(pattern, files)
+            if not (file or names) and name != "self":
+                leave_entry(path, line.strip(), files)
+            for child in [file] if file else names:
+                if child not in paths:
+                    paths.add(child)
+                    lessons.append(ImportedText(file=child, title=entry["title"] or ""))
+                    lessons += flatten(_read_toctrees(child, files, paths))
+        caption = _CAPTION.search(tree["body"])
+        yield from _level(caption[1], lessons) if caption else lessons
 
 
 # --- Docusaurus
@@ -190,6 +263,8 @@ def _read_sidebar(
                 yield from _read_folder(folder, files)
             case "category":
                 link = items.get("link")
+                if isinstance(link, Mapping) and (words := link.get("description")):
+                    files.leave(name, f"the description of a category: {words}", "entry of the map")
                 first = link.get("id") if isinstance(link, Mapping) else None
                 inside = items.get("items")
                 if first:

@@ -7,14 +7,25 @@ not recognized here.
 from __future__ import annotations
 
 import re
+import textwrap
 
 from coursebuild.features.importer.context import (
+    PROOF_LABELS,
     LessonContext,
     formula_anchor,
     label_anchor,
     to_anchor,
 )
-from coursebuild.features.importer.roles import convert_code, convert_role, write_link
+from coursebuild.features.importer.roles import (
+    convert_attributes,
+    convert_code,
+    convert_cross_reference,
+    convert_role,
+    convert_substitution,
+    convert_tag,
+    convert_wiki_link,
+    write_link,
+)
 from coursebuild.features.importer.source_files import title_of_file
 
 _ATTRIBUTES = (
@@ -26,14 +37,14 @@ _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
 """Attributes of Pandoc or of Python's Markdown, which follow what they belong to."""
 _KEY = r"\w(?:[\w.:/+-]*\w)?"
 """The key of a source."""
-_PLACE = r"(?:[^()\s]|\([^()\s]*\))+"
+_PLACE = r"(?:<[^<>\n]+>|(?:[^()\s<]|\([^()\s]*\))(?:[^()\s]|\([^()\s]*\))*)"
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
 # A formula holds no beginning of another: so each character is looked at a few times, not once for
 # each beginning before it.
 _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`))"
-    rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?:{_LINK_TITLE})?[ \t]*\)"
+    rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?P<hover>{_LINK_TITLE})?[ \t]*\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
     rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
@@ -43,11 +54,18 @@ _LINE = re.compile(
     r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]\[(?P<path>[A-Za-z_]\w*(?:\.\w+)+)?\])"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
-    r"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst)-(?P<label>[\w-]+)\]?)"
+    rf"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst|{'|'.join(PROOF_LABELS)})"
+    r"-(?P<label>\w+(?:-\w+)*)\]?)"
+    r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
+    r"|(?<!\^)\^[^\s\^\[\]]+\^(?!\^))"
+    r"|(?P<change>\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
+    r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
+    r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
+    r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{[^{}\n]*\})"
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
     r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
-    r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^{}\n]*%\})"
+    r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
@@ -59,7 +77,6 @@ _LINE = re.compile(
     rf"|(?P<attributes>(?:(?<=[^\s$])|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
     rf"|(?P<span>\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
-_ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
 _DISPLAY = re.compile(
     r"\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$"
     r"(?:[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\}))?"
@@ -75,7 +92,7 @@ _ENVIRONMENT = re.compile(
 )
 """A formula between dollar signs, or one that its environment alone makes one."""
 _BRACKETS = re.compile(
-    r"^(?P<lead>[ \t]*)(?:\\\[(?P<tex>(?>(?:(?!\\[\[\]]).)+))\\\]"
+    r"^(?P<lead>[ \t]*)(?:\\{1,2}\[(?P<tex>(?>(?:(?!\\{1,2}[\[\]]).)+))\\{1,2}\]"
     r"|\$(?P<lines>[ \t]*\n(?:(?!\n[ \t]*\n)[^$])+)\$)[ \t]*$",
     re.DOTALL | re.MULTILINE,
 )
@@ -91,9 +108,12 @@ _CAPTION = re.compile(
 )
 """A caption of Quarto, below its table."""
 _MEANING = re.compile(
-    r"^(?<![^\n]\n)(?![|:#>\s<]|[-*+][ ])([^\n]*[^\s\n:])[ \t]*\n:[ \t]+(?=\S)", re.MULTILINE
+    r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
+    r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
+    re.MULTILINE,
 )
-"""A term in a paragraph of its own, and the mark of what it means."""
+"""A term in a paragraph of its own, and what it means, once or more, each behind a colon."""
+_ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
 _LABEL = re.compile(r"\\label\{([^{}]*)\}")
 _LEAD = re.compile(r"\n[ \t>]*\Z")
 """What stands before the mark that ends a formula, on a line of its own."""
@@ -102,8 +122,10 @@ _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 _EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
 _ENDS = {"<!--": "-->", "$$": "$$"}
-_COMMENT = re.compile(r"^(?:%[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE)
-"""A comment of MyST, or its break between two cells."""
+_COMMENT = re.compile(
+    r"%%[^%\n]+%%|^(?:%(?!%)[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE
+)
+"""A comment of MyST or Obsidian, or the break of MyST between two cells."""
 _COMMENT_AS_HEADING = re.compile(
     r"^(#{1,6})[ \t]+<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$", re.MULTILINE
 )
@@ -149,7 +171,12 @@ _KINDS = {
     "cross": ("cross-reference", "a link"),
     "cite": ("citation", "in the words of BibTeX's keys"),
     "pair": ("pair of tags", "what it holds, without a frame"),
-    "substitution": ("substitution", "dropped: it changes no word"),
+    "substitution": ("substitution", "the words that it stands for"),
+    "marked": ("marked words", "a tag of HTML"),
+    "change": ("suggested change", "as if it had been accepted"),
+    "wiki": ("link", "its new address"),
+    "auto": ("link", "its new address"),
+    "latex": ("command of LaTeX", "dropped: it changes no word"),
     "mention": ("mention of a lesson", "its new number"),
     "route": ("link", "its new address"),
     "tail": ("link", "its new address"),
@@ -191,7 +218,11 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     text, count = _TARGET.subn(write_target, text)
     if count:
         account.changed["label", "an anchor"] += count
-    text, count = _MEANING.subn(r"**\1**: ", text)
+    for abbreviation in _ABBREVIATION.finditer(text):
+        message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
+        context.leave("abbreviation", message)
+    text = _ABBREVIATION.sub("", text)
+    text, count = _MEANING.subn(_write_meanings, text)
     if count:
         account.changed["definition", "behind its term, which is bold"] += count
     text, count = _CAPTION.subn(_move_caption, text)
@@ -214,6 +245,14 @@ def _join_lines(match: re.Match[str]) -> str:
     """Return a role or note on one line, and behind it the line ends that stood in it."""
     lines = match[0].split("\n")
     return " ".join(line.strip() for line in lines) + "\n" * (len(lines) - 1)
+
+
+def _write_meanings(match: re.Match[str]) -> str:
+    """Return what a term means, as paragraphs of which the first begins with the term."""
+    meanings = re.split(r"^:[ \t]+", match["meanings"].lstrip("\n"), flags=re.MULTILINE)[1:]
+    parts = (textwrap.dedent(f"    {part.lstrip()}").strip() for part in meanings)
+    lines = (re.sub(r"^[ ]{2,4}", "", part, flags=re.MULTILINE) for part in parts)
+    return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
 
 
 def _write_figure(match: re.Match[str]) -> str:
@@ -281,10 +320,12 @@ def find_anchors(text: str) -> set[str]:
     labelled = [*_FIGURE_NAME.finditer(text)]
     figures = {label_anchor(m["name"]) for m in labelled if m["kind"] == "figure"}
     figures |= {to_anchor(match["label"]) for match in _FIGURE.finditer(text)}
-    cells = re.findall(r"^#\|[ \t]*label:[ \t]*fig-([\w-]+)", text, re.MULTILINE)
+    cells = re.findall(r"^(?:#\|[ \t]*label:[ \t]*|!\[[^\n]*\{#)fig-([\w-]+)", text, re.MULTILINE)
     figures |= {to_anchor(label) for label in cells}
     anchors = {to_anchor(match["name"]) for match in _TARGET.finditer(text)}
-    anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)\}", text)}
+    anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)", text)}
+    proofs = re.findall(rf"#((?:{'|'.join(PROOF_LABELS)})-[\w-]+)", text)
+    anchors |= {to_anchor(name) for name in proofs}
     for match in _DISPLAY.finditer(normalize_formulas(text)):
         anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", _label_formula(match)))
     labels = re.findall(r"^\s*:(?:label|name):[ \t]*(\S+)", text, re.MULTILINE)
@@ -303,24 +344,24 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return convert_role(match["name"], match["body"], context)
         case "image":
             alt = match["alt"]
-            source = match["source"]
+            source = match["source"].strip("<>")
+            if source.endswith("#only-dark"):  # a page makes its pictures dark itself
+                return ""
             if re.match("[a-z]+://|//", source):
                 message = f"a picture from another host, `{source}`; it is a link now"
                 context.leave("picture", message)
                 text, end = match.string, match.end()
                 is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
                 return (alt or source) if is_in_link else f"[{alt or source}]({source})"
-            name, path = source.removeprefix("attachment:"), context.resolve_path(source)
-            dressing = match["dressing"] or ""
+            dressing, hover = match["dressing"] or "", match["hover"] or ""
+            hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             label = dressing if dressing.startswith("{#fig-") else ""
-            if name in context.pictures:
-                return f"![{alt}]({context.add_picture(name)}){label}"
-            if path in context.files:
-                return f"![{alt}]({context.add_file(path)}){label}"
+            if address := context.resolve_picture(source):
+                return f"![{alt}]({address}{hover}){label}"
             context.leave("picture", f"the picture `{source}`, which is not in the folder")
             return alt
         case "link":
-            text, address = match["text"], context.resolve_link(match["address"])
+            text, address = match["text"], context.resolve_link(match["address"].strip("<>"))
             if not text and not re.match("#|lesson:|page:", address):  # its tool knows a title
                 text = title_of_file(re.split("[:#]", match["address"])[-1])
             return write_link(_rewrite_line(text, context), address, match["title"] or "")
@@ -344,26 +385,17 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 whole if _WORD.search(whole) else _TIGHT.sub(lambda m: f"${m[1].strip()}$", whole)
             )
         case "code":
-            if match.string.lstrip().startswith("|") and context.path.endswith(".qmd"):
-                whole = re.sub(r"(?<!\\)\|", r"\\|", whole)  # it ends a cell, but for Pandoc
-            return convert_code(whole, context)
+            is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
+            code = convert_code(whole, context)
+            return re.sub(r"(?<!\\)\|", r"\\|", code) if is_cell else code
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":
-            kind = match["kind"]
-            label = match["label"]
-            if kind == "eq":
-                return write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
-            if kind == "sec":
-                return write_link("this section", context.resolve_anchor(f"sec-{to_anchor(label)}"))
-            kind = kind.replace("tbl", "tab")
-            if address := context.resolve_anchor(f"{kind}:{to_anchor(label)}"):
-                return write_link("", address)
-            message = f"the reference `{whole}` to what no text labels: write what is meant"
-            context.leave("cross-reference", message)
-            return {"fig": "the figure", "tab": "the table", "lst": "the listing"}[kind]
+            return convert_cross_reference(whole, match["kind"], match["label"], context)
         case "cite":
             keys = _CITED_KEY.findall(whole)
+            if any(key.partition("-")[0] in _CROSS_KINDS for key in keys):
+                return _rewrite_line(whole[1:-1], context)
             if keys and context.are_sources(keys):
                 return re.sub(",(?=[ ]*@)", ";", whole.replace("-@", "@"))
             message = f"`{whole}`, a source that no BibTeX file of the folder has; it is code now"
@@ -372,13 +404,25 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "pair":
             return _rewrite_line(match["held"], context)
         case "substitution":
-            if re.fullmatch(r"\{\{<\s*pagebreak\s*>\}\}", whole):
-                return ""
-            message = (
-                f"`{whole}`, which its tool replaces; it is code now: write what it stands for"
-            )
-            context.leave("substitution", message)
-            return f"`{whole}`"
+            return convert_substitution(whole, context)
+        case "marked":
+            is_marked = whole[:2] == "==" or context.has_marks
+            tag = _MARKS[whole[:2] if whole[:2] in _MARKS else whole[0]]
+            words = whole[2:-2] if whole[:2] in _MARKS else whole[1:-1]
+            return f"<{tag}>{_rewrite_line(words, context)}</{tag}>" if is_marked else whole
+        case "change":
+            words, mark = whole[3:-3], whole[1:3]
+            if not context.has_marks:
+                return whole
+            return "" if mark in ("--", ">>") else _rewrite_line(words.rpartition("~>")[2], context)
+        case "wiki":
+            page, part = match["page"].strip(), match["part"] or ""
+            return convert_wiki_link(whole, page, part, match["shown"] or "", context)
+        case "auto":
+            address = context.resolve_link(whole[1:-1])
+            return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
+        case "latex":
+            return "" if context.has_marks else whole
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
@@ -387,46 +431,24 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "route":
             return context.resolve_link(whole) or whole
         case "tail":
-            return f"]({context.resolve_link(match['rest']) or GONE}"
+            return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":
             address = match["named"]
             return whole.removesuffix(address) + (context.resolve_link(address) or GONE)
         case "tag":
-            return _convert_tag(whole, context)
+            return convert_tag(whole, context)
         case "markdown":  # a tag whose text is Markdown, as it always is here
             return match["before"]
         case "attributes":
-            line, before = match.string, match.string[: match.start()]
-            is_heading, is_whole = line.startswith("#"), whole == line.rstrip()
-            is_marked = whole.lstrip().startswith("{:")
-            is_behind = whole[0] == "{" and re.search(r"[`\]*>:\"]$|\]\([^()]*\)$", before)
-            if not (is_heading or is_whole or is_marked or is_behind):
-                return whole  # an index in a formula, a set, an argument
-            id = re.search(r"#([^\s{}\"'#]+)", whole)
-            if id is None or not (":" in id[1] or is_heading):
-                return ""
-            return whole if ":" in id[1] else f" {{#{to_anchor(id[1])}}}"
+            return convert_attributes(match)
         case "span":
             return _rewrite_line(match["words"], context)
         case _:
             return whole
 
 
-def _convert_tag(tag: str, context: LessonContext) -> str:
-    """Return a tag of HTML with the new address of the file of the folder that it names."""
-    attribute = _ATTRIBUTE.search(tag)
-    if attribute is None or re.match(r"[a-z][a-z+.-]*:|//|#", attribute[3]):
-        return tag
-    address, alt = attribute[3], re.search(r"\s(?i:alt)=[\"']([^\"']*)", tag)
-    before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
-    if new_address := context.resolve_file(address):
-        return before + new_address + after
-    context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
-    if re.match("<img", tag, re.IGNORECASE):
-        return alt[1] if alt else ""
-    return tag[: attribute.start()].rstrip() + after[1:]
-
-
+_MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
+_CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = re.compile(rf"(?<![\w@])@({_KEY})")
 _TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
 """A formula with blanks at its ends, which some tools allow."""

@@ -218,7 +218,13 @@ def _carry_macros(document: model.Document) -> Iterator[Edit]:
         for name, definition in reversed(macros.items()):
             if name not in own_macros and name in _COMMAND.findall(tex + definitions):
                 definitions = definition + definitions
-        if definitions:
+        if own_macros and not _DEFINITION.sub("", tex).strip():
+            text = document.source.text  # definitions alone: they stand in each formula below
+            span = formula.tex.span()
+            start, end = text.rfind("$", 0, span.start), text.find("$", span.end)
+            start -= text[start - 1 : start] == "$"
+            yield Edit(Span(document.source, start, end + 1 + (text[end + 1 : end + 2] == "$")), "")
+        elif definitions:
             start = formula.tex.span().start
             yield Edit(Span(document.source, start, start), definitions)
         macros |= own_macros

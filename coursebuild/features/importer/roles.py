@@ -1,10 +1,15 @@
-"""Roles of MyST and Sphinx, and inline code that its tool runs, as Markdown of coursebuild."""
+"""What stands in a line and names something, as Markdown of coursebuild.
+
+It is a role of MyST and Sphinx, a reference of Quarto, a link of Obsidian, a name that its tool
+replaces, or code that its tool runs.
+"""
 
 from __future__ import annotations
 
 import re
 
 from coursebuild.features.importer.context import (
+    PROOF_LABELS,
     LessonContext,
     formula_anchor,
     label_anchor,
@@ -37,11 +42,14 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
                 message = f"a link to `{target}`, which no text sets"
                 context.leave(f"role `{{{name}}}`", message)
             if ":" in address.rpartition("#")[2]:  # what has a number is called by it
-                return write_link("" if "%s" in words else words, address)
+                rest = words.partition("%s")[2] if "%s" in words else ""
+                return write_link("" if "%s" in words else words, address) + rest
             return write_link(words.replace("%s", "").strip() or title_of_file(target), address)
         case _ if name.partition(":")[0] in ("cite", "citep", "citet"):
             keys = [key.strip() for key in body.split(",")]
             if context.are_sources(keys):
+                if name.partition(":")[2] == "t" or name == "citet":
+                    return " and ".join(f"@{key}" for key in keys)
                 return f"[{'; '.join(f'@{key}' for key in keys)}]"
             message = f"`{body}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave(f"role `{{{name}}}`", message)
@@ -49,6 +57,11 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case "index":
             return words or ("" if ":" in body or "!" in body else body)
         case "download":
+            return write_link(words or target, context.resolve_link(target))
+        case "kbd" | "sub" | "sup" | "u" | "underline" | "del" | "strike":
+            tag = {"underline": "u", "strike": "del"}.get(name, name)
+            return f"<{tag}>{body}</{tag}>"
+        case "button":
             return write_link(words or target, context.resolve_link(target))
         case _ if name.rpartition(":")[2] in _CODE_ROLES:
             return f"`{words or target}`"
@@ -64,16 +77,107 @@ _CODE_ROLES = frozenset(
     "code file command program option envvar samp func function class mod module meth method attr "
     "attribute data const exc exception obj object type".split()
 )
-_WORD_ROLES = frozenset("abbr dfn guilabel kbd menuselection pep raw rfc span sub sup term".split())
+_WORD_ROLES = frozenset(
+    "abbr chem dfn guilabel menuselection pep raw rfc sc smallcaps span term".split()
+)
 _INLINE_RUN = re.compile(r"`(?:\{(?:python|r|julia)\}|r)[ ]+([^`]+)`")
+_LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)\w+[ ]+")
+"""The language of code in a line, as MkDocs marks it."""
 
 
 def convert_code(whole: str, context: LessonContext) -> str:
     """Return code in a line, without the mark of a tool that replaces it by its value."""
     run = _INLINE_RUN.fullmatch(whole)
     if run is None:
-        return whole
+        return _LANGUAGE.sub(r"\1", whole)
     cure = "print it in a script, and bind the number by `{out}`"
     message = f"{whole}, whose value its tool shows: {cure}"
     context.leave("code in a line", message)
     return f"`{run[1]}`"
+
+
+def convert_cross_reference(whole: str, kind: str, label: str, context: LessonContext) -> str:
+    """Return a reference of Quarto, as `@fig-label`, as a link."""
+    if kind == "eq":
+        return write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
+    if kind in PROOF_LABELS:
+        words = PROOF_LABELS[kind].capitalize()
+        return write_link(words, context.resolve_anchor(f"{kind}-{to_anchor(label)}"))
+    if kind == "sec":
+        return write_link("this section", context.resolve_anchor(f"sec-{to_anchor(label)}"))
+    kind = kind.replace("tbl", "tab")
+    if address := context.resolve_anchor(f"{kind}:{to_anchor(label)}"):
+        return write_link("", address)
+    message = f"the reference `{whole}` to what no text labels: write what is meant"
+    context.leave("cross-reference", message)
+    return {"fig": "the figure", "tab": "the table", "lst": "the listing"}[kind]
+
+
+_FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split()
+"""Names between braces that only place or mark what stands between them."""
+
+
+def convert_substitution(whole: str, context: LessonContext) -> str:
+    """Return what stands for a name between braces; or the whole as code, which is left."""
+    title = re.search(r"(?:title|caption)=\"([^\"]*)\"", whole)
+    name, *arguments = whole.strip("{}<> %").split() or [""]
+    address = "".join(arguments[:1])
+    if name in ("tab", "code") and title:
+        return f"**{title[1]}**"
+    if name == "video" or (name == "embed" and whole[1] == "%"):
+        address = address.removeprefix("url=").strip('"')
+        return write_link(title[1] if title else address, context.resolve_link(address))
+    if name.removeprefix("end") in _FRAMES and name != "embed":
+        return ""
+    if name == "kbd" and arguments:
+        return arguments[-1]
+    key = address if name in ("var", "meta") else name
+    if (value := context.substitutions.get(key)) is not None:
+        return value
+    message = f"`{whole}`, which its tool replaces; it is code now: write what it stands for"
+    context.leave("substitution", message)
+    return f"`{whole}`"
+
+
+def convert_wiki_link(whole: str, page: str, part: str, words: str, context: LessonContext) -> str:
+    """Return a link or picture of Obsidian; as it is where the folder has no such file."""
+    if whole[0] == "!" and (address := page and context.resolve_picture(page)):
+        return f"![{title_of_file(page)}]({address})"
+    if page and context.resolve_path(f"{page}.md") not in context.files:
+        return whole
+    address = context.resolve_link(f"{page}.md{part}" if page else part)
+    return write_link(words or page or part.lstrip("#"), address)
+
+
+_ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
+
+
+def convert_tag(tag: str, context: LessonContext) -> str:
+    """Return a tag of HTML with the new address of the file of the folder that it names."""
+    attribute = _ATTRIBUTE.search(tag)
+    if attribute is None or re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
+        return tag
+    address = attribute[3].removeprefix("attachment:")
+    before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
+    if new_address := context.resolve_picture(address) or context.resolve_file(address):
+        return before + new_address + after
+    context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
+    if re.match("<img", tag, re.IGNORECASE):
+        alt = re.search(r"\s(?i:alt)=[\"']([^\"']*)", tag)
+        return alt[1] if alt else ""
+    return tag[: attribute.start()].rstrip() + after[1:]
+
+
+def convert_attributes(match: re.Match[str]) -> str:
+    """Return attributes behind a heading or another part of a line: an anchor, or nothing."""
+    whole = match[0]
+    line, before = match.string, match.string[: match.start()]
+    is_heading, is_whole = line.startswith("#"), whole == line.rstrip()
+    is_marked = whole.lstrip().startswith("{:")
+    is_behind = whole[0] == "{" and re.search(r"[`\]*>:\"]$|\]\([^()]*\)$", before)
+    if not (is_heading or is_whole or is_marked or is_behind):
+        return whole  # an index in a formula, a set, an argument
+    id = re.search(r"#([^\s{}\"'#]+)", whole)
+    if id is None or not (":" in id[1] or is_heading):
+        return ""
+    return whole if ":" in id[1] else f" {{#{to_anchor(id[1])}}}"

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import base64
 import binascii
+import contextlib
 import json
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -24,7 +25,7 @@ _TITLED = re.compile(
     r" {0,3}(?:===[!+]?[ \t]+([\"'])(?P<tab>.*)\1"
     r"|(?P<mark>!!!|\?{3}\+?)[ \t]+(?P<head>\w[^\n]*?))[ \t]*\n?"
 )
-_CELL = re.compile(r"\{code-cell\b.*|\{(?:python|ipython3?)[^}]*\}")
+_CELL = re.compile(r"\{code-cell\}(?:[ \t]+i?python3?\b.*)?|\{(?:python|ipython3?)[^}]*\}")
 _FRONT_MATTER = re.compile(
     r"---[ \t]*\n(?P<yaml>.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
     r"|\+\+\+[ \t]*\n(?P<toml>.*?\n)?\+\+\+[ \t]*(?:\n|\Z)",
@@ -41,7 +42,17 @@ _HEADING = re.compile(rf"{_TITLE.pattern}|^(?P<lower>\#{{2,5}})(?=[ \t])", re.MU
 
 _SUMMARIES = ("description", "abstract", "subtitle")
 """Keys of front matter whose text becomes a lesson's summary; the first that there is."""
-_NEEDLESS = ("title", "jupyter", "jupytext", "kernelspec", "language_info", "sidebar_position")
+_NEEDLESS = (
+    "title",
+    "jupyter",
+    "jupytext",
+    "kernelspec",
+    "language_info",
+    "sidebar_position",
+    "myst",
+    "substitutions",
+    "colab",
+)
 """Further keys of which nothing is lost."""
 
 
@@ -53,8 +64,10 @@ class ReadText(Struct, frozen=True):
     summary: str
     segments: tuple[Segment, ...]
     pictures: Mapping[str, bytes]
-    lost: tuple[str, ...]
-    """Keys of its front matter, or of a notebook's metadata, that have no counterpart."""
+    lost: Mapping[str, Any]
+    """What its front matter, or a notebook's metadata, hold that has no counterpart, by key."""
+    substitutions: Mapping[str, str]
+    """What names between braces stand for in it."""
 
 
 def read_segments(text: str, name: str) -> ReadText:
@@ -85,12 +98,13 @@ def read_segments(text: str, name: str) -> ReadText:
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
     # The first heading of level 1, and the segments without it; from the next on, all go down by 1
     titles: list[str] = []
+    own_title = " ".join(str(metadata.get("title") or "").split())
 
     def shift_heading(heading: re.Match[str]) -> str:
         if heading["lower"]:  # what stands below a second title stays below it
             return heading["lower"] + "#" * (len(titles) > 1)
         titles.append(heading["text"] or heading["line"] or "")
-        if len(titles) == 1:
+        if len(titles) == 1 and own_title in ("", titles[0]):
             return ""
         return f"## {heading['line']}" if heading["line"] else f"#{heading[0]}"
 
@@ -100,23 +114,27 @@ def read_segments(text: str, name: str) -> ReadText:
         else segment
         for segment in segments
     ]
+    myst = metadata.get("myst")
+    inner = (myst if isinstance(myst, dict) else metadata).get("substitutions")
+    words = {**metadata, **(inner if isinstance(inner, dict) else {})}
     summaries = [key for key in _SUMMARIES if isinstance(metadata.get(key), str)][:1]
     return ReadText(
-        str(metadata.get("title") or (titles or [""])[0]),
+        str(metadata.get("title") or (titles or [""])[0]).strip(),
         " ".join("".join(str(metadata[key]) for key in summaries).split()),
         tuple(shifted),
         pictures,
-        tuple(
-            str(key)
+        {
+            str(key): value
             for key, value in metadata.items()
             if value and key not in (*_NEEDLESS, *summaries)
-        ),
+        },
+        {str(key): str(v) for key, v in words.items() if isinstance(v, str | int | float)},
     )
 
 
 _GATES = re.compile(
     r"^(?P<mark>`{3,}|~{3,}|:{3,})\{(?P<name>exercise|solution)-start\}"
-    r"(?P<head>.*\n(?:[ \t]*:.*\n)*)"
+    r"(?P<head>[^\n]*\n(?:[ \t]*:[^\n]*\n)*)"
     r"(?P=mark)[ \t]*\n(?P<body>.*?)^(?P=mark)\{(?P=name)-end\}[ \t]*\n(?P=mark)[ \t]*$",
     re.MULTILINE | re.DOTALL,
 )
@@ -128,6 +146,11 @@ _HINT = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 """A callout of GitBook."""
+_HIGHLIGHT = re.compile(
+    r"^\{[%{][<%-]?[ ]*highlight[ ]+(\w+)[^\n]*\n(.*?)\n\{[%{][<%-]?[ ]*(?:end|/)highlight[^\n]*$",
+    re.MULTILINE | re.DOTALL,
+)
+"""A block of code of Jekyll or Hugo."""
 
 
 def _join_gates(gates: re.Match[str]) -> str:
@@ -157,6 +180,7 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
     block.
     """
     text = _HINT.sub(r"::::::\1\n\2\n::::::", _GATES.sub(_join_gates, text))
+    text = _HIGHLIGHT.sub(r"```\1\n\2\n```", text)
     lines = text.split("\n")
     at = 0
     for (start, end), mark, head, content in (*_find_blocks(text), ([len(lines)] * 2, "", "", "")):
@@ -287,33 +311,46 @@ def _read_cells(
                 source = source.replace(f"attachment:{picture}", f"attachment:{number}-{picture}")
                 attachments[f"{number}-{picture}"] = data
             segments += read_markdown(source, place=place)
-        elif not source.strip():
-            continue
-        elif cell.get("cell_type") != "code" or "python" not in language:
-            head = f"{{{language}}}" if cell.get("cell_type") == "code" else "text"
-            segments.append(Segment(kind="block", place=place, text=source, head=head))
-        else:
+        elif cell.get("cell_type") == "code" and source.strip():
             outputs = cell.get("outputs") or ()
             tags = " ".join((cell.get("metadata") or {}).get("tags") or ())
             values = [o for o in outputs if o.get("output_type") == "execute_result"]
-            value_texts = ((o.get("data") or {}).get("text/plain") or "" for o in values)
+            value_texts = [(o.get("data") or {}).get("text/plain") or "" for o in values]
+            value_texts += ["\n".join(o["traceback"]) for o in outputs if o.get("traceback")]
             streams = (o for o in outputs if o.get("name") == "stdout")
+            is_python = "python" in language
             cell_segment = Segment(
-                kind="cell",
+                kind="cell" if is_python else "block",
                 place=place,
                 text=source,
-                head=tags,
+                head=tags if is_python else f"{{{language}}}",
                 shows_value=bool(values),
                 printed="".join(_join_lines(stream.get("text") or "") for stream in streams),
                 value="\n".join(map(_join_lines, value_texts)),
-                has_picture=any(
-                    kind.startswith("image/") for o in outputs for kind in o.get("data") or ()
-                )
-                if outputs
-                else None,
+                picture=_recorded_picture(outputs) if outputs else None,
+                lost=tuple(
+                    kind
+                    for output in outputs
+                    for kind in ({output.get("name"): 1} | (output.get("data") or {}))
+                    if kind in _LOST_KINDS
+                ),
             )
             segments.append(cell_segment)
     return segments, attachments
+
+
+_LOST_KINDS = frozenset(
+    "stderr text/markdown text/latex image/jpeg image/gif application/javascript "
+    "application/vnd.jupyter.widget-view+json".split()
+)
+
+
+def _recorded_picture(outputs: Iterable[Mapping[str, Any]]) -> tuple[str, bytes]:
+    """Return the picture among the outputs of a cell, with its extension; empty for none."""
+    data = {kind: text for output in outputs for kind, text in (output.get("data") or {}).items()}
+    with contextlib.suppress(binascii.Error, KeyError):
+        return ".png", base64.b64decode(_join_lines(data["image/png"]))
+    return ".svg", _join_lines(data.get("image/svg+xml") or "").encode()
 
 
 def _join_lines(source: str | list[str]) -> str:

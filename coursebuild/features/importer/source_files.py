@@ -46,9 +46,12 @@ class Segment(Struct, frozen=True, kw_only=True):
     printed: str = ""
     """Of a cell: what it printed, as recorded."""
     value: str = ""
-    """Of a cell: the value that was shown, as recorded."""
-    has_picture: bool | None = None
-    """Of a cell: whether a picture is recorded below it; `None` where no output is recorded."""
+    """Of a cell: the value that was shown, or the error, as recorded."""
+    picture: tuple[str, bytes] | None = None
+    """Of a cell: the picture that is recorded below it, with its extension; empty for none, and
+    `None` where no output is recorded."""
+    lost: tuple[str, ...] = ()
+    """Of a cell: the kinds of recorded outputs that are neither text nor a picture."""
 
 
 class ImportedText(Struct, frozen=True, kw_only=True):
@@ -74,6 +77,8 @@ class ImportedText(Struct, frozen=True, kw_only=True):
     segments: tuple[Segment, ...] = ()
     pictures: Mapping[str, bytes] = {}
     """Pictures that its file contains, by name."""
+    substitutions: Mapping[str, str] = {}
+    """What names between braces stand for in it, as its metadata say."""
 
     @property
     def link(self) -> str:
@@ -99,6 +104,10 @@ class ImportedCourse(Struct, frozen=True, kw_only=True):
     language: str = ""
     levels: tuple[ImportedLevel, ...]
     pages: tuple[ImportedText, ...] = ()
+    has_own_titles: bool = False
+    """Whether the title that a text has itself goes before that of the map, which is short."""
+    substitutions: Mapping[str, str] = {}
+    """What names between braces stand for in its texts."""
     has_hidden_lines: bool = False
     """Whether lines of Rust that begin with `# ` are hidden from readers."""
     camera_is_position: bool = False

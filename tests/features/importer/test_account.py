@@ -104,6 +104,16 @@ MYST: list[Construct] = [
     ("magic", LEFT, "```{code-cell} python\n%wa75 inline\nx = 1\n```"),
     ("tag of HTML", CHANGED, '<img src="p.png" alt="wa76">'),
     ("tag of HTML", LEFT, "<style>\n.x { color: red }\n</style>"),
+    ("directive `{csv-table}`", CHANGED, "```{csv-table} wa77\n:file: data.csv\n```"),
+    (
+        "directive `{exercise}`",
+        CHANGED,
+        "```{exercise-start}\n:label: ex3\n```\n\n```python\nwa78\n```\n\n```{exercise-end}\n```",
+    ),
+    ("directive `{code-cell}`", LEFT, "```{code-cell} julia\nwa79\n```"),
+    ("role `{del}`", CHANGED, "{del}`wa80`"),
+    ("substitution", CHANGED, "The {{ mass }} wa81"),
+    ("link", LEFT, "[wa82](inv:python#print)"),
 ]
 QUARTO: list[Construct] = [
     ("callout", CHANGED, '::: {.callout-tip collapse="true" title="wb1"}\nText wb2\n:::'),
@@ -121,7 +131,7 @@ QUARTO: list[Construct] = [
     ("cross-reference", LEFT, "See @fig-none."),
     ("citation", TAKEN, "Says [see @wb24, p. 3]."),
     ("citation", LEFT, "Says [see @wb25]."),
-    ("substitution", LEFT, "{{< video wb13.mp4 >}}"),
+    ("substitution", CHANGED, "{{< video wb13.mp4 >}}"),
     ("substitution", CHANGED, "{{< pagebreak >}}"),
     ("file that is included", CHANGED, "{{< include _part.qmd >}}"),
     ("file that is included", LEFT, "{{< include wb15.qmd >}}"),
@@ -137,6 +147,19 @@ QUARTO: list[Construct] = [
     ("caption of a table", CHANGED, "| a |\n| - |\n| wb20 |\n\n: Caption wb21 {#tbl-t}"),
     ("attributes", CHANGED, "[words wb22]{.smallcaps}"),
     ("block that is raw", LEFT, "```{=latex}\n\\wb23\n```"),
+    ("definition", CHANGED, "Term wb30\n\n:   One wb31\n:   Two wb32\n\n    More wb33"),
+    ("marked words", CHANGED, "H~wb34~O and x^wb35^"),
+    ("cross-reference", CHANGED, "::: {#nte-a .callout-note}\nwb36\n:::\n\nSee @nte-a."),
+    ("division", CHANGED, '::: {.content-visible unless-format="pdf"}\nwb37\n:::'),
+    ("command of LaTeX", CHANGED, "Text wb38 \\newpage"),
+    ("code in a line", CHANGED, "| a |\n| - |\n| `wb39|b` |"),
+    (
+        "figure of a cell",
+        CHANGED,
+        "```{python}\n#| fig-alt: >\n#|   Two wb40\n#|   lines wb41\n"
+        "import matplotlib.pyplot as plt\nplt.plot([1])\n```",
+    ),
+    ("heading", TAKEN, "# Second title wb42"),
 ]
 MKDOCS: list[Construct] = [
     ("callout", CHANGED, '!!! note inline end "Title wc1"\n    Text wc2'),
@@ -153,6 +176,10 @@ MKDOCS: list[Construct] = [
     ("keys", CHANGED, "Press ++ctrl+alt+w++ wc20."),
     ("definition", CHANGED, "Term wc21\n:   Meaning wc22."),
     ("tag of HTML", LEFT, "<font color=blue>wc23</font>"),
+    ("abbreviation", LEFT, "*[KE]: wc30"),
+    ("suggested change", CHANGED, "{++wc31++}"),
+    ("division", LEFT, "::: package.wc32\n    options:\n\nAfter wc33"),
+    ("picture", CHANGED, "![wc34](p.png#only-light)"),
     ("tag of HTML", LEFT, '<img alt="wc24"\n  src="https://example.org/a.png">'),
 ]
 MDBOOK: list[Construct] = [
@@ -166,6 +193,13 @@ MDBOOK: list[Construct] = [
     ("link", CHANGED, "[wd12](two.html#part)"),
     ("title of the page", CHANGED, "{{#title Words}}"),
     ("callout", CHANGED, '{% hint style="info" %}\nwd14\n{% endhint %}'),
+    (
+        "substitution",
+        CHANGED,
+        '{% tabs %}\n{% tab title="wd15" %}\nwd16\n{% endtab %}\n{% endtabs %}',
+    ),
+    ("picture", CHANGED, "![wd17](<p.png>)"),
+    ("link", CHANGED, "[[two|wd18]]"),
 ]
 DOCUSAURUS: list[Construct] = [
     ("callout", CHANGED, ":::tip[Title we1]\nText we2\n:::"),
@@ -173,6 +207,9 @@ DOCUSAURUS: list[Construct] = [
     ("statement of JavaScript", LEFT, "import We5 from '@theme/We5';"),
     ("component", LEFT, '<TabItem label="we6">\n\nText we7\n\n</TabItem>'),
     ("link", CHANGED, "[we8](./two.md)"),
+    ("expression of JavaScript", LEFT, "It is {props.we11}."),
+    ("tag of HTML", CHANGED, "<img src={require('./p.png').default} alt='we12' />"),
+    ("file that is included", CHANGED, "import P from './two.md';\n\n<P />"),
     ("block of `jsx`", CHANGED, '```jsx title="we9.js"\nwe10\n```'),
 ]
 TARGETS = """(here)=
@@ -192,6 +229,7 @@ E
 MORE: dict[str, dict[str, str]] = {
     "myst": {
         "_toc.yml": "format: jb-book\nroot: one\nchapters: [{file: two}]\n",
+        "_config.yml": "parse: {myst_substitutions: {mass: 3 kg}}\n",
         "refs.bib": "@book{wa17, title = {T}, year = 1900}\n",
         "code.py": "none = 1\nwa58 = 2\n",
         "part.txt": "Included wa59.\n",

@@ -117,6 +117,7 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         ('=== ":simple-linux: Linux"\n\n    Text.\n', "**Linux**\n\nText.\n"),
         ("```js{1,3}\nf()\n```\n", "```js\nf()\n```\n"),
         ("- a\n\n  ```js\n  `${x}`\n  }\n  ```\n", "- a\n\n  ```js\n  `${x}`\n  }\n  ```\n"),
+        ("```\n:name: value\n```\n", "```\n:name: value\n```\n"),
         ("Code `\\a{b}` and\n`c` here.\n", "Code `\\a{b}` and\n`c` here.\n"),
         ("{% file %}run.sh{% endfile %}\n\nText.\n", "run.sh\n\nText.\n"),
         ('Text {% include "a.html" %}.\n', 'Text `{% include "a.html" %}`.\n'),
@@ -145,6 +146,7 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         "icon",
         "lines",
         "fence in a list",
+        "block without a kind",
         "code over lines",
         "pair of tags",
         "tag",
@@ -184,7 +186,7 @@ lines](two.md 'The next') and ![](far.svg 'gone').
     texts = {"one.md": lines, "two.md": "# Two\n\nText.\n"}
     course = convert_files(tmp_path, {**texts, "springs(2).svg": drawing, "two.svg": drawing})
     text = course.files["content/lessons/1.1-one.md"].decode()
-    pictures = "![A spring](../files/springs(2).svg), ![two](../files/two.svg)"
+    pictures = '![A spring](../files/springs(2).svg), ![two](../files/two.svg "both")'
     link = "(lesson:1.2 'The next')"
     assert text == f"{pictures}, [below]{link},\n[over\nlines]{link} and .\n"
     assert "the picture `far.svg`, which is not in the folder" in account_of(course)

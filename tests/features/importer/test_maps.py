@@ -82,7 +82,7 @@ SUMMARY = r"""# Summary
 
 def test_summary_of_mdbook_is_the_map(tmp_path: Path) -> None:
     names = "before zeta deep/below deep/further alone alpha after unlisted".split()
-    files = {f"text/{name}.md": "" for name in names}
+    files = {f"text/{name}.md": "Text.\n" for name in names}
     files |= {"book.toml": '[book]\ntitle = "A book"\nsrc = "text"\n', "text/SUMMARY.md": SUMMARY}
     outline, pages, left = import_map(tmp_path, files)
     assert outline == [
@@ -99,7 +99,7 @@ def test_summary_of_mdbook_is_the_map(tmp_path: Path) -> None:
 
 def test_summary_of_gitbook_has_parts_as_headings_of_level_2(tmp_path: Path) -> None:
     summary = "# Table of contents\n\n* [Start](README.md)\n\n## Part\n\n* [B](b.md)\n* [A](a.md)\n"
-    files = {"SUMMARY.md": summary, "README.md": "", "a.md": "", "b.md": ""}
+    files = {"SUMMARY.md": summary, **dict.fromkeys(("README.md", "a.md", "b.md"), "Text.\n")}
     outline, _, _ = import_map(tmp_path / "book", files)
     assert outline == [("Lessons", ["Start"]), ("Part", ["B", "A"])]
 
@@ -161,13 +161,46 @@ def test_nav_of_mkdocs_and_chapters_of_quarto_keep_their_order(tmp_path: Path) -
     nav = (
         "site_name: S\nnav:\n  - Z: z.md\n  - Part:\n    - B: b.md\n    - a.md\n  - Gone: gone.md\n"
     )
-    files = {"mkdocs.yml": nav, "docs/z.md": "", "docs/a.md": "", "docs/b.md": ""}
-    outline, _, left = import_map(tmp_path / "m", files)
-    assert outline == [("S", ["Z"]), ("Part", ["B", "docs/a.md"])]
-    assert left == ["the map names `gone.md`, which is not in the folder or no text"]
+    files = {"mkdocs.yml": nav, "docs/z.md": "# Zeta\n\nText.\n", "docs/b.md": "Text.\n"}
+    outline, _, left = import_map(tmp_path / "m", {**files, "docs/a.md": ""})
+    assert outline == [("S", ["Zeta"]), ("Part", ["B", "docs/a.md"])]
+    assert left == ["the map names `Gone: gone.md`, which is not in the folder or no text"]
     chapters = "[z.qmd, {part: P, chapters: [b.qmd, gone.qmd]}]"
     book = f"book:\n  title: Q\n  chapters: {chapters}\n  appendices: [a.qmd]\n"
     files = {"_quarto.yml": book, "a.qmd": "", "b.qmd": "", "z.qmd": ""}
     outline, _, left = import_map(tmp_path / "q", files)
     assert outline == [("Q", ["z.qmd"]), ("P", ["b.qmd"]), ("Q", ["a.qmd"])]
     assert left == ["the map names `gone.qmd`, which is not in the folder or no text"]
+
+
+def test_toctrees_of_sphinx_are_the_map(tmp_path: Path) -> None:
+    index = """# Manual
+
+```{toctree}
+:caption: First
+
+zeta
+Short <more/a>
+```
+
+```{toctree}
+:caption: Second
+:glob:
+
+b*
+gone
+```
+"""
+    zeta = "# Zeta\n\nText.\n\n```{toctree}\n:maxdepth: 1\n\nbelow\n```\n"
+    files = {"conf.py": 'project = "The manual"\n', "index.md": index, "zeta.md": zeta}
+    names = ("below.md", "b1.md", "b2.md", "more/a.md")
+    outline, pages, left = import_map(tmp_path, {**files, **dict.fromkeys(names, "")})
+    assert outline == [("First", ["Zeta", "below.md", "more/a.md"]), ("Second", ["b1.md", "b2.md"])]
+    assert pages == ["Manual"]
+    assert "the map names `gone`, which is not in the folder or no text" in left
+
+
+def test_a_book_of_its_first_page_alone_has_a_lesson(tmp_path: Path) -> None:
+    book = "book:\n  title: Q\n  chapters: [index.qmd]\n"
+    outline, pages, _ = import_map(tmp_path, {"_quarto.yml": book, "index.qmd": ""})
+    assert (outline, pages) == ([("Q", ["index.qmd"])], [])

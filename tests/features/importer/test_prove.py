@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import re
@@ -16,6 +17,10 @@ import pytest
 from coursebuild.cli import main
 
 ABSENT = "a_package_that_nobody_has"
+PNG = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
+"""One pixel."""
 
 
 def write_notebook(path: Path, *codes: str, printed: str = "") -> None:
@@ -133,6 +138,47 @@ def test_a_script_gets_the_folder_that_it_writes_to(folder: Path) -> None:
     write_notebook(folder / "old/a.ipynb", f"{code};")
     assert main(["import", "old", "--out", "new", "--prove"]) == 0
     assert " writes=runs/\n" in lesson(folder / "new", "1.1-a")
+
+
+def test_a_picture_that_a_notebook_holds_is_shown_until_its_script_has_drawn_it(
+    folder: Path,
+) -> None:
+    picture = base64.b64encode(PNG).decode()
+    plot = "import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.title('A line')\nplt.show()"
+    outputs = [{"output_type": "display_data", "data": {"image/png": picture}}]
+    shell = [{"output_type": "stream", "name": "stdout", "text": "listed\n"}, *outputs]
+    cells = [
+        {"cell_type": "code", "source": plot, "outputs": outputs},
+        {"cell_type": "code", "source": "%%bash\nls", "outputs": shell},
+    ]
+    (folder / "old").mkdir()
+    notebook = {"cells": cells, "metadata": {}, "nbformat": 4}
+    (folder / "old/a.ipynb").write_text(json.dumps(notebook))
+    assert main(["import", "old", "--out", "new"]) == 0
+    text = lesson(folder / "new", "1.1-a")
+    assert "```python file=examples/l1_1_a.py figure=l1-1-a-1.png\n" in text
+    assert "Figure: ![A line](l1-1-a-1.png) A line" in text
+    assert "```bash\nls\n```\n\n```text\nlisted\n```\n\n![A](l1-1-a-2.png)" in text
+    files = [folder / f"new/content/lessons/l1-1-a-{number}.png" for number in (1, 2)]
+    assert [path.read_bytes() for path in files] == [PNG, PNG]
+    assert main(["-C", "new", "import", "--prove"]) == 0
+    assert files[0].read_bytes().startswith(b"\x89PNG") and files[0].read_bytes() != PNG
+    assert files[1].read_bytes() == PNG
+
+
+@pytest.mark.site
+def test_a_page_says_which_figure_is_not_drawn_yet(folder: Path) -> None:
+    write_notebook(folder / "old/a.ipynb", "print(1)", printed="1\n")
+    assert main(["import", "old", "--out", "new"]) == 0
+    path = folder / "new/content/lessons/1.1-a.md"
+    head = f"l1_1_a.py figure=f.svg requires={ABSENT}"
+    text = path.read_text().replace("l1_1_a.py", head)
+    path.write_text(f"{text}\nFigure: ![A line](f.svg) What it shows.\n")
+    assert main(["-C", "new", "build"]) == 0
+    page = (folder / "new/public/lessons/1.1-a.html").read_text()
+    figure = re.search(r'<figure class="figure".*?</figure>', page, re.DOTALL)
+    assert figure is not None and "Not drawn yet" in figure[0] and "What it shows." in figure[0]
+    assert "<img" not in figure[0]
 
 
 def runs_in(progress: str) -> list[int]:

@@ -37,7 +37,6 @@ from coursebuild.api import (
     model,
 )
 from coursebuild.core.files.write import FileChange
-from coursebuild.core.model import Table
 from coursebuild.core.model.results import Change, EffectKind, Sign
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
@@ -350,7 +349,7 @@ def _mark_varying(
         comparison = course.comparison_of(recording)
         results = [compare(recording, comparison, text).changes for text in texts]
         is_borne_out = not all(results)
-        is_said = recording.comparison is not None or isinstance(recording.body, Table)
+        is_said = recording.comparison is not None or isinstance(recording.body, model.Table)
         if texts[0] == texts[1] or not any(results) or is_said:
             continue
         pattern = varying_pattern(*texts)
