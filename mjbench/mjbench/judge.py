@@ -206,9 +206,10 @@ _AS_FAR = ", as far as the reference resolves"
 def _strays_from(report: ScenarioReport, rival: WorkPrecisionRow) -> str:
     """From which timestep on a setting may leave the motion of small steps.
 
-    Empty where its own timestep is not longer, and where the scene's own setting leaves it too.
+    Empty where its own timestep is not longer, and where the scene's own setting leaves it too. Of
+    commands nothing is known: they are late at timesteps that do not divide the time they hold for.
     """
-    near = {row.integrator: row.near for row in report.stable}
+    near = {} if report.hold else {row.integrator: row.near for row in report.stable}
 
     def limit(row: WorkPrecisionRow) -> float:
         reach = near.get(row.setting.integrator)
