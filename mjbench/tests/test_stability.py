@@ -356,7 +356,8 @@ def test_a_motion_that_dies_is_not_near_however_small_it_was() -> None:
 def test_commands_that_come_late_are_told() -> None:
     """They change at 0.2 s: a step of 0.03 s begins at 0.21 s."""
     xml = """<mujoco><option timestep="{}" gravity="0 0 0"/><worldbody><body>
-    <joint name="x" type="slide"/><geom size=".1" mass="1"/></body></worldbody><actuator><motor joint="x"/></actuator></mujoco>"""
+    <joint name="x" type="slide"/><geom size=".1" mass="1"/></body></worldbody>
+    <actuator><motor joint="x"/></actuator></mujoco>"""
     scenario = Scenario(0.4, 0.1, (0.0,), (0.0,), controls=((10.0,), (-10.0,)), hold=0.2)
     setup = Setup(scenario=scenario)
     models = {h: mujoco.MjModel.from_xml_string(xml.format(h)) for h in (1e-4, 0.02, 0.03)}
