@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import mujoco
 import pytest
 
@@ -104,13 +102,6 @@ def test_limbs_that_nothing_commands_go_while_one_arm_moves() -> None:
     assert names(finding) == ["waist", "left_arm"]
     assert finding.label == MEASURED_LABEL and finding.difference < ALIKE
     assert findings["contact-left"].difference < ALIKE
-
-
-@pytest.mark.slow
-def test_humanoid_of_which_one_arm_moves_gets_as_quick_as_by_hand() -> None:
-    """By hand, with three joints alone and no contact, a similar one got 3.2 times as quick."""
-    survey = run_survey(humanoid(), declarations=WAVE, quick=False, clock=time.thread_time_ns)
-    assert survey.report.slim is not None and (survey.report.slim.time or 0) > 3
 
 
 def test_couplings_and_shapes() -> None:
