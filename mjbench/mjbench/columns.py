@@ -25,6 +25,8 @@ LOST = "lost"
 """The column of a run that is lost, which has no errors."""
 _ROUNDED = 1e-9
 """Relative changes of what is conserved below this are those of rounding."""
+_NEGLIGIBLE = 1e-3
+"""The part of an error over the whole run below which it is none in a part of it."""
 LABELS = {
     "step_error": "what is seen",
     "seen": "what is seen",
@@ -87,10 +89,16 @@ def ratios(
     """
     result: dict[Column, float] = {}
     for column in baseline.keys() & rival_columns.keys():
-        least = leasts.get(column[0], 0.0) * (1 + 1e-9)
+        least = _least(column, baseline, leasts) * (1 + 1e-9)
         before, now = (max(values[column], least) for values in (baseline, rival_columns))
         result[column] = now / before if before else (math.inf if now else 1.0)
     return result
+
+
+def _least(column: Column, baseline: Columns, leasts: Mapping[str, float]) -> float:
+    """Below which an error means nothing, in a part of the run also beside that of the whole."""
+    whole = 0.0 if column[1] == WHOLE else baseline.get((column[0], WHOLE), 0.0)
+    return max(leasts.get(column[0], 0.0), _NEGLIGIBLE * whole)
 
 
 class Spread(Struct, frozen=True):
@@ -133,7 +141,7 @@ def unresolved_columns(columns: Columns, leasts: Mapping[str, float]) -> frozens
     return frozenset(
         column
         for column, value in columns.items()
-        if value <= (least := leasts.get(column[0], 0.0)) * (1 + 1e-9) and least
+        if value <= (least := _least(column, columns, leasts)) * (1 + 1e-9) and least
     )
 
 

@@ -187,13 +187,37 @@ def _judge_rival(
         return f"{none}{claim} here, but {elsewhere} {texts[0]}", False, texts
     if not is_cheap and gain.high > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, but is no better {elsewhere}", False, ()
+    if limit := _strays_from(report, rival):
+        reason = f"leaves the motion of small steps at some timesteps beyond {limit}"
+        return f"{none}{claim} here, but {rival.setting.integrator} {reason}", False, ()
     text = f"{rival.name} is better: it {price} and {_gain_text(everywhere, figure)}"
     quantity = quantity_of(report)
     if not resolved:
-        text += ", as far as the reference resolves"
+        text += _AS_FAR
     elif (value := quantity.value_of(rival)) is not None and value <= quantity.least:
-        text += ", or more: the reference resolves no more"
+        is_less = " less" in text
+        text += ", or more: the reference resolves no more" if is_less else _AS_FAR
     return text, True, ()
+
+
+_AS_FAR = ", as far as the reference resolves"
+
+
+def _strays_from(report: ScenarioReport, rival: WorkPrecisionRow) -> str:
+    """From which timestep on a setting may leave the motion of small steps.
+
+    Empty where its own timestep is not longer, and where the scene's own setting leaves it too. Of
+    commands nothing is known: they are late at timesteps that do not divide the time they hold for.
+    """
+    near = {} if report.hold else {row.integrator: row.near for row in report.stable}
+
+    def limit(row: WorkPrecisionRow) -> float:
+        reach = near.get(row.setting.integrator)
+        return math.inf if reach is None else reach_bound(reach)
+
+    baseline = next(row for row in report.rows if row.own)
+    stays = [row.setting.timestep <= limit(row) * (1 + 1e-9) for row in (baseline, rival)]
+    return seconds_text(limit(rival), 2) if stays == [True, False] else ""
 
 
 def _gain(starts: Sequence[Mapping[Column, float]]) -> Spread:

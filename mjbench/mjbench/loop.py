@@ -104,7 +104,7 @@ class _LoopRun:
             reason = f"{type(error).__name__}: {error}"
             raise LoopError(f"{loop.path} fails at {data.time:g} s: {reason}") from error
         if len(commands) != model.nu:
-            message = f"{loop.path} gives {len(commands)} commands, and the model takes {model.nu}"
+            message = f"the number of commands is {model.nu}, and {loop.path} gives {len(commands)}"
             raise LoopError(message)
         if loop.noise:
             limited = model.actuator_ctrllimited != 0

@@ -10,6 +10,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
+from mjbench.declarations import is_multiple
 from mjbench.detector import Passages, Peaks, RunStatus, has_bad_state, judge, update_peaks
 from mjbench.pilot import Pilot, horizon_error, nudges, position_distance, scales
 from mjbench.problem import Array, Setup
@@ -26,6 +27,7 @@ _TRANSIENT, _DECAY = 8, 0.75
 a run."""
 _PART = 0.25
 """The part of the way that a motion goes by which what is off is not near to it."""
+_LATE = ", with commands up to a step late"
 _AT_REST = 1e-100
 """The part of its largest speed below which nothing begins to move: subnormal numbers are slow."""
 
@@ -117,10 +119,9 @@ def run_trial(
     timestep = float(model.opt.timestep)
     steps = step_count(span, timestep)
     interval = max(2, steps // _LOOKS)
-    commands = {
-        min(math.ceil(begin / timestep - 1e-9), steps): inputs
-        for begin, _, inputs in setup.scenario.holds(span)
-    }
+    holds = setup.scenario.holds(span)
+    commands = {min(math.ceil(begin / timestep - 1e-9), steps): new for begin, _, new in holds}
+    is_late = any(begin and not is_multiple(begin, timestep) for begin, _, _ in holds)
     times = () if motion is None or start else motion.states.times.tolist()
     samples = {round(time / timestep): number for number, time in enumerate(times)}
     stops = sorted(
@@ -153,7 +154,7 @@ def run_trial(
         if motion is not None and count in samples and not astray:
             distance = motion.distance(model, data, samples[count])
             if not distance < 1:
-                astray = f"off by {motion.far} at {data.time:.3g} s"
+                astray = f"off by {motion.far} at {data.time:.3g} s" + _LATE * is_late
         if stop in commands:
             commands[stop].give(data)
         sizes.append((count, math.hypot(*data.qvel.tolist())))

@@ -327,6 +327,32 @@ def test_verdicts_claim_only_what_holds() -> None:
     assert untimed.startswith("nothing was timed, so no setting can be called better; ")
 
 
+def test_what_leaves_the_motion_of_small_steps_is_not_better() -> None:
+    """The reference resolves no error of positions, but runs were seen to leave it beyond 3 ms."""
+    rows = [replace(r, position=(0.005, 0.005)) for r in masked()]
+    quick = replace(rows[0].setting, iterations=1)
+    rows.append(replace(rows[0], own=False, setting=quick, step_error=0.2))
+    fields: dict[str, Any] = {"contact_model": CONES, "floor": 5e-4, "least_seen": 0.1}
+    text = judged(rows, **fields).verdict.text
+    better = "implicit at 4.16667 ms is better: it takes 0.47 of the time and errs no more in any "
+    assert text.startswith(f"{better}column, as far as the reference resolves; ")
+    limits = (0.001, 0.1), None, 1.0, 1, 9, None
+    stable = [StableRow(name, "all", *limits, near=0.003) for name in ("Euler", "implicit")]
+    verdict = judged(rows, stable=tuple(stable), **fields).verdict
+    assert verdict.better is None and (
+        "but implicit leaves the motion of small steps at some timesteps beyond 3 ms"
+        in verdict.text
+    )
+
+
+def test_rounding_after_an_error_is_gone_makes_no_setting_better() -> None:
+    """Two weights fall steadily after a jolt: what is left of its error is rounding."""
+    rows = rows_of((1, 0.6), (1, 0.6))
+    for n, end in enumerate((5e-6, 3e-6)):
+        rows[n] = replace(rows[n], velocity=(0.4, end), halves={"velocity": (0.4, end)})
+    assert judged(rows).verdict.better is None
+
+
 def test_what_is_not_resolved_makes_no_setting_better() -> None:
     verdict = judged(rows_of((1, 2.0), (0.5, 2.0)), least_seen=2.0).verdict
     assert verdict.better is None and not verdict.on_front

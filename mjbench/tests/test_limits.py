@@ -37,6 +37,8 @@ def test_where_digits_do_not_hold_the_least_limit_is_given_and_why() -> None:
     assert limit_text(all_of_own) == "500 s; from its own start 1000 s"
     none = replace(ROW, bracket=(0.0, 25.44))
     assert limit_text(none) == "none from every start; from its own 25 s"
+    nowhere = replace(ROW, largest="none", bracket=(0.0, 0.0))
+    assert limit_text(nowhere) == "none from 1 s on"
     near = StableRow("RK4", 0.056, (0.1, 1.0), None, 1.0, 8, 8, None, (0.05502, 0.05656))
     assert limit_text(near).startswith("55 ms; "), "not 60 ms"
 

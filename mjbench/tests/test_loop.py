@@ -167,7 +167,7 @@ def growth(period: float, late: int) -> float:
         (POLICY, ["--engines"], "other engines are measured without controller, task and profile"),
         (POLICY, ["--task", "t"], "no sensor, site or body `t`"),
         (POLICY, ["--task", "shake"], "the sensor `shake` reads what commands do"),
-        ("def control(m, d): return [0, 0]", ["--period", "1"], "gives 2 commands, and the model"),
+        ("def control(m, d): return [0, 0]", ["--period", "1"], "number of commands is 1, and"),
         ("def control(m, d): d.body('z')", ["--period", "1"], "fails at 0 s: KeyError"),
         (
             "def control(m, d): return float('nan') if d.time else 0",

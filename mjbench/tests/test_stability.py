@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import mujoco
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
@@ -32,6 +33,7 @@ from mjbench.stability import (
     stable_rows,
     with_energy_bound,
 )
+from mjbench.stability_runs import KeptMotion, run_trial
 
 pytestmark = pytest.mark.long
 
@@ -349,6 +351,20 @@ def test_a_motion_that_dies_is_not_near_however_small_it_was() -> None:
     discrete = rows_of(TOPPLING.format("1e8"), qpos=(0.005, 0.0), search=(2e-4, 1e-2))["discrete"]
     assert discrete.largest == "all"
     assert discrete.near == "none" and "/ 0.00299 m at " in discrete.near_reason
+
+
+def test_commands_that_come_late_are_told() -> None:
+    """They change at 0.2 s: a step of 0.03 s begins at 0.21 s."""
+    xml = """<mujoco><option timestep="{}" gravity="0 0 0"/><worldbody><body>
+    <joint name="x" type="slide"/><geom size=".1" mass="1"/></body></worldbody>
+    <actuator><motor joint="x"/></actuator></mujoco>"""
+    scenario = Scenario(0.4, 0.1, (0.0,), (0.0,), controls=((10.0,), (-10.0,)), hold=0.2)
+    setup = Setup(scenario=scenario)
+    models = {h: mujoco.MjModel.from_xml_string(xml.format(h)) for h in (1e-4, 0.02, 0.03)}
+    motion = KeptMotion(simulate(setup, models[1e-4]).states, np.array([1e-3]), "0.001 m")
+    texts = {h: run_trial(setup, models[h], 0.4, motion).astray for h in (0.02, 0.03)}
+    assert texts[0.02] == "off by 0.001 m at 0.1 s"
+    assert texts[0.03] == "off by 0.001 m at 0.09 s, with commands up to a step late"
 
 
 def test_energy_that_cannot_be_is_instability() -> None:

@@ -1,4 +1,4 @@
-"""What takes no part in what a scene shows, as far as runs can say: bodies, joints, couplings.
+"""What takes no part in what a scene shows, as far as runs can say: bodies and couplings.
 
 1. What touched a body that can move and is left, at any time and along any chain, is no candidate,
    however little that seems to have changed.
@@ -7,26 +7,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from typing import Any
+from collections.abc import Collection
 
 import mujoco
 import numpy as np
-from msgspec.structs import replace
 
-from mjbench.pilot import scales
-from mjbench.problem import Array, Scenario
+from mjbench.problem import Scenario
 from mjbench.pruning.candidates import (
     Item,
     commanded_actuators,
     display_name,
     is_forceless_tendon,
 )
-from mjbench.pruning.comparison import ALIKE, WatchedRun, watch
-from mjbench.pruning.model_text import ModelText, section_of, thing_kind
-from mjbench.pruning.xml_edits import Element, ModelEdit, set_attributes
-from mjbench.reports.diet_report import name_list
-from mjbench.scene import Scene
+from mjbench.pruning.comparison import WatchedRun
+from mjbench.pruning.model_text import ModelText, section_of
+from mjbench.pruning.xml_edits import Element
 from mjbench.simulation import initial_data
 
 
@@ -143,98 +138,10 @@ def _users(
 
 
 _USERS = ("sensor", "actuator", "equality")
-_OF_JOINTS, _OF_TENDONS = "joint joint1 joint2 jointinparent", "tendon tendon1 tendon2"
-"""Attributes that refer to joints, and to tendons."""
-_TURNS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
-"""Attributes by which a body is turned."""
+_OF_TENDONS = "tendon tendon1 tendon2"
+"""Attributes that refer to tendons."""
 _STILL = 1e-9
-"""rad or m: a joint that begins so near to where it is drawn needs no other drawing."""
-
-
-def resting_joints(text: ModelText, runs: Sequence[WatchedRun]) -> list[Item]:
-    """The joints of each body that never move, though they might: without them it is welded.
-
-    Where a rest is only luck, as that of a pole on its tip, a start that is off by a millionth
-    shows it.
-    """
-    model = text.model
-    if not runs or not model.nv:
-        return []
-    still = np.all(
-        [run.displacements <= ALIKE * _visible(model, run.scene) for run in runs], axis=0
-    )
-    for run in runs:
-        nudged = initial_data(run.scene.scenario, model)
-        off = _LUCK * np.random.default_rng(3).choice((-1.0, 1.0), model.nv) * still
-        mujoco.mj_integratePos(model, nudged.qpos, off, 1.0)
-        scenario = replace(run.scene.scenario, qpos=tuple(nudged.qpos))
-        run = watch(model, replace(run.scene, scenario=scenario))
-        still &= run.displacements <= ALIKE * _visible(model, run.scene)
-    starts = [initial_data(run.scene.scenario, model).qpos for run in runs]
-    items = []
-    for body, body_ids in text.things("body"):
-        joints = {}
-        for joint in body.children:
-            ids = text.ids(joint) if thing_kind(joint) == "joint" else ()
-            if ids and all(np.all(still[model.dof_jntid == i]) for i in ids):
-                joints[joint] = ids
-        bent_joints = [
-            joint for joint in joints if _is_drawn_elsewhere(model, joints[joint], starts)
-        ]
-        edits: tuple[ModelEdit, ...] = ()
-        if bent_joints and (
-            len(body_ids) != 1
-            or len(joints) < int(model.body_jntnum[body_ids[0]])
-            or body.parent is None
-            or body.parent.tag not in ("body", "worldbody")
-            or any(np.max(np.abs(start - starts[0])) > _STILL for start in starts)
-        ):
-            joints = {joint: ids for joint, ids in joints.items() if joint not in bent_joints}
-        elif bent_joints:
-            edits = _draw_at(model, body, body_ids[0], starts[0])
-        if joints:
-            users = [u for joint in joints for u in _users(text, joint, _USERS, _OF_JOINTS)]
-            name = name_list([display_name(joint) for joint in joints])
-            drops = tuple((body, turn) for turn in _TURNS[1:] if edits and body.attribute(turn))
-            removals = (*joints, *users)
-            items.append(Item("resting-joint", name, next(iter(joints)), removals, drops, edits))
-    return items
-
-
-_LUCK = 1e-6
-"""rad or m: by how much joints that rest are off where their rest is tried."""
-
-
-def _visible(model: Any, scene: Scene) -> Array:
-    """What is just visible of each degree of freedom (nv,): rad, or m."""
-    angle = np.radians(scene.bench.visible_angle)
-    units = scales(model)
-    return np.where(units == 1.0, angle, scene.bench.visible * units)
-
-
-def _is_drawn_elsewhere(model: Any, ids: Iterable[int], starts: Iterable[Any]) -> bool:
-    """Whether one of these joints begins elsewhere than the model is drawn."""
-    off = np.zeros(model.nv)
-    for start in starts:
-        mujoco.mj_differentiatePos(model, off, 1.0, model.qpos0, start)
-        if any(np.max(np.abs(off[model.dof_jntid == i])) > _STILL for i in ids):
-            return True
-    return False
-
-
-def _draw_at(model: Any, body: Element, number: int, start: Any) -> tuple[ModelEdit, ...]:
-    """Draw a body where it is at the beginning."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = start
-    mujoco.mj_kinematics(model, data)
-    parent = int(model.body_parentid[number])
-    back, place, turn = np.zeros(4), np.zeros(3), np.zeros(4)
-    mujoco.mju_negQuat(back, data.xquat[parent])
-    mujoco.mju_rotVecQuat(place, data.xpos[number] - data.xpos[parent], back)
-    mujoco.mju_mulQuat(turn, back, data.xquat[number])
-    values = {"pos": place, "quat": turn}
-    texts = [(key, " ".join(f"{x:.17g}" for x in value)) for key, value in values.items()]
-    return set_attributes(body, texts)
+"""rad or m: a joint that begins so near to where it is drawn is not placed by a scenario."""
 
 
 def couplings(text: ModelText) -> list[Item]:

@@ -2,8 +2,8 @@
 
 1. The proof of a kind holds only if MuJoCo compiles the model without the thing, so that no other
    element refers to it. The survey checks that nothing else in the compiled model changes.
-2. What has no proof is tried by running. The integrator and the timestep are not candidates: they
-   change an error, which is judged against a reference, never against the model.
+2. What has no proof is tried by running. Integrator, timestep and solver are not candidates: they
+   change an error, which `bench` judges against a reference, never against the model.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from mjbench.pruning.reachability import (
     Pair,
     find_separate,
     hull_distance,
-    is_enclosed,
     iterate_pairs,
 )
 from mjbench.pruning.xml_edits import (
@@ -129,21 +128,10 @@ KINDS = {
     "collision-idle": FindingKind(
         "contacts are searched for on the {}, and nothing touched there", "geom"
     ),
-    "resting-joint": FindingKind("nothing moved in the {}", "joint", "Joint"),
     "coupling-idle": FindingKind("what the scene shows is the same without the {}", "coupling"),
-    "geom-inside": FindingKind("another geom of its body encloses the {}", "geom", "Geom"),
     "mesh-primitive": FindingKind(
         "a simple shape can stand for the mesh of the {}", "geom", "Geom"
     ),
-    "sleep": FindingKind("bodies at rest can sleep"),
-    "island": FindingKind("all constraints can be solved at once, without islands"),
-    "multiccd": FindingKind("one contact at a time between two meshes suffices"),
-    "solver": FindingKind("the solver {} suffices"),
-    "cone": FindingKind("{} friction cones suffice"),
-    "jacobian": FindingKind("{} Jacobians suffice"),
-    "iterations": FindingKind("{} iterations of the solver suffice"),
-    "tolerance": FindingKind("a solver tolerance of {} suffices"),
-    "noslip_iterations": FindingKind("the solver needs no iterations against slip"),
 }
 """What uses other things comes before them, so that they can go with it."""
 
@@ -321,26 +309,6 @@ def _without_contact(
     ]
 
 
-def inner_geoms(text: ModelText) -> list[Item]:
-    """Geoms that lie wholly inside another one of their body, and collide as it does.
-
-    One that has mass only stops colliding.
-    """
-    model, items = text.model, []
-    for element, ids in text.things("geom"):
-        if not all(is_enclosed(model, i) for i in ids):
-            continue
-        body = element.parent
-        has_inertia = body is not None and any(child.tag == "inertial" for child in body.children)
-        if has_inertia or (element.get("mass") or element.get("density")) == "0":
-            removals = (element,)
-            items.append(Item("geom-inside", display_name(element), element, removals))
-        elif any(model.geom_contype[i] or model.geom_conaffinity[i] for i in ids):
-            edits = set_attributes(element, _UNTOUCHABLE)
-            items.append(Item("geom-inside", display_name(element), element, edits=edits))
-    return items
-
-
 def contact_of_rest(text: ModelText, items: Sequence[Item]) -> list[Item]:
     """Contact as a whole, together with items without which nothing may touch any more."""
     can_touch = text.model.nflex or next(iterate_pairs(text.model), None)
@@ -390,53 +358,3 @@ def primitive_meshes(text: ModelText) -> list[Item]:
             if off < _FIT * min(model.geom_rbound[i] for i in ids):
                 items.append(Item("mesh-primitive", name, element, edits=edits))
     return items
-
-
-_OTHER_SETTINGS = (
-    ("flag", "sleep", "enable"),
-    ("flag", "island", "disable"),
-    ("flag", "multiccd", "disable"),
-    ("option", "solver", "Newton"),
-    ("option", "solver", "CG"),
-    ("option", "cone", "pyramidal"),
-    ("option", "cone", "elliptic"),
-    ("option", "jacobian", "dense"),
-    ("option", "jacobian", "sparse"),
-    ("option", "iterations", "10"),
-    ("option", "tolerance", "1e-6"),
-    ("option", "noslip_iterations", "0"),
-)
-
-SETTINGS = frozenset(name for _, name, _ in _OTHER_SETTINGS)
-"""Kinds of findings that are about settings rather than things."""
-
-
-def other_settings(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
-    """Other solver settings, for a model in which a constraint was ever active.
-
-    None is the model's own, or asks for more work.
-    """
-    if not any(run.constrained for run in runs):
-        return []
-    option = text.model.opt
-    is_spared = {
-        "iterations": option.iterations <= 10,
-        "tolerance": option.tolerance >= 1e-6,
-        "noslip_iterations": option.noslip_iterations == 0,
-        "multiccd": bool(option.disableflags & int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)),
-        "island": bool(option.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ISLAND)),
-        "sleep": bool(option.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP)),
-    }
-    own_names = {
-        name: kind(getattr(option, name)).name.rpartition("_")[2]
-        for name, kind in (
-            ("solver", mujoco.mjtSolver),
-            ("cone", mujoco.mjtCone),
-            ("jacobian", mujoco.mjtJacobian),
-        )
-    }
-    return [
-        Item(name, value, None, edits=set_option(text.main, tag, name, value))
-        for tag, name, value in _OTHER_SETTINGS
-        if not is_spared.get(name, False) and value.upper() != own_names.get(name)
-    ]

@@ -185,8 +185,6 @@ class WatchedRun(Struct, frozen=True, eq=False):
     judgement: RunJudgement
     touching_pairs: frozenset[tuple[int, int]]
     """Pairs of geoms between which there was a contact that counts."""
-    constrained: bool
-    """Whether a constraint was ever active."""
     displacements: Array
     """(nv,): how far each degree of freedom was from its beginning, at most."""
     speeds: Array
@@ -206,14 +204,13 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
     displacements, speeds = np.zeros(model.nv), np.zeros(model.nv)
     steps_made, horizon = 0, math.inf
     touching: set[tuple[int, int]] = set()
-    peaks, constrained, passages = Peaks(), False, Passages(model)
+    peaks, passages = Peaks(), Passages(model)
     gauge = _Gauge(model, model, index_map(model, {}), scene)
     for inputs in scene.scenario.inputs(scene.timestep):
         inputs.give(data)
         inputs.give(twin)
         advance(model, data)
         steps_made += 1
-        constrained = constrained or data.nefc > 0
         if data.ncon:
             pairs = data.contact.geom[data.contact.exclude == 0]  # none has a force within its gap
             touching |= {(min(p), max(p)) for p in pairs.tolist() if min(p) >= 0}
@@ -235,7 +232,7 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
         passages.setup = setup
     elapsed = steps_made * scene.timestep
     judgement = judge(model, data, elapsed, peaks, setup, passages.texts())
-    observations = frozenset(touching), constrained, displacements, speeds, horizon
+    observations = frozenset(touching), displacements, speeds, horizon
     return WatchedRun(scene, judgement, *observations)
 
 

@@ -205,77 +205,11 @@ def find_separate(model: Any, pairs: Iterable[Pair]) -> frozenset[Pair]:
     return frozenset(pair for pair in pairs if reach.are_separate(*pair))
 
 
-def is_enclosed(model: Any, inner: int) -> bool:
-    """Whether a geom lies inside another one of its body."""
-    centre, turn = model.geom_pos[inner], np.zeros(9)
-    mujoco.mju_quat2Mat(turn, model.geom_quat[inner])
-    points, radius = _outline(model, inner)
-    points = centre + points @ turn.reshape(3, 3).T
-    for outer in np.flatnonzero(model.geom_bodyid == model.geom_bodyid[inner]):
-        masks = (model.geom_contype, model.geom_conaffinity)
-        if outer == inner or any(mask[outer] & mask[inner] != mask[inner] for mask in masks):
-            continue
-        mujoco.mju_quat2Mat(turn, model.geom_quat[outer])
-        local = (points - model.geom_pos[outer]) @ turn.reshape(3, 3)
-        if len(points) and depths(model, int(outer), local).min() >= radius:
-            return True
-    return False
-
-
-_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
-
-
-def _outline(model: Any, geom: int) -> tuple[Vector, float]:
-    """Points (n, 3) in a geom's frame, and a radius about them, whose hull contains it."""
-    size = model.geom_size[geom]
-    match mujoco.mjtGeom(int(model.geom_type[geom])):
-        case mujoco.mjtGeom.mjGEOM_SPHERE:
-            return np.zeros((1, 3)), float(size[0])
-        case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            return np.array([[0, 0, -size[1]], [0, 0, size[1]]]), float(size[0])
-        case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return _CORNERS * (size[0], size[0], size[1]), 0.0
-        case mujoco.mjtGeom.mjGEOM_BOX | mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-            return _CORNERS * size, 0.0
-        case mujoco.mjtGeom.mjGEOM_MESH:
-            return mesh_vertices(model, int(model.geom_dataid[geom])), 0.0
-        case _:
-            return np.zeros((0, 3)), 0.0
-
-
 def mesh_vertices(model: Any, mesh: int) -> Vector:
     """The vertices (n, 3) of a mesh, in its own frame, m."""
     first = int(model.mesh_vertadr[mesh])
     vertices: Vector = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])]
     return vertices.astype(np.float64)
-
-
-def depths(model: Any, geom: int, points: Vector) -> Vector:
-    """How deep points (n, 3), in a geom's frame, lie in it, m; negative for those outside."""
-    size, distances = model.geom_size[geom], np.abs(points)
-    radial = np.linalg.norm(points[:, :2], axis=1)
-    match mujoco.mjtGeom(int(model.geom_type[geom])):
-        case mujoco.mjtGeom.mjGEOM_SPHERE:
-            return np.asarray(size[0] - np.linalg.norm(points, axis=1))
-        case mujoco.mjtGeom.mjGEOM_BOX:
-            return np.asarray((size - distances).min(axis=1))
-        case mujoco.mjtGeom.mjGEOM_CAPSULE:
-            excess = np.maximum(distances[:, 2] - size[1], 0.0)
-            return np.asarray(size[0] - np.hypot(radial, excess))
-        case mujoco.mjtGeom.mjGEOM_CYLINDER:
-            return np.asarray(np.minimum(size[0] - radial, size[1] - distances[:, 2]))
-        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:  # not less than it is
-            return np.asarray((1 - np.linalg.norm(points / size, axis=1)) * size.min())
-        case mujoco.mjtGeom.mjGEOM_MESH:  # of its hull, which is what collides
-            mesh = int(model.geom_dataid[geom])
-            first, count = int(model.mesh_polyadr[mesh]), int(model.mesh_polynum[mesh])
-            faces = slice(first, first + count)
-            normals = model.mesh_polynormal[faces].astype(np.float64)
-            corners = model.mesh_polyvert[model.mesh_polyvertadr[faces]]
-            heights = (normals * mesh_vertices(model, mesh)[corners]).sum(axis=1)
-            return np.asarray((heights - points @ normals.T).min(axis=1, initial=np.inf))
-        case _:
-            return np.full(len(points), -np.inf)
 
 
 def hull_distance(model: Any, variant: Any, geom: int) -> float:

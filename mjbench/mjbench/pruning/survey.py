@@ -5,7 +5,6 @@
 2. What is *proved* needless goes first, then far bodies. All else is tried in what is left: as much
    of each kind is taken out as changes no motion, and only the time that it saves speaks for it.
 3. Scripts and labs of the course run with what is left: what changes their output is no finding.
-   Other settings, with which they compute other digits, are tried in the scenarios alone.
 """
 
 from __future__ import annotations
@@ -20,15 +19,13 @@ from msgspec.structs import replace
 
 from mjbench.costs import Clock
 from mjbench.machine import Machine
-from mjbench.pruning.bystanders import couplings, far_bodies, resting_joints
+from mjbench.pruning.bystanders import couplings, far_bodies
 from mjbench.pruning.candidates import (
     KINDS,
     Item,
     contact_of_rest,
     idle_contacts,
-    inner_geoms,
     message_of,
-    other_settings,
     primitive_meshes,
     unreachable_contacts,
     unread_elements,
@@ -160,24 +157,20 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         text, runs = self.text, self.trials.runs
         groups = self._settle(self._prove())
         proved = {item.element for group in groups for item in group.items}
-        self.tell("what never moves")
+        self.tell("what the scene is not about")
         names = {name for reader in self.readers for name in reader.names}
         scenarios = [run.scene.scenario for run in self.good_runs]
         far_items = far_bodies(text, names, scenarios, runs)
         groups += self._settle(self._try_by_running([far_items]))
-        candidates = [
-            resting_joints(text, self.good_runs),
-            [item for item in couplings(text) if item.element not in proved],
-        ]
+        candidates = [[item for item in couplings(text) if item.element not in proved]]
         if not any(group.finding.kind == "contact-off" for group in groups):
-            candidates += [idle_contacts(text, runs), inner_geoms(text), primitive_meshes(text)]
+            candidates += [idle_contacts(text, runs), primitive_meshes(text)]
         groups += self._try_by_running(candidates)
-        kinds = ("far-body", "resting-joint", "coupling-idle")
+        kinds = ("far-body", "coupling-idle")
         removed_items = [i for group in groups for i in group.items if i.kind in kinds]
         if not any(group.finding.kind in ("contact-off", "contact-idle") for group in groups):
             groups += self._try_by_running([contact_of_rest(text, removed_items)])
         groups = self._confirm(groups)
-        groups += self._try_by_running([item] for item in other_settings(text, runs))
         self.tell("all together")
         fixable = [item for group in groups if group.finding.fixable for item in group.items]
         fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None

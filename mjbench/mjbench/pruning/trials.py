@@ -11,7 +11,7 @@ import numpy as np
 from msgspec import Struct
 
 from mjbench.costs import Clock, Job, Timing, scenario_job, time_jobs
-from mjbench.pruning.candidates import KINDS, SETTINGS, Item
+from mjbench.pruning.candidates import KINDS, Item
 from mjbench.pruning.comparison import (
     ALIKE,
     KEY_SIZES,
@@ -220,18 +220,8 @@ class PruningTrials(Struct, eq=False, dict=True):
 
         groups = [group for group in groups if group.finding.difference < ALIKE]
         by_time = sorted(groups, key=lambda group: -(group.finding.saving.time or 0.0))
-        best = largest_subset(
-            [group for group in by_time if group.finding.kind not in SETTINGS], moves_alike
-        )
+        best = largest_subset(by_time, moves_alike)
         trial = self._prune_groups(best)
-        # What is quicker in the whole model need not be so in what is left of it.
-        for group in by_time:
-            variant = self._prune_groups([*best, group]) if group.finding.kind in SETTINGS else None
-            if variant is None or trial is None or not moves_alike([*best, group]):
-                continue
-            saving = self.measure_saving(variant.edits, variant, trial)
-            if saving.certain and (saving.time or 0.0) > 1.0:
-                best, trial = [*best, group], variant
         result = self.compare(trial, self.whole) if best and trial else None
         if trial is None or result is None:
             return None, None

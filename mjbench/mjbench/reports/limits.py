@@ -25,7 +25,7 @@ def limit_text(row: StableRow) -> str:
     least limit, and what allows more is said: the own start, theory, or elsewhere, another start or
     another time.
     """
-    if row.bracket is None:
+    if row.bracket is None or row.largest == "none":
         return reach_text(row.largest, row.searched)
     low, high = row.bracket
     if row.islands is not None:

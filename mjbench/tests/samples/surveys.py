@@ -8,7 +8,6 @@ import mujoco
 
 from mjbench.costs import Clock
 from mjbench.declarations import Declarations, parse_declarations
-from mjbench.pruning.candidates import SETTINGS
 from mjbench.pruning.comparison import pruning_scenes
 from mjbench.pruning.model_text import ModelText, open_model
 from mjbench.pruning.readers import read_code
@@ -104,11 +103,10 @@ def run_survey(
 
 
 def findings_by_kind(survey: Survey) -> dict[str, Finding]:
-    """The findings that are not about settings, by kind; without timing these are all findings."""
-    things = [content for content in survey.report.findings if content.kind not in SETTINGS]
-    kinds = [content.kind for content in things]
-    assert len(set(kinds)) == len(kinds)
-    return {content.kind: content for content in things}
+    """The findings by kind."""
+    findings = {finding.kind: finding for finding in survey.report.findings}
+    assert len(findings) == len(survey.report.findings)
+    return findings
 
 
 def names(finding: Finding) -> list[str]:
