@@ -3,9 +3,9 @@
 Run: python benchmarks/mistakes.py [--seed 37 …] [--count 1200] [--kinds KIND …] [--jobs 2]
          [--course DIR] [--list END …] [--minutes N]
 
-The course is verified once. Then each change of a lesson, a page, the map or what is declared of a
-model is checked in memory, in a copy of the course; of scripts and labs those run whose text has
-changed. A change ends in one of these ways:
+The course is verified once, in its folder, where results are known. Then each change of a
+lesson, a page, the map or what is declared of a model is checked in memory, in a copy of the
+course; of scripts and labs those run whose text has changed. A change ends in one of these ways:
 
 - at its place: a message names a changed line, or the one before or after it;
 - in its result: what runs was changed, and a message names what came of it, such as the output;
@@ -54,7 +54,7 @@ from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
 from coursebuild.pipeline.check import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
 from coursebuild.pipeline.proofs import find_losses, find_proofs  # noqa: E402
-from coursebuild.pipeline.verify import verify  # noqa: E402
+from coursebuild.pipeline.verify import Verification, verify  # noqa: E402
 from coursebuild.preview.run_history import script_keys  # noqa: E402
 from coursebuild.preview.session import Session  # noqa: E402
 
@@ -88,16 +88,14 @@ class Outcome(Struct, frozen=True):
 class Checker:
     """A course in memory in which changes are checked, one after the other."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, verification: Verification) -> None:
         self.server = ScriptServer()
-        self.seconds = 600.0  # of the course as it is, whatever else this machine does
         self.options = Options(root, 1, open_store(root, None, None), run_all=self._run)
         self.session = Session(self.options)
         self.session.read()
         course = self._course
-        self.verification = verify(course, self.options)
-        self.seconds = SECONDS
-        self.session.take_results(course, self.verification)
+        self.verification = verification
+        self.session.take_results(course, verification)
         report = judge(course, self.session.diagnostics())
         findings = report.diagnostics
         self.hints = Counter(map(_identity, report.hints))
@@ -127,7 +125,7 @@ class Checker:
         return self.session.course
 
     def _run(self, root: Path, jobs: Sequence[ScriptJob], **keywords: Any) -> tuple[ScriptRun, ...]:
-        jobs = [replace(job, timeout=self.seconds) for job in jobs]
+        jobs = [replace(job, timeout=SECONDS) for job in jobs]
         return self.server.run(root, jobs, **keywords)
 
     def check(self, change: Change) -> Outcome:
@@ -242,18 +240,35 @@ _checker: Checker | None = None
 
 def _prepare(course: Path, top: Path) -> None:
     global _checker
+    verification = verify_course(course)
     folder = Path(tempfile.mkdtemp(dir=top)) / "course"
     copy_course(course, folder)
-    _checker = Checker(folder)
+    _checker = Checker(folder, verification)
     _checker.draw()
 
 
+def verify_course(root: Path) -> Verification:
+    """Verify a course as it is: in a copy, scripts that import its modules would run again."""
+    server = ScriptServer()
+    options = Options(root, 1, open_store(root, None, None), run_all=server.run)
+    session = Session(options)
+    session.read()
+    assert session.course is not None
+    verification = verify(session.course, options)
+    session.close()
+    server.close()
+    options.store.close()
+    return verification
+
+
 def copy_course(course: Path, folder: Path) -> None:
-    """Copy what belongs to a course, with the results of its scripts."""
+    """Copy what belongs to a course, with what is known of its texts and labs."""
     names = (*"content models lib runs docs plugins mjcourse examples".split(), FOLDER)
+    of_site = shutil.ignore_patterns("pages", "published", "pictures", "exports", "compressed")
     for name in names:
         if (course / name).is_dir():
-            shutil.copytree(course / name, folder / name, symlinks=True)
+            ignore = of_site if name == FOLDER else None
+            shutil.copytree(course / name, folder / name, symlinks=True, ignore=ignore)
     for file in course.iterdir():
         if file.is_file():
             shutil.copy(file, folder / file.name)
