@@ -37,7 +37,7 @@ _BASES = {
     "rad": "angle",
     "cycle": "cycle",
 }
-TURNS = ("angle", "cycle")
+_TURNS = ("angle", "cycle")
 """Numbers by their dimension; they tell hertz from radians per second."""
 _PREFIXES = {
     **dict(zip(("da", *"hkMGTPEZYRQ"), (1, 2, *range(3, 31, 3)), strict=True)),
@@ -104,7 +104,7 @@ class Unit(Struct, frozen=True):
     @property
     def dimension(self) -> Dimension:
         """The dimension, in which angles and cycles are numbers."""
-        return tuple(power for power in self.powers if power[0] not in TURNS)
+        return tuple(power for power in self.powers if power[0] not in _TURNS)
 
     def times(self, factor: Unit, power: Fraction | int = 1) -> Unit | None:
         """The product with a power of another unit, of differences on its scale.
@@ -121,7 +121,7 @@ class Unit(Struct, frozen=True):
 
     def is_same(self, unit: Unit) -> bool:
         """Whether it has the size of another unit and measures the same; angles may be left out."""
-        turns = [{name for name, _ in side.powers} & {*TURNS} for side in (self, unit)]
+        turns = [{name for name, _ in side.powers} & {*_TURNS} for side in (self, unit)]
         return (
             (self.size, self.pi, self.zero) == (unit.size, unit.pi, unit.zero)
             and self.dimension == unit.dimension

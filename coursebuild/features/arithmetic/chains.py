@@ -20,7 +20,7 @@ from collections.abc import Collection, Iterator, Mapping
 from msgspec.structs import replace
 
 from coursebuild.core.text.unit_table import UNITS
-from coursebuild.core.text.units import TURNS, find_units
+from coursebuild.core.text.units import find_units
 from coursebuild.features.arithmetic.evaluate import (
     ORDERS,
     UNDECIDED,
@@ -132,8 +132,8 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
     if _may_hold(sides, relation):
         return "its unit may be that of another part"
     units = (part.text for side in sides for part in side.walk() if part.kind == "unit")
-    turns = [{n for u in find_units(text) for n, _ in u.powers} & {*TURNS} for text in units]
-    if all({name} in turns for name in TURNS):
+    turns = [{n for u in find_units(t) for n, _ in u.powers} & {"angle", "cycle"} for t in units]
+    if {"angle"} in turns and {"cycle"} in turns:
         return "turns stand beside angles"
     if relation == "≈":
         return ""
