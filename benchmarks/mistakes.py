@@ -250,9 +250,10 @@ _checker: Checker | None = None
 
 def _prepare(course: Path, top: Path, count: int | None, seed: int) -> None:
     global _checker
-    verification, chosen = verify_course(course, count, seed)
     folder = Path(tempfile.mkdtemp(dir=top)) / "course"
     copy_course(course, folder)
+    has_results = (course / FOLDER).is_dir()
+    verification, chosen = verify_course(course if has_results else folder, count, seed)
     _checker = Checker(folder, verification, chosen)
     _checker.draw()
 
