@@ -1,11 +1,11 @@
 """Change a course in small ways as hands do, check each change, and count what nobody is told of.
 
 Run: python benchmarks/mistakes.py [--seed 37 …] [--count 1200] [--kinds KIND …] [--jobs 2]
-         [--course DIR] [--list END …] [--minutes N]
+         [--course DIR] [--list END …] [--minutes N] [--lessons N]
 
-The course is verified once. Then each change of a lesson, a page, the map or what is declared of a
-model is checked in memory, in a copy of the course; of scripts and labs those run whose text has
-changed. A change ends in one of these ways:
+The course is verified once, in its folder, where results are known. Then each change of a
+lesson, a page, the map or what is declared of a model is checked in memory, in a copy of the
+course; of scripts and labs those run whose text has changed. A change ends in one of these ways:
 
 - at its place: a message names a changed line, or the one before or after it;
 - in its result: what runs was changed, and a message names what came of it, such as the output;
@@ -15,6 +15,9 @@ changed. A change ends in one of these ways:
 - same: the pages say the same;
 - prose: only words have changed, which nothing can know to be wrong;
 - silent: all others. They are listed.
+
+With `--lessons` only so many lessons and pages, drawn by the first seed, are verified, changed and
+compared, besides the map and models; what a change of these breaks elsewhere is then not noticed.
 
 Nothing excuses a silence: which slips could not be known either, a reader of the list decides.
 Beside the silence stand the false alarms that it was bought with: those of `corpus.py --record`.
@@ -54,7 +57,7 @@ from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
 from coursebuild.pipeline.check import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
 from coursebuild.pipeline.proofs import find_losses, find_proofs  # noqa: E402
-from coursebuild.pipeline.verify import verify  # noqa: E402
+from coursebuild.pipeline.verify import Verification, verify  # noqa: E402
 from coursebuild.preview.run_history import script_keys  # noqa: E402
 from coursebuild.preview.session import Session  # noqa: E402
 
@@ -88,16 +91,14 @@ class Outcome(Struct, frozen=True):
 class Checker:
     """A course in memory in which changes are checked, one after the other."""
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, verification: Verification, chosen: frozenset[str]) -> None:
         self.server = ScriptServer()
-        self.seconds = 600.0  # of the course as it is, whatever else this machine does
         self.options = Options(root, 1, open_store(root, None, None), run_all=self._run)
         self.session = Session(self.options)
         self.session.read()
         course = self._course
-        self.verification = verify(course, self.options)
-        self.seconds = SECONDS
-        self.session.take_results(course, self.verification)
+        self.verification = verification
+        self.session.take_results(course, verification)
         report = judge(course, self.session.diagnostics())
         findings = report.diagnostics
         self.hints = Counter(map(_identity, report.hints))
@@ -105,7 +106,12 @@ class Checker:
             raise SystemExit(f"the course has mistakes of its own: {_describe(findings[0])}")
         self.findings = Counter(map(_identity, findings))
         self.texts = {source.path: source.text for source in (course.map, *course.sources)}
-        self.texts = {p: t for p, t in self.texts.items() if p.startswith("content/")}
+        self.chosen = chosen
+        self.texts = {
+            path: text
+            for path, text in self.texts.items()
+            if path in chosen or path == course.map.path
+        }
         self.texts |= {
             path.relative_to(root).as_posix(): path.read_text("utf-8")
             for path in sorted(root.glob("models/*.toml"))
@@ -115,6 +121,7 @@ class Checker:
         self.keys = script_keys(course)
         self.pages: dict[str, bytes] = {}
         self._owner_pages = {owner.path: urls.owner_path(owner) for owner in course.owners}
+        self._other_pages = {page for path, page in self._owner_pages.items() if path not in chosen}
 
     def close(self) -> None:
         self.session.close()
@@ -127,7 +134,7 @@ class Checker:
         return self.session.course
 
     def _run(self, root: Path, jobs: Sequence[ScriptJob], **keywords: Any) -> tuple[ScriptRun, ...]:
-        jobs = [replace(job, timeout=self.seconds) for job in jobs]
+        jobs = [replace(job, timeout=SECONDS) for job in jobs]
         return self.server.run(root, jobs, **keywords)
 
     def check(self, change: Change) -> Outcome:
@@ -175,7 +182,7 @@ class Checker:
             p: run for p, run in self.runs.items() if keys.get(p) == self.keys.get(p)
         }
         is_alone = keys == self.keys and path in self._owner_pages  # no other page can change
-        documents = frozenset([path]) if is_alone else None
+        documents = frozenset([path]) if is_alone else self.chosen
         verification = verify(course, self.options, documents, known_runs=known_runs_by_path)
         if is_alone:
             results = replace(self.verification.results, trials=verification.results.trials)
@@ -207,7 +214,8 @@ class Checker:
 
     def _all_pages(self) -> list[str]:
         assert self.session.library is not None
-        return [entry.path for entry in page_list(self.session.library)]
+        paths = [entry.path for entry in page_list(self.session.library)]
+        return [path for path in paths if path not in self._other_pages]
 
 
 def _identity(diagnostic: Diagnostic) -> tuple[str, str, str]:
@@ -240,20 +248,43 @@ _checker: Checker | None = None
 """That of this process."""
 
 
-def _prepare(course: Path, top: Path) -> None:
+def _prepare(course: Path, top: Path, count: int | None, seed: int) -> None:
     global _checker
     folder = Path(tempfile.mkdtemp(dir=top)) / "course"
     copy_course(course, folder)
-    _checker = Checker(folder)
+    has_results = (course / FOLDER).is_dir()
+    verification, chosen = verify_course(course if has_results else folder, count, seed)
+    _checker = Checker(folder, verification, chosen)
     _checker.draw()
 
 
+def verify_course(root: Path, count: int | None, seed: int) -> tuple[Verification, frozenset[str]]:
+    """Verify so many documents of a course as it is; with their paths.
+
+    In a copy, scripts that import the modules of the course would run again.
+    """
+    server = ScriptServer()
+    options = Options(root, 1, open_store(root, None, None), run_all=server.run)
+    session = Session(options)
+    session.read()
+    assert session.course is not None
+    paths = sorted(document.source.path for document in session.course.documents)
+    paths = paths if count is None else random.Random(seed).sample(paths, min(count, len(paths)))
+    verification = verify(session.course, options, frozenset(paths))
+    session.close()
+    server.close()
+    options.store.close()
+    return verification, frozenset(paths)
+
+
 def copy_course(course: Path, folder: Path) -> None:
-    """Copy what belongs to a course, with the results of its scripts."""
+    """Copy what belongs to a course, with what is known of its texts and labs."""
     names = (*"content models lib runs docs plugins mjcourse examples".split(), FOLDER)
+    of_site = shutil.ignore_patterns("pages", "published", "pictures", "exports", "compressed")
     for name in names:
         if (course / name).is_dir():
-            shutil.copytree(course / name, folder / name, symlinks=True)
+            ignore = of_site if name == FOLDER else None
+            shutil.copytree(course / name, folder / name, symlinks=True, ignore=ignore)
     for file in course.iterdir():
         if file.is_file():
             shutil.copy(file, folder / file.name)
@@ -267,7 +298,12 @@ def _check(kind: str, seed: int, number: int) -> Outcome | None:
 
 
 def run(
-    course: Path, seeds: Sequence[int], count: int, kinds: Sequence[str], jobs: int
+    course: Path,
+    seeds: Sequence[int],
+    count: int,
+    kinds: Sequence[str],
+    jobs: int,
+    lesson_count: int | None = None,
 ) -> Iterator[Outcome]:
     """Check so many changes for each seed, as many of each kind."""
     share_of_kind = max(1, round(count / len(kinds)))
@@ -276,7 +312,8 @@ def run(
     ]
     with tempfile.TemporaryDirectory(prefix="mistakes-", ignore_cleanup_errors=True) as top:
         context = multiprocessing.get_context("fork")  # no V8 runs in this process
-        pool = ProcessPoolExecutor(jobs, context, _prepare, (course, Path(top)))
+        setting = (course, Path(top), lesson_count, seeds[0])
+        pool = ProcessPoolExecutor(jobs, context, _prepare, setting)
         try:
             for outcome in pool.map(_check, *zip(*tasks, strict=True), chunksize=1):
                 if outcome is not None:
@@ -335,13 +372,15 @@ def main() -> int:
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS, metavar="KIND")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--minutes", type=float, default=float("inf"), help="stop after so long")
+    parser.add_argument("--lessons", type=int, help="verify and change so many documents")
     parser.add_argument("--course", type=Path, default=ROOT)
     parser.add_argument("--list", nargs="*", choices=ENDS, default=["silent", "elsewhere"])
     arguments = parser.parse_args()
     course: Path = arguments.course.resolve()
     outcomes: list[Outcome] = []
     began = time.monotonic()
-    for outcome in run(course, arguments.seed, arguments.count, arguments.kinds, arguments.jobs):
+    shares = arguments.kinds, arguments.jobs, arguments.lessons
+    for outcome in run(course, arguments.seed, arguments.count, *shares):
         outcomes.append(outcome)
         if outcome.end in arguments.list:
             old = (course / outcome.change.path).read_text("utf-8")

@@ -91,7 +91,7 @@ def parse_course_map(source: Source) -> Parsed[model.Course | None]:
         *_check_files(decoding),
         *check_settings(root, decoding),
     ]
-    unusable = bool(diagnostics)
+    unusable = any(diagnostic.is_error for diagnostic in diagnostics)
     diagnostics += strays
     diagnostics += _check_prerequisites(
         [lesson for level in levels for lesson in level.lessons],

@@ -46,6 +46,8 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _INVALID = object()
+_MARKUP = re.compile(r"\$[^\s$](?:[^$]*[^\s$])?\$(?!\w)|\*\*[^\s*](?:[^*]*[^\s*])?\*\*(?!\w)")
+"""A formula or strong text, unlike `$5/$6` and `x**2`."""
 _BOUND_NUMBER = re.compile(r"`(?P<text>[^`]+)`\{out\b[^{}]*\}")
 
 
@@ -105,7 +107,7 @@ class _Decoder:
     def decode_value(
         self, node: Node, type: inspect.Type, name: str, remarks: Mapping[str, str] = _NO_REMARKS
     ) -> object:
-        """The value of a node of a declared type; `remarks` are the `extra` of its `Meta`."""
+        """The value of a node of a declared type; `remarks` are what its `Meta` says."""
         extra = type.extra if isinstance(type, inspect.Metadata) else None
         is_bound = isinstance(node, StringNode) and "{out" in node.value
         if isinstance(node, StringNode) and is_bound and (extra or {}).get("text") == "number":
@@ -114,7 +116,8 @@ class _Decoder:
             return self.report_wrong_type(node, type, name)
         match type, node:
             case inspect.Metadata(), _:
-                return self.decode_value(node, type.type, name, type.extra or _NO_REMARKS)
+                remarks = {**(type.extra_json_schema or {}), **(type.extra or {})}
+                return self.decode_value(node, type.type, name, remarks)
             case inspect.StrType(), StringNode():
                 return self.decode_string(node, type, name, remarks)
             case inspect.LiteralType(), StringNode():
@@ -156,6 +159,9 @@ class _Decoder:
             message = f"{format_name(name)} cannot be {format_value(node)}"
             help = f"expected: {remarks.get('expects', '')}"
             return self.report("field-value", node.mark, message, help)
+        if "plain text" in remarks.get("description", "") and (mark := _MARKUP.search(value)):
+            message = f"`{mark[0]}` would be shown as written, in a plain text"
+            self.report("shown-as-written", node.mark, message, "write what readers should see")
         if "text" in remarks:
             self.texts.append((node, remarks["text"]))
         elif (character := REORDERING.search(value)) is not None:

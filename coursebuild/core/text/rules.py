@@ -84,6 +84,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "heading-top": "A lesson has a heading of level 1, or a page has one other than its title.",
         "nesting-deep": "Quotations, lists or footnotes are nested too deeply.",
         "heading-skip": "A heading skips a level.",
+        "shown-as-written": "A character of Markdown would be shown.",
         "heading-empty": "A heading has no text.",
         "heading-attributes": "The attributes after a heading cannot be read.",
         "anchor-repeated": "Two things on a page have the same anchor.",
@@ -242,18 +243,20 @@ GROUPS: dict[str, dict[str, str]] = {
         "package-reduced": "A QTI package cannot hold a question as the page shows it.",
     },
 }
-_WARNINGS = frozenset(
+_MILD: dict[str, Severity] = {"shown-as-written": "hint"}
+_MILD |= dict.fromkeys(
     """
     draft-empty unit-unproven file-unlisted no-scripts theme-contrast template-outdated heading-skip
     markup-foreign math-brackets math-command symbol-repeated footnote-unused image-alt
     recording-loose script-unrepeatable script-penetration script-writes script-connects
     output-ambiguous output-noise report-stale bench-unrecorded lab-penetration lab-reset
     package-reduced
-    """.split()
+    """.split(),
+    "warning",
 )
 
 RULES: dict[str, Rule] = {
-    name: Rule(name, "warning" if name in _WARNINGS else "error", summary)
+    name: Rule(name, _MILD.get(name, "error"), summary)
     for group in GROUPS.values()
     for name, summary in group.items()
 }

@@ -45,10 +45,10 @@ def differentiate(expression: Expression, name: str) -> Expression:
     """
     kind, parts = expression.kind, expression.parts
     start, end = expression.start, expression.end
-    if name not in expression.names():
-        return _number("0", expression)
-    if kind == "symbol":
-        return _number("1", expression)
+    if kind == "symbol" or name not in expression.names():
+        return Expression(
+            "number", start, end, text="1" if kind == "symbol" and expression.text == name else "0"
+        )
     if kind == "derivative":
         return differentiate(differentiate(parts[0], parts[1].text), name)
     if kind == "integral" and len(parts) == 4:
@@ -59,11 +59,12 @@ def differentiate(expression: Expression, name: str) -> Expression:
         return replace(expression, parts=(differentiate(parts[0], name),))
     if kind not in _PARTIAL_DERIVATIVES:
         raise expression.not_understood("its derivative is not known")
-    terms = [
-        Expression("*", start, end, (partial, differentiate(part, name)))
-        for partial, part in zip(_partial_derivatives(expression), parts, strict=True)
-        if name in part.names()
-    ]
+    arguments = dict(zip("uw", parts, strict=False))
+    terms = []
+    for tex, part in zip(_PARTIAL_DERIVATIVES[kind], parts, strict=True):
+        if name in part.names():
+            partial = replace(read_partial(tex).substitute(arguments), start=start, end=end)
+            terms.append(Expression("*", start, end, (partial, differentiate(part, name))))
     return terms[0] if len(terms) == 1 else Expression("+", start, end, tuple(terms))
 
 
@@ -87,19 +88,7 @@ def _differentiate_integral(integral: Expression, name: str) -> Expression:
     return Expression("+", start, end, (total, inner))
 
 
-def _partial_derivatives(expression: Expression) -> tuple[Expression, ...]:
-    arguments = dict(zip("uw", expression.parts, strict=False))
-    return tuple(
-        replace(read_partial(tex).substitute(arguments), start=expression.start, end=expression.end)
-        for tex in _PARTIAL_DERIVATIVES[expression.kind]
-    )
-
-
 @cache
 def read_partial(tex: str) -> Expression:
     """Read an entry of the table."""
     return read_expression(tex, 0, len(tex))
-
-
-def _number(text: str, place: Expression) -> Expression:
-    return Expression("number", place.start, place.end, text=text)

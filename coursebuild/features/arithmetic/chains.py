@@ -20,6 +20,7 @@ from collections.abc import Collection, Iterator, Mapping
 from msgspec.structs import replace
 
 from coursebuild.core.text.unit_table import UNITS
+from coursebuild.core.text.units import find_units
 from coursebuild.features.arithmetic.evaluate import (
     ORDERS,
     UNDECIDED,
@@ -29,7 +30,6 @@ from coursebuild.features.arithmetic.evaluate import (
     choose_rounded,
     describe_dimension,
     evaluate,
-    format_number,
     read_numeral,
     unit_readings,
 )
@@ -37,9 +37,9 @@ from coursebuild.features.arithmetic.expressions import Expression, NotUnderstoo
 from coursebuild.features.arithmetic.statements import (
     FormulaSide,
     Statement,
-    has_plain_comma,
     point_decimals,
     read_statements,
+    second_reading,
 )
 from coursebuild.features.arithmetic.symbol_comparison import (
     NotJudged,
@@ -48,8 +48,6 @@ from coursebuild.features.arithmetic.symbol_comparison import (
     decide,
 )
 from coursebuild.features.arithmetic.tex import CONSTANTS, OF_QUOTIENT
-
-_RELATION = re.compile(r"[=<>≈≤≥≠]|\\(?:approx|sim|le|ge|ne|ll|gg)")
 
 
 @functools.lru_cache(maxsize=1024)
@@ -60,12 +58,12 @@ def check_arithmetic(
 
     `unit`: what follows the formula in the text; `comma`: it may stand before decimals.
     """
-    if not _RELATION.search(tex) or not (symbols or re.search(r"\d", tex)):
+    if not (symbols or re.search(r"\d", tex)):
         return ()
     comparisons = _check_statements(tex, symbols, unit, comma)
     is_wrong = any(comparison.kind == "wrong" for comparison in comparisons)
-    if is_wrong and comma and has_plain_comma(tex):
-        return (FormulaComparison("unread", 0, len(tex), "a comma in it may part two numbers"),)
+    if is_wrong and comma and (reason := second_reading(tex)):
+        return (FormulaComparison("unread", 0, len(tex), reason),)
     if is_wrong and not comma and point_decimals(tex, comma=True) != point_decimals(tex):
         as_decimals = _check_statements(tex, symbols, unit, comma=True)
         if all(comparison.kind != "wrong" for comparison in as_decimals):
@@ -78,13 +76,19 @@ def _check_statements(
 ) -> tuple[FormulaComparison, ...]:
     statements = read_statements(tex, comma)
     by_name = {symbol.name: symbol for symbol in symbols}
-    return tuple(
+    comparisons = tuple(
         comparison
         for statement in statements
         for comparison in _check_chain(
             statement, by_name, unit if statement is statements[-1] else ""
         )
     )
+    rests = [statement.sides[0] for statement in statements if not statement.relations]
+    if any(c.kind == "wrong" for c in comparisons) and any(
+        isinstance(rest.expression, NotUnderstood) for rest in rests
+    ):  # as `\quad(\mathrm{mod}\ 12)` or `\quad\text{is false}`
+        return (FormulaComparison("unread", 0, len(tex), "a part of it may say how it is meant"),)
+    return comparisons
 
 
 def _check_chain(
@@ -124,8 +128,13 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
 
     `0 = 1` ends a proof by contradiction, and of whole numbers `/` may be a division without rest.
     """
-    if _may_hold((left.get_expression(), right.get_expression()), relation):
+    sides = left.get_expression(), right.get_expression()
+    if _may_hold(sides, relation):
         return "its unit may be that of another part"
+    units = (part.text for side in sides for part in side.walk() if part.kind == "unit")
+    turns = [{n for u in find_units(t) for n, _ in u.powers} & {"angle", "cycle"} for t in units]
+    if {"angle"} in turns and {"cycle"} in turns:
+        return "turns stand beside angles"
     if relation == "≈":
         return ""
     first, second = (side.tex[side.start : side.end].strip(" .") for side in (left, right))
@@ -163,8 +172,7 @@ def _strip_unit(expression: Expression, whole: Collection[str] = _OF_ONE_NUMBER)
     kind, parts = expression.kind, expression.parts
     if kind == "-" and len(parts) == 1:
         return replace(expression, parts=(_strip_unit(parts[0], whole),))
-    has_unit = kind == "*" and parts[1].kind == "unit"
-    return parts[0] if has_unit and parts[1].text not in whole else expression
+    return parts[0] if expression.ends_in_unit() and parts[1].text not in whole else expression
 
 
 def _may_hold(sides: tuple[Expression, Expression], relation: str) -> bool:
@@ -236,7 +244,7 @@ def _find_mistake_as_read(
             raise right.not_understood(UNDECIDED)
         if ORDERS[relation](sign, 0) if relation in ORDERS else sign == 0:
             return None
-        numbers = [format_number(value) for value in values]
+        numbers = [f"{value:.10g}" for value in values]
         message = f"{numbers[0]} and {numbers[1]} are not the same"
         if relation in ORDERS:
             message = f"{numbers[0]} {relation} {numbers[1]} does not hold"
@@ -246,7 +254,7 @@ def _find_mistake_as_read(
     if decide(agrees(numeral, value, relation), right):
         return None
     digits = max(numeral.digits + 2, 4)
-    result = format_number(numeral.express(value), digits)
+    result = f"{numeral.express(value):.{digits}g}"
     message = f"the result is {result}, not this"
     is_rounded = numeral.is_whole and relation == "=" and agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""

@@ -2,7 +2,7 @@
 
 Entry points: `evaluate(expression, symbols)`, a value in base units with its dimension;
 `read_numeral(expression)`, a number with its precision, and `agrees`, whether a value is that
-number; `format_number`.
+number.
 
 Results that are too large, or no numbers, are not understood. Sums of different dimensions, and
 functions of an argument with a dimension, are `WrongDimensions`.
@@ -158,7 +158,7 @@ def agrees(numeral: Numeral, value: Real, relation: str) -> bool | None:
     if numeral.is_whole and relation == "=":
         sign = difference.sign()
         return None if sign is None else sign == 0
-    excess = (abs(difference) * Real.of(2) - numeral.step).sign()
+    excess = (difference.abs() * Real.of(2) - numeral.step).sign()
     return None if excess is None else excess <= 0
 
 
@@ -172,11 +172,6 @@ def choose_rounded(numerals: Mapping[int, Numeral], relation: str) -> int:
     if rounded and (relation == "=" or len(sizes) > 1):
         numerals = rounded
     return max(numerals, key=lambda i: (float(numerals[i].step), i))
-
-
-def format_number(value: Real, digits: int = 10) -> str:
-    """Return a value as text."""
-    return f"{value:.{digits}g}"
 
 
 _MAX_CHOICES = 5
@@ -359,12 +354,15 @@ class _Evaluator:
 
     def _beginning(self, expression: Expression) -> Real:
         """Return where the scale begins on which a product is a place, as 25 °C is."""
-        if expression.kind != "*" or expression.parts[1].kind != "unit":
+        if not expression.ends_in_unit():
             return _ZERO
         unit = find_reading(expression.parts[1], self.readings)
         return Real.of(unit.zero) * measure(unit) if unit.zero else _ZERO
 
     def _evaluate_sum(self, expression: Expression) -> PhysicalQuantity:
+        before, last = expression.parts[0], expression.parts[-1]
+        if last.ends_in_unit("%") and not any(part.text == "%" for part in before.walk()):
+            raise last.not_understood("it may be of what stands before it")
         first, *rest = map(self.evaluate, expression.parts)
         if not rest:  # -40 °C is not the opposite of 40 °C
             beginning = self._beginning(expression.parts[0])

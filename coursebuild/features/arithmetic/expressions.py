@@ -45,6 +45,11 @@ class Expression(Struct, frozen=True):
         """Whether this expression is or contains one of these kinds."""
         return any(expression.kind in kinds for expression in self.walk())
 
+    def ends_in_unit(self, *texts: str) -> bool:
+        """Whether this is a number with a unit, or with one of these units."""
+        unit = self.parts[1] if self.kind == "*" else self
+        return unit is not self and unit.kind == "unit" and (not texts or unit.text in texts)
+
     def names(self) -> set[str]:
         """The names of the symbols on which its value depends."""
         if self.kind == "symbol":
@@ -66,19 +71,9 @@ class Expression(Struct, frozen=True):
         return NotUnderstood(reason, self.start, self.end)
 
 
-def join_units(product: Expression, sign: str, factor: Expression) -> Expression:
-    r"""Return a product whose unit goes on behind a sign, as in `5\,\mathrm N\cdot\mathrm m`."""
-    if product.kind != "*" or product.parts[1].kind != "unit":
-        raise factor.not_understood("it may be a symbol")
-    number, unit = product.parts
-    text = f"{unit.text}{'/' if sign == '/' else '·'}{factor.text}"
-    unit = Expression("unit", unit.start, factor.end, text=text)
-    return Expression("*", product.start, factor.end, (number, unit))
-
-
 def is_mixed(left: Expression, right: Expression) -> bool:
-    """Whether this is a mixed number: a number before a fraction of numbers."""
+    r"""Whether this may be one number: `2\tfrac12`; `9.81(2)`, with its uncertainty; `(12)(34)`."""
     is_fraction = right.kind == "/" and all(part.kind == "number" for part in right.parts)
     while left.kind in ("*", "-") and left.parts:
         left = left.parts[-1]
-    return is_fraction and left.kind == "number"
+    return left.kind == "number" and (is_fraction or right.kind == "number")

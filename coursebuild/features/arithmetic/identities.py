@@ -29,7 +29,6 @@ from coursebuild.features.arithmetic.evaluate import (
     WrongDimensions,
     describe_dimension,
     evaluate,
-    format_number,
     has_zero,
 )
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
@@ -189,7 +188,7 @@ def _compare_at(
         raise WrongDimensions(reason, right.start, right.end)
     difference = lhs.value - rhs.value
     if difference.sign():
-        points = ", ".join(f"{name} = {format_number(x.value, 6)}" for name, x in values.items())
+        points = ", ".join(f"{name} = {x.value:.6g}" for name, x in values.items())
         sides = " and ".join(_format_apart(lhs.value, rhs.value))
         raise _Refuted(f"the sides are {sides} where {points}", right.start, right.end)
     if not difference.is_negligible(lhs.value, rhs.value):
@@ -198,7 +197,7 @@ def _compare_at(
 
 def _format_apart(left: Real, right: Real) -> tuple[str, str]:
     """Return two numbers in as many digits as show that they differ."""
-    texts = [(format_number(left, digits), format_number(right, digits)) for digits in (6, 17, 40)]
+    texts = [(f"{left:.{digits}g}", f"{right:.{digits}g}") for digits in (6, 17, 40)]
     return next((pair for pair in texts if Decimal(pair[0]) != Decimal(pair[1])), texts[-1])
 
 

@@ -155,9 +155,6 @@ class Real:
             return Real(ball=self.ball / right.ball)
         return self * Real(_Form(1 / (form.factor * form.radicand), form.radicand, -form.power))
 
-    def __abs__(self) -> Real:
-        return self.abs()
-
     def abs(self, analytic: bool = False) -> Real:
         """Its size; where it must be analytic, no number around zero."""
         if self.form is not None:

@@ -20,6 +20,7 @@ _MAX_LENGTH = 5_000
 _DIGITS = re.compile("[0-9],[0-9]")
 _COMMA = re.compile(r"([0-9]+)\{,\}([0-9]+)")
 _PLAIN_COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")
+_POINT_OF_THOUSANDS = re.compile(r"(?<![0-9.])[1-9][0-9]{0,2}\.[0-9]{3}(?![0-9])")
 _CERTAIN_COMMA = re.compile(r"(?<![0-9.])0\{,\}[0-9]|[0-9]\{,\}(?:[0-9]{1,2}|[0-9]{4,})(?![0-9])")
 """A comma that parts no thousands."""
 _ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x66B: "."}
@@ -117,9 +118,11 @@ def point_decimals(tex: str, comma: bool = False) -> str:
     return _COMMA.sub(r"\1.\2  ", tex) if _CERTAIN_COMMA.search(tex) else tex
 
 
-def has_plain_comma(tex: str) -> bool:
-    """Whether a comma between digits stands in no braces, so that it may part two numbers."""
-    return _PLAIN_COMMA.search(tex) is not None
+def second_reading(tex: str) -> str:
+    """How the signs in numbers may be meant where commas stand before decimals; empty if not."""
+    if _PLAIN_COMMA.search(tex):
+        return "a comma in it may part two numbers"
+    return "a point in it may part thousands" if _POINT_OF_THOUSANDS.search(tex) else ""
 
 
 @lru_cache(maxsize=2048)

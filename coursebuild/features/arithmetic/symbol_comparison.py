@@ -27,7 +27,6 @@ from coursebuild.features.arithmetic.evaluate import (
     choose_rounded,
     describe_dimension,
     evaluate,
-    format_number,
     has_zero,
     measure,
     read_numeral,
@@ -236,7 +235,7 @@ class SymbolComparison:
             if not numerals:
                 if self._is_within_rounding(bare, size):
                     return None
-                numbers = " and ".join(format_number(value) for value in scaled)
+                numbers = " and ".join(f"{value:.10g}" for value in scaled)
                 mistakes.append(self._mistake(1, f"{numbers} are not the same"))
                 continue
             sized = {i: n.scale(size) if i == bare else n for i, n in numerals.items()}
@@ -246,7 +245,7 @@ class SymbolComparison:
             if decide(agrees(numeral, value, self.relation), self.expressions[1]):
                 return None
             digits = max(numeral.digits + 2, 4)
-            result = format_number(numeral.express(value / unit_size), digits)
+            result = f"{numeral.express(value / unit_size):.{digits}g}"
             mistakes.append(self._mistake(index, f"the result is {result}", result))
         return mistakes[0]
 

@@ -5,7 +5,7 @@ Entry point: `read_expression(tex, start, end)`, an `Expression`, by recursive d
 1. Numbers, symbols and groups side by side are a product. A number is `12`, `1\,000`, `1{,}000` or
    `0.5`; `\mathrm{kg}` after it is its unit.
 2. What can be read in two ways is not understood: `a/bc`, `1/2x`, `f(x)`, `2\tfrac12`, `\sin x^2`,
-   `\sin 2\pi/3`, `\sin x\cdot y`.
+   `\sin 2\pi/3`, `\sin x\cdot y`, `9.81(2)`, `\prod_{k=1}^3 k\cdot2`, `5\,\mathrm h(2)`.
 3. Round or square brackets right after a function hold all that it is of: `\cos(x)^2` is the square
    of the cosine. Without brackets it is of the factors that follow, up to the next function.
 4. Digits with a zero before them (`0010`) may be of another base: they have no value.
@@ -17,12 +17,7 @@ import re
 
 from coursebuild.core.checks import formulas
 from coursebuild.core.text.quantities import plain_unit
-from coursebuild.features.arithmetic.expressions import (
-    Expression,
-    NotUnderstood,
-    is_mixed,
-    join_units,
-)
+from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood, is_mixed
 
 CONSTANTS = frozenset((r"\pi", r"\mathrm{e}"))
 """Symbols that stand for fixed numbers."""
@@ -181,8 +176,13 @@ class _Reader:
                 raise self.not_understood("what `/` divides by can be read in two ways")
             start = self.at
             unit = None if sign and sign not in _UNIT_SIGNS else self.unit()
-            if sign and unit is not None:
-                product = join_units(product, sign, unit)
+            if sign and unit is not None:  # as in `5\,\mathrm N\cdot\mathrm m`
+                if not product.ends_in_unit():
+                    raise unit.not_understood("it may be a symbol")
+                number, first = product.parts
+                text = f"{first.text}{'/' if sign == '/' else '·'}{unit.text}"
+                unit = Expression("unit", first.start, self.at, text=text)
+                product = Expression("*", product.start, self.at, (number, unit))
                 continue
             factor = unit
             if factor is None:
@@ -192,12 +192,12 @@ class _Reader:
                     factor = Expression("-", start, self.at, (factor,))
                 is_run = self.tex[start] in ".0123456789"
                 is_run &= SPACE.sub("", self.tex[product.start : start])[-1:] != "!"
-                is_run |= re.search(r"\([0-9]+\)\s*\([0-9]+\)$", self.tex[: self.at]) is not None
                 if not sign and (is_run or is_mixed(product, factor)):
                     raise factor.not_understood("two numbers stand side by side")
                 is_spaced = self.tex[:start].rstrip().endswith(r"\,")
-                if not (sign or is_spaced) and product.kind == "symbol" and self.tex[start] in "([":
-                    # The symbol can be a function of what the bracket holds.
+                is_name = product.kind == "symbol" or product.ends_in_unit()
+                if not (sign or is_spaced) and is_name and self.tex[start] in "([":
+                    # The name can be a function of what the bracket holds.
                     content = factor.parts[0] if factor.kind in ("^", "factorial") else factor
                     if content.kind in ("symbol", "number", "/", "*"):
                         raise content.not_understood("it may be a product or a function of this")
@@ -414,6 +414,12 @@ class _Reader:
         outer, self.indices = self.indices, self.indices | {index.text}
         term = self.product()
         self.indices = outer
+        if name == "prod" and term.kind in ("*", "/"):
+            first, last = term.parts
+            signs = TOKEN.findall(self.tex, first.end, last.start)
+            is_behind = last.kind == "unit" or not {*signs}.isdisjoint(_PRODUCT_SIGNS)
+            if is_behind and not any(part.text == index.text for part in last.walk()):
+                raise last.not_understood("it may be a factor of the product, or of each term")
         return Expression(name, start, self.at, (term, index, limits["_"], limits["^"]))
 
     def function(self, name: str, start: int) -> Expression:

@@ -176,8 +176,5 @@ FEATURE = Feature(
     name="hints",
     check_document=unread_marks,
     check=odd_angles,
-    rules=(
-        Rule("shown-as-written", "hint", "A character of Markdown would be shown."),
-        Rule("angle-unit", "hint", "An angle has the look of degrees where radians are read."),
-    ),
+    rules=(Rule("angle-unit", "hint", "An angle has the look of degrees where radians are read."),),
 )

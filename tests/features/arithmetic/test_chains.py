@@ -243,7 +243,7 @@ m_\text{eff}/m = m_{\text{eff}}/m = 25\,\%
 \frac{v^2}{2 g \ell} - 1 \approx 0.02\,\%
 \tfrac12g\,(0.1\ \mathrm s)^2 = 49.05\ \mathrm{mm}
 g\,(0.1\ \mathrm s)^2 = 0.0981\ \mathrm m
-2(3)(0.5) = 3
+(2 + 1)(0.5) = 1.5
 """
 WRONG = r"""
 T = 2\pi\sqrt{\ell/g} \approx 2.060
@@ -273,6 +273,25 @@ E = 9.81\,m
 y = v + x
 x \to 0
 """
+DOUBTFUL = r"""
+2(3)(0.5) = 3
+9.81(2) = 9.81
+\prod_{k=1}^3 k\cdot 2 = 12
+\prod_{k=1}^3 k\ \mathrm m = 6\ \mathrm m
+200\ \mathrm g + 10\,\% = 220\ \mathrm g
+50\ \mathrm{Hz} = 314.2\ \mathrm{rad/s}
+3\,\mathrm h(2) = 6
+7 + 8 = 3 \quad(\mathrm{mod}\ 12)
+1 + 1 = 3, \quad \text{which is false}
+"""
+
+
+def test_a_form_with_two_readings_is_not_judged() -> None:
+    for tex in DOUBTFUL.strip().splitlines():
+        assert {c.kind for c in check_arithmetic(tex)} <= {"unread"}, tex
+    thousands = check_arithmetic("1.250 + 500 = 1.750", comma=True)
+    assert {c.kind for c in thousands} <= {"unread"}
+    assert {c.kind for c in check_arithmetic("1.250 + 500 = 1.750")} == {"wrong"}
 
 
 def test_symbols_with_values_are_computed_and_units_compared() -> None:

@@ -1,0 +1,1 @@
+"""Formulas that nobody wrote, each with what SymPy says of it."""
