@@ -279,5 +279,5 @@ def test_model_as_large_as_numbers_go_has_no_scale_bar(page: Page) -> None:
     lab_element, text = editor_of(page)
     text.fill('<mujoco><worldbody><geom size="1e308"/></worldbody></mujoco>')
     press(lab_element, "Compile and run")
-    expect(lab_element.locator(".lab-scale")).to_be_hidden()
+    expect(lab_element.locator(".lab-view .lab-scale")).to_be_hidden()
     expect(lab_element).to_have_attribute("data-state", "playing")
