@@ -37,6 +37,7 @@ const FONTS = [
     sheets: { 'opsz.css': ALL, 'opsz-italic.css': ALL },
     whole: false,
   },
+  { name: '@fontsource-variable/source-sans-3', sheets: { 'wght.css': ALL }, whole: false },
   {
     // Its italics have no Greek and no Cyrillic letters, though the package has files of those names.
     name: '@fontsource-variable/source-code-pro',

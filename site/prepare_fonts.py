@@ -26,7 +26,7 @@ from fontTools.varLib import instancer
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from coursebuild.core.pages import theme
 
-WEIGHTS = {theme.TEXT: (400, 700), theme.CODE: (400, 700)}
+WEIGHTS = dict.fromkeys((theme.TEXT, theme.INTERFACE, theme.CODE), (400, 700))
 """The weights that the style sheet uses."""
 RADICAL = "√"
 WIDEST = 1.07
@@ -90,11 +90,10 @@ def prepare(folder: Path, cuts: Path) -> None:
         face["file"] = source.with_suffix(".ttf").name
         data = source.read_bytes()
         source.unlink()
-        with TTFont(io.BytesIO(data)) as whole:
-            face["measure"] = theme.measure_font(whole)
         weights = WEIGHTS.get(face["family"])
         face["weight"] = weights or face["weight"]
         with prepare_font(data, weights) as font:
+            face["measure"] = theme.measure_font(font)
             characters = "".join(sorted(map(chr, font.getBestCmap())))
             face["characters"] = theme.unicode_range(characters)
             font.save(folder / face["file"])
@@ -113,7 +112,7 @@ def hash_sources(bundle: Path) -> str:
     """A hash of the fonts and of the modules that cut them."""
     digest = hashlib.sha256()
     for path in (
-        *map(Path, (__file__, theme.__file__, theme.__file__)),
+        *map(Path, (__file__, theme.__file__)),
         *sorted((bundle / "fonts").iterdir()),
     ):
         digest.update(f"{path.name}\0".encode() + path.read_bytes())

@@ -273,3 +273,11 @@ def test_model_that_never_comes_to_an_end_holds_nothing_up(page: Page) -> None:
     press(lab_element, "Back to the lesson’s model")
     expect(text).to_have_value(lesson)
     expect(lab_element).to_have_attribute("data-state", "playing")
+
+
+def test_model_as_large_as_numbers_go_has_no_scale_bar(page: Page) -> None:
+    lab_element, text = editor_of(page)
+    text.fill('<mujoco><worldbody><geom size="1e308"/></worldbody></mujoco>')
+    press(lab_element, "Compile and run")
+    expect(lab_element.locator(".lab-view .lab-scale")).to_be_hidden()
+    expect(lab_element).to_have_attribute("data-state", "playing")

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from support.axe import violations
 from support.built_sites import Site
-from support.lab_page import press, until, watch_page
+from support.lab_page import press, until, wait_for_condition, watch_page
 
 pytestmark = pytest.mark.browser
 
@@ -146,6 +146,9 @@ def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None
         text.fill(f"{reach}.x = 1")
         press(hold, "Check")
         expect(verdicts(hold).last).to_contain_text(f"ReferenceError: {reach} is not defined")
+    text.fill('import("x")')
+    press(hold, "Check")
+    expect(verdicts(hold).last).to_contain_text("was seen")
     text.fill("Math.sin = Array.prototype.map = null; self.postMessage({type: 'judged'})")
     press(hold, "Check")
     expect(hold).not_to_contain_text("Solved")
@@ -167,6 +170,28 @@ def test_a_formula_is_written_as_on_paper(page: Page) -> None:
     text.fill("(2*g*h)^0.5")
     press(push, "Check")
     expect(verdicts(push)).to_contain_text("passed 3.132 m/s was seen")
+
+
+@pytest.mark.parametrize("width", [390, 1440])
+def test_an_exercise_comes_alive_in_the_room_that_was_kept_for_it(
+    browsers: Mapping[str, Browser], sites: Mapping[str, Site], width: int
+) -> None:
+    late: list[Route] = []
+    size = {"width": width, "height": 800}
+    with browsers["plain"].new_context(viewport=size, service_workers="block") as context:  # type: ignore[arg-type]
+        page = context.new_page()
+        page.route("**/labs/lab.*.js", lambda route: late.append(route))
+        page.goto(sites["exercises"].url(ADDRESS))
+        elements = page.locator(".exercise").all()
+        heights = [element.evaluate("e => e.offsetHeight") for element in elements]
+        wait_for_condition(page, lambda: late != [])
+        for route in late:
+            route.continue_()
+        for element, height in zip(elements, heights, strict=True):
+            element.scroll_into_view_if_needed()
+            expect(element).to_have_class(re.compile("lab-on"))
+            expect(element.get_by_role("textbox")).to_be_visible()
+            assert element.evaluate("e => e.offsetHeight") == height
 
 
 def test_an_exercise_is_read_without_scripts(

@@ -73,6 +73,7 @@ def test_every_shipped_package_has_its_licence(
     assert {
         "fontsource-stix-two-math.txt",
         "fontsource-variable-source-code-pro.txt",
+        "fontsource-variable-source-sans-3.txt",
         "fontsource-variable-source-serif-4.txt",
         "mujoco-mujoco.txt",
         "temml.txt",

@@ -271,6 +271,7 @@ FRAME = FrameInputs(
         credits="assets/licences.1.txt",
         touch_icon="assets/touch.1.png",
         scripts=(("data-quiz=", "assets/quiz.1.js"),),
+        fonts=(("", "assets/fonts/text.1.woff2"),),
         logo="assets/logo.1.svg",
         logo_dark="assets/logo-dark.1.svg",
         logo_width=40,

@@ -65,6 +65,8 @@ class Names(Struct, frozen=True):
     touch_icon: str
     scripts: tuple[tuple[str, str], ...] = ()
     """The scripts of parts of pages, each after its mark (`PagePart`)."""
+    fonts: tuple[tuple[str, str], ...] = ()
+    """Those that a page fetches at once if it holds the mark before them."""
     logo: str = ""
     logo_dark: str = ""
     logo_width: int = 0
@@ -74,7 +76,7 @@ class Names(Struct, frozen=True):
         """All site paths."""
         values = (getattr(self, field) for field in self.__struct_fields__)
         single = (path for path in values if isinstance(path, str) and path)
-        return frozenset((*single, *(path for _, path in self.scripts)))
+        return frozenset((*single, *(path for _, path in self.scripts + self.fonts)))
 
 
 def hashed_name(path: str, data: bytes) -> str:

@@ -205,6 +205,7 @@ class PageFrame(Struct, frozen=True):
             robots="" if head.indexed else "noindex",
             icon=place.href(names.icon),
             style=place.href(names.style),
+            fonts=tuple(place.href(path) for mark, path in names.fonts if mark in body),
             theme_script=place.href(names.theme_script),
             script=place.href(names.script),
             part_scripts=tuple((name, href) for href, name in part_names.items()),

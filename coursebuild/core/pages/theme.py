@@ -29,11 +29,19 @@ from msgspec import Struct
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
 from coursebuild.core.model.course import Theme
 
-TEXT, CODE, MATH = "Source Serif 4 Variable", "Source Code Pro Variable", "STIX Two Math"
+TEXT, INTERFACE = "Source Serif 4 Variable", "Source Sans 3 Variable"
+CODE, MATH = "Source Code Pro Variable", "STIX Two Math"
 """Families, by their names in the bundle."""
 COURSE = {"text": "Course Text", "interface": "Course Interface", "code": "Course Code"}
 """The families of a course's own fonts in the style sheet, by use."""
-_COURSE_FAMILIES = {TEXT: COURSE["text"], CODE: COURSE["code"]}
+_COURSE_FAMILIES = {
+    TEXT: COURSE["text"],
+    INTERFACE: COURSE["interface"],
+    CODE: COURSE["code"],
+}
+_CALM_FAMILIES = frozenset((TEXT, INTERFACE, COURSE["text"], COURSE["interface"]))
+"""Families whose lines would break elsewhere when the font arrives: it is shown from the first line
+on, or from the next page. Code keeps its columns, and formulas need their own font."""
 
 BASE = frozenset("".join(map(chr, range(0x20, 0x7F))) + "\u00a0§°±²³µ·¹½×éöü–—‘’“”…•−")
 """Characters of text that every site keeps."""
@@ -228,14 +236,30 @@ FALLBACKS = (
         ("Times New Roman Italic", "Liberation Serif Italic", "Tinos Italic"),
         0.39993,
     ),
+    Fallback(INTERFACE, "normal", ("DejaVu Sans",), 0.50462),
+    Fallback(INTERFACE, "normal", ("Roboto",), 0.44099),
+    Fallback(INTERFACE, "normal", ("Arial", "Helvetica", "Liberation Sans", "Arimo"), 0.43948),
     Fallback(CODE, "normal", ("DejaVu Sans Mono",), 0.60205),
     Fallback(CODE, "normal", ("Courier New", "Liberation Mono", "Cousine"), 0.60010),
 )
 """If several exist on a machine for one face, the last is used: browsers try later rules first.
 
-The widths are measured as `site/prepare_fonts.py` measures those of the web fonts; Liberation Serif
-and Liberation Mono have the widths of the fonts listed with them.
+The widths are measured as `site/prepare_fonts.py` measures those of the web fonts; Helvetica and
+the Liberation fonts have the widths of the fonts listed with them.
 """
+
+
+def fonts_at_once(files: Iterable[tuple[FontJob, str]]) -> tuple[tuple[str, str], ...]:
+    """The addresses of the fonts that a page needs for its first lines, each after a mark.
+
+    A page needs those whose marks it holds; all hold the empty one.
+    """
+    return tuple(
+        ("<math" if job.face.family == MATH else "", url)
+        for job, url in files
+        if job.face.family in {*_CALM_FAMILIES, MATH}
+        and (job.face.style, job.face.subset) == ("normal", "latin")
+    )
 
 
 def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
@@ -248,8 +272,9 @@ def face_rules(files: Iterable[tuple[FontJob, str]]) -> str:
         weight = f"{low} {high}" if low != high else str(low)
         whole = face.unicode_range is None
         form = "woff2" if url.endswith(".woff2") else "truetype"
+        display = "optional" if face.family in _CALM_FAMILIES else "swap"
         rules.append(
-            f'@font-face{{font-family:"{face.family}";font-style:{face.style};font-weight:{weight};font-display:swap;'
+            f'@font-face{{font-family:"{face.family}";font-style:{face.style};font-weight:{weight};font-display:{display};'
             f'src:url("{url}") format("{form}")'
             + ("}" if whole else f";unicode-range:{unicode_range(job.characters)}}}")
         )

@@ -18,6 +18,9 @@ from coursebuild.features.exercise.model import FORMULA, LANGUAGES, Exercise, Pu
 from coursebuild.features.exercise.schema import HiddenTrial
 from coursebuild.features.lab.reply import PublishedLab
 
+ROWS = 22
+"""The most lines that the page's editor shows at once, as in `site/js/lab/page/editor.js`."""
+
 
 def draw_exercise(page: PageContext, block: Exercise) -> Markup:
     """Draw an exercise without its editor."""
@@ -50,6 +53,8 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
         task=page.blocks(block.task),
         subject=_subject(words, block),
         start=code(block.start.text),
+        rows=min(ROWS, block.start.text.rstrip().count("\n") + 1),
+        height=block.lab.fields.height,
         solution=code(block.solution.text),
         explain=page.blocks(block.explain),
         trials=[(trial.name, _bounds(words, trial)) for trial in block.trials],

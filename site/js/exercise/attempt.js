@@ -48,6 +48,8 @@ const REACH = [
 
 /** Take from this worker, for good, all by which its code could reach the network, what a browser keeps, or other pages. */
 export function confine() {
+  // What a text begins and nobody awaits, such as an import, fails silently: at each step, the page would be told again.
+  globalThis.addEventListener?.('unhandledrejection', (event) => event.preventDefault())
   for (let owner = globalThis; owner !== null; owner = Object.getPrototypeOf(owner)) {
     for (const name of REACH) Reflect.deleteProperty(owner, name)
   }

@@ -27,23 +27,25 @@ export class Exercise extends Instrument {
     const { words, config } = this
     const { exercise } = config
     this.controls.element?.remove() // its buttons belong to the trials
-    this.otherText = exercise.start // the reader's, while the start is in the editor
     this.loadedText = null
     this.checkedText = null
     this.tries = 0
     this.stopJudging = () => {}
     this.stateText = ''
-    this.editor = new Editor(exercise.start, words, { run: () => this.check(), input: () => this.labelBackButton() })
-    this.editor.element.querySelector('label').textContent = words(`exercise.live.${exercise.subject}`, { names: exercise.names.join(', ') })
-    const check = textButton(words('exercise.live.check'), () => this.check(), 'lab-button exercise-check')
-    this.backButton = textButton('', () => this.exchange())
-    const keys = h('span', {}, words('exercise.live.keys_check'))
-    this.labelBackButton()
+    const texts = {
+      label: words(`exercise.live.${exercise.subject}`, { names: exercise.names.join(', ') }),
+      run: words('exercise.live.check'),
+      keys: words('exercise.live.keys_check'),
+      back: words('exercise.live.back'),
+      mine: words('exercise.live.mine'),
+    }
+    this.editor = new Editor(exercise.start, words, texts, { run: () => this.check() })
+    this.editor.runButton.classList.add('exercise-check')
     this.rows = exercise.trials.map((trial, i) => this.makeRow(trial, i))
     const label = this.element.querySelector('.lab-static [role="group"]')?.getAttribute('aria-label') ?? ''
     this.board = h('ol', { class: 'exercise-trials', 'aria-label': label }, ...this.rows.map(({ element }) => element))
     this.summary = h('p', { class: 'exercise-state', role: 'status' })
-    this.editor.element.append(h('div', { class: 'lab-buttons' }, check, this.backButton, keys), this.summary, this.board)
+    this.editor.element.append(this.summary, this.board)
     this.body.prepend(this.editor.element)
   }
 
@@ -62,18 +64,6 @@ export class Exercise extends Instrument {
     const foot = super.makeFoot()
     foot.querySelector('button').remove() // a link holds no attempt
     return foot
-  }
-
-  listeners() {
-    const inherited = super.listeners()
-    return {
-      ...inherited,
-      error: (error) => {
-        this.playRequested = false
-        if (error.kind === 'load') this.editor.fail(error.message)
-        else inherited.error(error)
-      },
-    }
   }
 
   // --- judging
@@ -174,24 +164,6 @@ export class Exercise extends Instrument {
       this.simulation.replay({ values: this.initial, events: button === null ? [] : [[0, button]], end: t })
     })
     this.body.querySelector('.lab-stage').scrollIntoView({ block: 'nearest' })
-  }
-
-  // --- the reader's text
-
-  /** Exchange the reader's text for the start, or back. */
-  exchange() {
-    const { editor, config } = this
-    const { text } = editor
-    const { start } = config.exercise
-    editor.text = text === start ? this.otherText : start
-    if (text !== start) this.otherText = text
-    this.labelBackButton()
-  }
-
-  labelBackButton() {
-    const { editor, config, otherText, words } = this
-    const { start } = config.exercise
-    this.backButton.textContent = words(`exercise.live.${editor.text !== start || otherText === start ? 'back' : 'mine'}`)
   }
 
   dispose() {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import io
 import json
+import re
 import runpy
 from collections.abc import Callable
 from pathlib import Path
@@ -24,12 +25,14 @@ from coursebuild.core.pages.theme import (
     CODE,
     FALLBACKS,
     GREEK,
+    INTERFACE,
     MATH,
     TEXT,
     FontJob,
     characters_in,
     face_rules,
     font_jobs,
+    fonts_at_once,
     italic_letter,
     read_faces,
     subset_font,
@@ -173,11 +176,22 @@ def test_rules_have_fallbacks_of_the_same_measure(assets: Assets) -> None:
     css = face_rules((job, f"fonts/{job.face.file}") for job in cut_fonts)
     assert css.count("@font-face") == len(cut_fonts) + len(FALLBACKS)
     assert 'font-family:"Source Serif 4 Variable fallback";font-style:normal;src:local(' in css
-    for local, scale in (("Times New Roman", "111."), ("DejaVu Serif", "87.1")):
+    locals_scaled = {"Times New Roman": "111.", "DejaVu Serif": "87.1", "DejaVu Sans": "82.0"}
+    for local, scale in locals_scaled.items():
         rule = css.split(f'local("{local}"')[1].split("}")[0]
         assert f"size-adjust:{scale}" in rule, "as wide as the web font"
     assert 'font-family:"STIX Two Math";font-style:normal;font-weight:400;' in css
-    assert css.count("font-display:swap") == len(cut_fonts)
+    displays = dict(re.findall(r'font-family:"([^"]+)".*?font-display:(\w+)', css))
+    assert displays == {TEXT: "optional", INTERFACE: "optional", CODE: "swap", MATH: "swap"}
+
+
+def test_a_page_fetches_the_fonts_of_its_first_lines_at_once(assets: Assets) -> None:
+    cut_fonts = [(job, job.face.file) for job in jobs(assets, "αβ")]
+    assert fonts_at_once(cut_fonts) == (
+        ("", "source-serif-4-latin-opsz-normal.ttf"),
+        ("", "source-sans-3-latin-wght-normal.ttf"),
+        ("<math", "stix-two-math-latin-400-normal.ttf"),
+    )
 
 
 SCRIPT = b"function f(x) { return x * x + 1 }\n" * 300

@@ -3,11 +3,10 @@
  * point to which the reader has come. Style sheets colour it, as they do the plots of the static form.
  */
 
-import { h } from './dom.js'
+import { draw, h } from './dom.js'
 import { formatLabel } from './numbers.js'
 import { spanOf, spread } from './span.js'
 
-const SVG = 'http://www.w3.org/2000/svg'
 const DASHES = ['', '6 3', '2 3', '8 3 2 3', '1 4']
 const LETTER = 7 // px, of a letter or a digit
 const TOP = 24
@@ -234,12 +233,6 @@ export class Chart {
   dispose() {
     this.resizer.disconnect()
   }
-}
-
-function draw(tag, attributes = {}) {
-  const element = document.createElementNS(SVG, tag)
-  for (const [name, value] of Object.entries(attributes)) if (value !== '') element.setAttribute(name, String(value))
-  return element
 }
 
 function write(text, attributes) {

@@ -4,13 +4,12 @@
 
 import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
-import { Notices } from './notices.js'
 import { formatLabel, formatReadout, formatTime } from './numbers.js'
 import { PLAIN_PLOT, Plot } from './plots.js'
 import { Hands } from './pointer.js'
-import { insertBody } from './shell.js'
+import { Shell } from './shell.js'
 import { Simulation } from './simulation.js'
-import { prefersStillness, watchSight } from './support.js'
+import { prefersStillness } from './support.js'
 import { buildTransport } from './transport.js'
 import { View } from './view.js'
 
@@ -41,11 +40,9 @@ const PLAIN_CONTROL = {
 export async function mountCustom(element, config, base, words) {
   const { mount } = await import(new URL(config.module, base).href)
   if (typeof mount !== 'function') throw new Error(`${config.kind}.js exports no function mount(element, config, api)`)
-  const body = h('div', { class: 'lab-live' })
-  insertBody(element, body)
-  const kit = new Kit(element, body, config, base, words)
+  const kit = new Kit(element, config, base, words)
   try {
-    const mounted = (await mount(body, config.data, kit.api())) ?? {}
+    const mounted = (await mount(kit.body, config.data, kit.api())) ?? {}
     element.classList.add('lab-on')
     kit.finish()
     return {
@@ -62,25 +59,19 @@ export async function mountCustom(element, config, base, words) {
 }
 
 /** Makes the `api` of a custom lab, and disposes at the end of what it has created. */
-class Kit {
-  constructor(element, body, config, base, words) {
-    this.element = element
-    this.body = body
-    this.config = config
+class Kit extends Shell {
+  constructor(element, config, base, words) {
+    super(element, config, words, null)
     this.base = base
-    this.words = words
-    this.notices = new Notices(words)
     this.simulations = []
     this.disposals = []
     this.watchers = new Set()
     this.isVisible = false
-    this.disposals.push(
-      watchSight(body, (visible) => {
-        this.isVisible = visible
-        this.simulations.forEach((simulation) => simulation.setVisible(visible))
-        this.watchers.forEach((watcher) => watcher(visible))
-      }),
-    )
+    this.put(h('div', { class: 'lab-live' }), (visible) => {
+      this.isVisible = visible
+      this.simulations.forEach((simulation) => simulation.setVisible(visible))
+      this.watchers.forEach((watcher) => watcher(visible))
+    })
   }
 
   api() {
@@ -123,7 +114,7 @@ class Kit {
    */
   createSimulation(options = {}) {
     const { on = {}, picture = true, height = HEIGHT, label = this.config.title, ...fields } = options
-    const { words, notices, config } = this
+    const { words, config } = this
     const number = this.simulations.length + 1
     const lab = { ...PLAIN_LAB, ...pickAddresses(config), ...fields, id: `${config.id}/${number}`, kind: 'simlab' }
     lab.controls = lab.controls.map((control) => ({ ...PLAIN_CONTROL, ...control }))
@@ -134,12 +125,7 @@ class Kit {
       config: { ...lab, autoplay: lab.autoplay && !prefersStillness() },
       base: this.base,
       view,
-      on: {
-        diverged: ({ time, message }) => notices.show(words('lab.live.diverged', { t: formatTime(time), message }), 'wrong'),
-        error: (error) => notices.failure(error, lab),
-        noPicture: () => view.element.replaceChildren(h('p', { class: 'lab-message lab-is-wrong' }, words('lab.live.no_webgl'))),
-        ...on,
-      },
+      on: { ...this.faults(lab, view), ...on },
     })
     if (view !== null) {
       const keys = {
@@ -170,8 +156,7 @@ class Kit {
   dispose() {
     for (const simulation of this.simulations.splice(0)) simulation.dispose()
     for (const dispose of this.disposals.splice(0)) dispose()
-    this.body.remove()
-    this.element.classList.remove('lab-on')
+    super.dispose()
   }
 }
 

@@ -58,12 +58,16 @@ export function pictogram(path) {
 
 /** An SVG of one path, without a size. */
 export function outline(d) {
-  const svg = document.createElementNS(SVG, 'svg')
-  svg.setAttribute('aria-hidden', 'true')
-  const path = document.createElementNS(SVG, 'path')
-  path.setAttribute('d', d)
-  svg.append(path)
+  const svg = draw('svg', { 'aria-hidden': 'true' })
+  svg.append(draw('path', { d }))
   return svg
+}
+
+/** An element of an SVG; attributes that are empty are left out. @param {string} tag @param {Record<string, string | number>} [attributes] */
+export function draw(tag, attributes = {}) {
+  const element = document.createElementNS(SVG, tag)
+  for (const [name, value] of Object.entries(attributes)) if (value !== '') element.setAttribute(name, String(value))
+  return element
 }
 
 let count = 0

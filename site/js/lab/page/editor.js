@@ -1,7 +1,8 @@
 /**
- * A text field with line numbers and an error message that refers to one of its lines.
+ * A text field with line numbers, an error message that refers to one of its lines, and buttons: one that runs the text, and one that
+ * exchanges it for the given one, or back.
  *
- *   const editor = new Editor(text, words, { run, input })
+ *   const editor = new Editor(text, words, texts, { run, exchange })
  *   editor.fail("Schema violation: unrecognized attribute: 'foo'\nElement 'geom', line 3")
  */
 
@@ -11,9 +12,15 @@ import { LONGEST_MODEL } from './share.js'
 const ROWS = 22 // at most; what is longer scrolls
 
 export class Editor {
-  /** @param {{run: () => void, input: () => void}} on Ctrl or Cmd with Enter, and every change of the text */
-  constructor(text, words, on) {
+  /**
+   * @param {string} text that is given @param {(key: string, values?: Record<string, any>) => string} words
+   * @param {{label: string, run: string, keys: string, back: string, mine: string}} texts of the field, its buttons, and their keys
+   * @param {{run: () => void, exchange?: () => void}} on the text is to run; it was exchanged
+   */
+  constructor(text, words, texts, on) {
     this.words = words
+    this.texts = texts
+    this.given = this.otherText = text // the other one is the reader's, while the given one is in the field
     const [id, errorId] = [freshId('model'), freshId('wrong')]
     this.error = h('p', { class: 'lab-message lab-is-wrong', id: errorId, role: 'alert', hidden: true })
     this.numbers = h('div', { class: 'lab-numbers', 'aria-hidden': 'true' })
@@ -36,7 +43,7 @@ export class Editor {
       cancelAnimationFrame(request)
       request = requestAnimationFrame(() => {
         this.numberLines()
-        on.input()
+        this.labelBackButton()
       })
     })
     this.field.addEventListener('scroll', () => (this.numbers.scrollTop = this.field.scrollTop))
@@ -48,11 +55,31 @@ export class Editor {
     this.element = h(
       'div',
       { class: 'lab-editor' },
-      h('label', { for: id }, words('lab.live.model')),
+      h('label', { for: id }, texts.label),
       h('div', { class: 'lab-source', dir: 'ltr' }, this.numbers, this.field),
       this.error,
     )
+    this.backButton = textButton('', () => {
+      this.exchange()
+      on.exchange?.()
+    })
+    this.runButton = textButton(texts.run, on.run)
+    this.element.append(h('div', { class: 'lab-buttons' }, this.runButton, this.backButton, h('span', {}, texts.keys)))
+    this.labelBackButton()
     this.numberLines()
+  }
+
+  /** Exchange the reader's text for the given one, or back. */
+  exchange() {
+    const { text, given } = this
+    this.text = text === given ? this.otherText : given
+    if (text !== given) this.otherText = text
+    this.labelBackButton()
+  }
+
+  labelBackButton() {
+    const { text, given, otherText, texts } = this
+    this.backButton.textContent = text !== given || otherText === given ? texts.back : texts.mine
   }
 
   get text() {
@@ -62,6 +89,7 @@ export class Editor {
   set text(text) {
     this.field.value = text
     this.field.rows = rowsOf(text)
+    this.labelBackButton()
     this.clear()
   }
 

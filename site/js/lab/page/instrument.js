@@ -35,6 +35,8 @@ export class Instrument extends Shell {
     super(element, config, words, progress)
     this.base = base
     this.openEditor = openEditor
+    /** @type {import('./editor.js').Editor | null} */
+    this.editor = null // of what the reader writes, in those that have one
     this.bench = null // in which the reader edits the model, in place of this
     this.values = this.initial = config.controls.map(({ value }) => value ?? null)
     this.textAt = this.plotAt = -Infinity
@@ -103,29 +105,26 @@ export class Instrument extends Shell {
     const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full)
     const panel = h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.makeFoot())
     const plots = this.plots.map((plot) => plot.element)
+    const reason = config.still ? h('p', { class: 'lab-reason' }, config.still) : null // why nothing moves when a reader presses Play
     this.show(
       'lab-live',
-      [screen, this.transport.element, this.tape.element, this.makeReason()],
+      [screen, this.transport.element, this.tape.element, reason],
       [this.motion, this.notices.message, this.goal?.element ?? null, ...plots, panel],
       (isVisible) => this.simulation.setVisible(isVisible),
     )
   }
 
-  /** Why nothing moves when a reader presses Play. */
-  makeReason() {
-    return this.config.still ? h('p', { class: 'lab-reason' }, this.config.still) : null
-  }
-
   /** Link, export and help under the instrument. */
   makeFoot() {
     const { config } = this
+    const script = config.exportPython
     const act = (key, run) => this.makeButton(key, run)
     return h(
       'div',
       { class: 'lab-foot' },
       act(...this.shareAction()),
       ...(this.plots.length > 0 ? [this.makeKeepButton(), act('csv', () => this.exportCurves())] : []),
-      config.exportPython ? act('export', () => this.export()) : null,
+      script ? act('export', () => download(script.name, fillScript(script.text, this.values), 'text/x-python')) : null,
       document.querySelector('script[data-state]') && !config.kind ? this.makeLogButton() : null,
       config.source && this.openEditor ? act('edit', () => this.edit()) : null,
       this.panel.element,
@@ -153,8 +152,9 @@ export class Instrument extends Shell {
   // --- events of the simulation
 
   listeners() {
-    const { words, notices, config } = this
+    const { words, notices } = this
     return {
+      ...this.faults(this.config, this.view),
       state: (state, reason) => this.onStateChange(state, reason),
       ready: ({ values }) => this.onReady(values),
       model: (model) => this.panel.open(model),
@@ -164,12 +164,13 @@ export class Instrument extends Shell {
         notices.clear()
         this.update(values)
       },
-      diverged: ({ time, message }) => notices.show(words('lab.live.diverged', { t: formatTime(time), message }), 'wrong'),
       warning: ({ time, message }) => notices.show(words('lab.live.warning', { t: formatTime(time), message }), 'warning'),
-      error: (error) => notices.failure(error, config),
+      error: (error) => {
+        if (this.editor === null || error.kind !== 'load') return notices.failure(error, this.config)
+        this.editor.fail(error.message)
+        this.playRequested = false
+      },
       saved: (state) => this.onSaved(state),
-      noPicture: () =>
-        this.view.element.replaceChildren(h('p', { class: 'lab-message lab-is-wrong' }, words('lab.live.no_webgl'))),
     }
   }
 
@@ -385,11 +386,6 @@ export class Instrument extends Shell {
       )
     }
     return this.makeButton('copy_log', () => this.save(copy))
-  }
-
-  export() {
-    const { name, text } = this.config.exportPython
-    download(name, fillScript(text, this.values), 'text/x-python')
   }
 
   exportCurves() {

@@ -171,27 +171,11 @@ export class Hands {
   }
 
   cameraKey(key, shift, camera) {
-    const step = (dx, dy) => () => (shift ? camera.pan(dx, dy) : camera.rotate(dx, dy))
-    switch (key) {
-      case 'ArrowLeft':
-        return step(-TURN, 0)
-      case 'ArrowRight':
-        return step(TURN, 0)
-      case 'ArrowUp':
-        return step(0, -TURN)
-      case 'ArrowDown':
-        return step(0, TURN)
-      case '+':
-      case '=':
-        return () => camera.zoom(CLOSER)
-      case '-':
-      case '_':
-        return () => camera.zoom(1 / CLOSER)
-      case '0':
-        return () => this.resetCamera()
-      default:
-        return undefined
-    }
+    const turn = { ArrowLeft: [-TURN, 0], ArrowRight: [TURN, 0], ArrowUp: [0, -TURN], ArrowDown: [0, TURN] }[key]
+    if (turn) return () => (shift ? camera.pan(turn[0], turn[1]) : camera.rotate(turn[0], turn[1]))
+    const zoom = { '+': CLOSER, '=': CLOSER, '-': 1 / CLOSER, _: 1 / CLOSER }[key]
+    if (zoom) return () => camera.zoom(zoom)
+    return key === '0' ? () => this.resetCamera() : undefined
   }
 
   dispose() {

@@ -3,15 +3,9 @@
 import { h, textButton } from './dom.js'
 import { GoalView } from './goal.js'
 import { Notices } from './notices.js'
+import { formatTime } from './numbers.js'
 import { copyLink, writeLink } from './share.js'
 import { watchSight } from './support.js'
-
-/** Put a body before the static form of a lab, which is hidden as long as it is there. */
-export function insertBody(element, body) {
-  const still = element.querySelector('.lab-static')
-  if (still !== null) still.before(body)
-  else element.append(body)
-}
 
 export class Shell {
   /**
@@ -55,11 +49,28 @@ export class Shell {
    * @param {(isVisible: boolean) => void} see the lab comes into sight or leaves it
    */
   show(kind, stage, side, see) {
-    const { element, notices } = this
-    this.body = h('div', { class: kind }, h('div', { class: 'lab-stage' }, ...stage), h('div', { class: 'lab-side' }, ...side), notices.announcement)
-    insertBody(element, this.body)
-    element.classList.add('lab-on')
-    this.unwatch = watchSight(this.body, see)
+    const parts = [h('div', { class: 'lab-stage' }, ...stage), h('div', { class: 'lab-side' }, ...side), this.notices.announcement]
+    this.put(h('div', { class: kind }, ...parts), see)
+    this.element.classList.add('lab-on')
+  }
+
+  /** Put a body before the static form, which is hidden as soon as the lab is on. */
+  put(body, see) {
+    const still = this.element.querySelector('.lab-static')
+    this.body = body
+    if (still !== null) still.before(body)
+    else this.element.append(body)
+    this.unwatch = watchSight(body, see)
+  }
+
+  /** Listeners of a simulation that say what goes wrong in it. @param {any} config its lab's JSON @param {import('./view.js').View | null} view */
+  faults(config, view) {
+    const { words, notices } = this
+    return {
+      diverged: ({ time, message }) => notices.show(words('lab.live.diverged', { t: formatTime(time), message }), 'wrong'),
+      error: (error) => notices.failure(error, config),
+      noPicture: () => view.element.replaceChildren(h('p', { class: 'lab-message lab-is-wrong' }, words('lab.live.no_webgl'))),
+    }
   }
 
   /** Switches full screen on or off; null if the browser has none. */

@@ -193,6 +193,8 @@ class ScaleBar {
   /** Fit the bar to a view of `width` by `height` CSS pixels, of which a metre has `metre`. */
   show(width, height, metre) {
     const length = roundLength((LONGEST * width) / metre)
+    this.element.hidden = !Number.isFinite(length * metre) // of a model as large as numbers go
+    if (this.element.hidden) return
     const path = `M${MARGIN} ${height - MARGIN - TICK}v${TICK}h${(length * metre).toFixed(1)}v${-TICK}`
     if (path === this.path) return
     this.path = path

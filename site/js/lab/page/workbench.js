@@ -21,7 +21,7 @@ export function openEditor({ element, config, base, words }, xml, leave) {
   const bare = { goal: null, exportPython: null, source: null, key: null, start: null, still: '', stopAt: null, trail: null, autoplay: false }
   const own = { kind: 'mjcf', xml, mjb: '', module: '', worker: `${config.worker}#${config.id}` }
   const bench = new Workbench(element, { ...config, ...bare, ...own, controls: [], readouts: [], plots: [] }, base, words)
-  bench.backButton.after(textButton(words('lab.live.leave'), leave))
+  bench.editor.backButton.after(textButton(words('lab.live.leave'), leave))
   bench.editor.field.focus()
   return bench
 }
@@ -31,13 +31,15 @@ export class Workbench extends Instrument {
     super.build()
     const { words, config } = this
     this.own = null // the files beside the reader's model
-    this.otherText = config.xml // the reader's text, while the lesson's is in the editor
-    this.editor = new Editor(config.xml, words, { run: () => this.run(), input: () => this.labelBackButton() })
-    this.backButton = textButton('', () => this.exchange())
-    const run = textButton(words('lab.live.compile'), () => this.run())
-    const keys = h('span', {}, words('lab.live.keys_compile'))
-    this.editor.element.append(h('div', { class: 'lab-buttons' }, run, this.backButton, keys), this.makeSources())
-    this.labelBackButton()
+    const texts = {
+      label: words('lab.live.model'),
+      run: words('lab.live.compile'),
+      keys: words('lab.live.keys_compile'),
+      back: words('lab.live.lesson_model'),
+      mine: words('lab.live.my_model'),
+    }
+    this.editor = new Editor(config.xml, words, texts, { run: () => this.run(), exchange: () => this.run() })
+    this.editor.element.append(this.makeSources())
     this.body.prepend(this.editor.element)
   }
 
@@ -65,20 +67,9 @@ export class Workbench extends Instrument {
     return h('div', { class: 'lab-sources' }, options.length > 1 ? menu.element : null, files)
   }
 
-  listeners() {
-    const inherited = super.listeners()
-    return {
-      ...inherited,
-      ready: (message) => {
-        this.editor.clear()
-        inherited.ready(message)
-      },
-      error: (error) => {
-        this.playRequested = false
-        if (error.kind === 'load') this.editor.fail(error.message)
-        else inherited.error(error)
-      },
-    }
+  onReady(values) {
+    this.editor.clear()
+    super.onReady(values)
   }
 
   /** Compile the text. */
@@ -94,7 +85,6 @@ export class Workbench extends Instrument {
   openModel(text, own = null) {
     this.own = own
     this.editor.text = text
-    this.labelBackButton()
     this.run()
   }
 
@@ -121,22 +111,6 @@ export class Workbench extends Instrument {
     }
   }
 
-  /** Exchange the reader's text for the lesson's model, or back. */
-  exchange() {
-    const { editor, config } = this
-    const text = editor.text
-    editor.text = text === config.xml ? this.otherText : config.xml
-    if (text !== config.xml) this.otherText = text
-    this.labelBackButton()
-    this.run()
-  }
-
-  labelBackButton() {
-    const { editor, config, otherText, words } = this
-    const showsLesson = editor.text !== config.xml || otherText === config.xml
-    this.backButton.textContent = words(showsLesson ? 'lab.live.lesson_model' : 'lab.live.my_model')
-  }
-
   shareAction() {
     return ['link_model', () => this.shareModel()]
   }
@@ -156,7 +130,6 @@ export class Workbench extends Instrument {
     if (text === undefined) return
     this.own = null
     this.editor.text = text
-    this.labelBackButton()
     this.run(false)
   }
 }
