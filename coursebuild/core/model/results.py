@@ -29,7 +29,7 @@ class Outcome(enum.Enum):
     SKIPPED = "skipped"
     """A module that it requires is missing."""
     NORUN = "norun"
-    """The author said not to run it."""
+    """Its author said not to run it, or nothing is named that runs its language."""
     UNRECORDED = "unrecorded"
     """Nothing is recorded of it yet, so it was not run: there was nothing to compare with."""
 
@@ -40,8 +40,7 @@ class ScriptJob(Struct, frozen=True):
     path: str
     """POSIX path relative to the project root, e.g. `examples/l4_2.py`."""
     args: tuple[str, ...]
-    timeout: float
-    """Seconds."""
+    timeout: float  # seconds
     requires: tuple[str, ...]
     perturbation: int = 0
     """From 1 on, the direction in which initial states are moved; below 0, steps change."""

@@ -33,7 +33,12 @@ from coursebuild.features.arithmetic.evaluate import (
     read_numeral,
     unit_readings,
 )
-from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+from coursebuild.features.arithmetic.expressions import (
+    CONSTANTS,
+    OF_QUOTIENT,
+    Expression,
+    NotUnderstood,
+)
 from coursebuild.features.arithmetic.statements import (
     FormulaSide,
     Statement,
@@ -47,7 +52,6 @@ from coursebuild.features.arithmetic.symbol_comparison import (
     SymbolQuantity,
     decide,
 )
-from coursebuild.features.arithmetic.tex import CONSTANTS, OF_QUOTIENT
 
 
 @functools.lru_cache(maxsize=1024)

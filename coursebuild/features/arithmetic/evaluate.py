@@ -23,9 +23,8 @@ from msgspec.structs import replace
 
 from coursebuild.core.text.units import Dimension, Unit, find_units, multiply
 from coursebuild.features.arithmetic.calculus import differentiate
-from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+from coursebuild.features.arithmetic.expressions import SIDE_BY_SIDE, Expression, NotUnderstood
 from coursebuild.features.arithmetic.real import ONE, PI, E, Real, apply, integrate
-from coursebuild.features.arithmetic.tex import SIDE_BY_SIDE
 
 _ZERO = Real.of(0)
 ORDERS = {"<": operator.lt, ">": operator.gt, "≤": operator.le, "≥": operator.ge, "≠": operator.ne}

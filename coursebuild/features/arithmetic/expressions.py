@@ -19,6 +19,14 @@ class NotUnderstood(Exception):  # noqa: N818  # it is no mistake
         self.reason, self.start, self.end = reason, start, end
 
 
+CONSTANTS = frozenset((r"\pi", r"\mathrm{e}"))
+"""Symbols that stand for fixed numbers."""
+OF_QUOTIENT = "unit of a quotient"
+"""The text of a product as `1/50 Hz`, whose unit may be that of the divisor alone."""
+SIDE_BY_SIDE = "side by side"
+"""The text of a product in what a function without brackets is of."""
+
+
 class Expression(Struct, frozen=True):
     """An operation on expressions, or a number, symbol or unit.
 
@@ -69,6 +77,16 @@ class Expression(Struct, frozen=True):
     def not_understood(self, reason: str) -> NotUnderstood:
         """Return the exception that says that this part cannot be computed."""
         return NotUnderstood(reason, self.start, self.end)
+
+
+def join_units(product: Expression, sign: str, unit: Expression) -> Expression:
+    r"""Return a product whose unit goes on behind a sign, as in `5\,\mathrm N\cdot\mathrm m`."""
+    if not product.ends_in_unit():
+        raise unit.not_understood("it may be a symbol")
+    number, first = product.parts
+    text = f"{first.text}{'/' if sign == '/' else '·'}{unit.text}"
+    whole = Expression("unit", first.start, unit.end, text=text)
+    return Expression("*", product.start, unit.end, (number, whole))
 
 
 def is_mixed(left: Expression, right: Expression) -> bool:

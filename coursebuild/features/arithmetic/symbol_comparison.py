@@ -31,10 +31,9 @@ from coursebuild.features.arithmetic.evaluate import (
     measure,
     read_numeral,
 )
-from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
+from coursebuild.features.arithmetic.expressions import CONSTANTS, Expression, NotUnderstood
 from coursebuild.features.arithmetic.real import ONE, Real
 from coursebuild.features.arithmetic.statements import FormulaSide, Statement
-from coursebuild.features.arithmetic.tex import CONSTANTS
 
 
 def decide(verdict: bool | None, place: Expression) -> bool:

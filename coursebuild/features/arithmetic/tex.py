@@ -17,10 +17,14 @@ import re
 
 from coursebuild.core.checks import formulas
 from coursebuild.core.text.quantities import plain_unit
-from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood, is_mixed
-
-CONSTANTS = frozenset((r"\pi", r"\mathrm{e}"))
-"""Symbols that stand for fixed numbers."""
+from coursebuild.features.arithmetic.expressions import (
+    OF_QUOTIENT,
+    SIDE_BY_SIDE,
+    Expression,
+    NotUnderstood,
+    is_mixed,
+    join_units,
+)
 
 _MAX_FACTORS = 100
 """The limit for one expression, which also limits how deep it nests."""
@@ -49,13 +53,8 @@ _BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
 _BRACKETS = {"(": ")", "[": "]", "{": "}", "|": "|", r"\lvert": r"\rvert"}
 _QUOTIENT_SIGNS = ("/", r"\div")
 _UNIT_SIGNS = ("/", r"\cdot")
-r"""Signs between upright units, as in `\mathrm N\cdot\mathrm m`."""
 _PRODUCT_SIGNS = (r"\cdot", r"\times", "*", "⋅", "×", *_QUOTIENT_SIGNS)
 _NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^") | {r"\rvert", *_PRODUCT_SIGNS}
-OF_QUOTIENT = "unit of a quotient"
-"""The text of a product as `1/50 Hz`, whose unit may be that of the divisor alone."""
-SIDE_BY_SIDE = "side by side"
-"""The text of a product in what a function without brackets is of."""
 _NUMBER_ONE, _NUMBER_TWO = (Expression("number", 0, 0, text=digit) for digit in "12")
 _REASONS = {
     ",": "a comma between digits may part two numbers",
@@ -176,13 +175,8 @@ class _Reader:
                 raise self.not_understood("what `/` divides by can be read in two ways")
             start = self.at
             unit = None if sign and sign not in _UNIT_SIGNS else self.unit()
-            if sign and unit is not None:  # as in `5\,\mathrm N\cdot\mathrm m`
-                if not product.ends_in_unit():
-                    raise unit.not_understood("it may be a symbol")
-                number, first = product.parts
-                text = f"{first.text}{'/' if sign == '/' else '·'}{unit.text}"
-                unit = Expression("unit", first.start, self.at, text=text)
-                product = Expression("*", product.start, self.at, (number, unit))
+            if sign and unit is not None:
+                product = join_units(product, sign, unit)
                 continue
             factor = unit
             if factor is None:

@@ -13,8 +13,9 @@ from msgspec import Struct
 from coursebuild.api import marks
 from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.context import LessonContext, label_anchor, to_anchor
+from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
-from coursebuild.features.importer.prose import display_formula, rewrite_prose
+from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import TOO_MUCH, read_yaml
 
 

@@ -16,6 +16,7 @@ from coursebuild.features.importer.context import (
     label_anchor,
     to_anchor,
 )
+from coursebuild.features.importer.displays import normalize_formulas
 from coursebuild.features.importer.roles import (
     convert_attributes,
     convert_code,
@@ -77,26 +78,6 @@ _LINE = re.compile(
     rf"|(?P<attributes>(?:(?<=[^\s$])|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
     rf"|(?P<span>\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
-_DISPLAY = re.compile(
-    r"\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$"
-    r"(?:[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\}))?"
-    r"(?:[ \t]*<br[ ]*/?>)*(?P<behind>[ \t]*(?=[^\s.,;:]|[.,;:][ \t]*\S))?",
-    re.DOTALL,
-)
-_ENVIRONMENT = re.compile(
-    r"\$\$(?>[^$]+)\$\$|^[ \t]*"
-    r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
-    r"(?>(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*)"
-    r"\\end\{(?P=env)(?P=star)\})[ \t]*$",
-    re.DOTALL | re.MULTILINE,
-)
-"""A formula between dollar signs, or one that its environment alone makes one."""
-_BRACKETS = re.compile(
-    r"^(?P<lead>[ \t]*)(?:\\{1,2}\[(?P<tex>(?>(?:(?!\\{1,2}[\[\]]).)+))\\{1,2}\]"
-    r"|\$(?P<lines>[ \t]*\n(?:(?!\n[ \t]*\n)[^$])+)\$)[ \t]*$",
-    re.DOTALL | re.MULTILINE,
-)
-"""A formula between brackets, or below a line that holds nothing but a dollar sign."""
 _TARGET = re.compile(
     r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE
 )
@@ -114,11 +95,6 @@ _MEANING = re.compile(
 )
 """A term in a paragraph of its own, and what it means, once or more, each behind a colon."""
 _ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
-_LABEL = re.compile(r"\\label\{([^{}]*)\}")
-_LEAD = re.compile(r"\n[ \t>]*\Z")
-"""What stands before the mark that ends a formula, on a line of its own."""
-_WORDS_BEFORE = re.compile(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
-_WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 _EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
 _ENDS = {"<!--": "-->", "$$": "$$"}
@@ -274,38 +250,9 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
     return _LINE.sub(rewrite, line)
 
 
-def normalize_formulas(text: str) -> str:
-    """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
-    text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
-    text = _ENVIRONMENT.sub(lambda m: f"$${m['tex']}$$" if m["tex"] else m[0], text)
-    return _DISPLAY.sub(_label_formula, text)
-
-
-def display_formula(tex: str, label: str) -> str:
-    """Return a displayed formula in Markdown."""
-    return f"$$\n{tex.strip()}\n$$" + (f" {{#eq:{formula_anchor(label)}}}" if label else "")
-
-
 def _move_caption(match: re.Match[str]) -> str:
     label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
     return f"Table: {match['caption']}{label}\n\n{match['table']}"
-
-
-def _label_formula(match: re.Match[str]) -> str:
-    inside = _LABEL.search(match["tex"])
-    label = match["myst"] or match["quarto"] or (inside[1] if inside else "")
-    tex = _LABEL.sub("", match["tex"])
-    tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
-    bare = _WHOLE_ENVIRONMENT.sub("", tex)
-    if re.search(r"(?<!\\)&", bare):  # MyST aligns at `&`, and needs no environment
-        tex = f"\n\\begin{{aligned}}\n{tex.strip()}\n\\end{{aligned}}\n"
-    opening, closing = "", match["behind"] or ""
-    if lead := _LEAD.search(match["tex"]):  # a mark beside a text could be that of another formula
-        line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]
-        opening = lead[0] if _WORDS_BEFORE.match(line) else ""
-        closing = lead[0] if match["behind"] is not None else ""
-    braces = f" {{#eq:{formula_anchor(label)}}}" if label else ""
-    return f"{opening}$${tex}$${braces}{closing}"
 
 
 _FIGURE_NAME = re.compile(
@@ -326,8 +273,7 @@ def find_anchors(text: str) -> set[str]:
     anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)", text)}
     proofs = re.findall(rf"#((?:{'|'.join(PROOF_LABELS)})-[\w-]+)", text)
     anchors |= {to_anchor(name) for name in proofs}
-    for match in _DISPLAY.finditer(normalize_formulas(text)):
-        anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", _label_formula(match)))
+    anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", normalize_formulas(text)))
     labels = re.findall(r"^\s*:(?:label|name):[ \t]*(\S+)", text, re.MULTILINE)
     anchors |= {to_anchor(label) for label in labels}
     anchors |= {f"eq:{formula_anchor(label)}" for label in labels}
