@@ -91,7 +91,7 @@ class Outcome(Struct, frozen=True):
 class Checker:
     """A course in memory in which changes are checked, one after the other."""
 
-    def __init__(self, root: Path, verification: Verification, chosen: frozenset[str]) -> None:
+    def __init__(self, root: Path, verification: Verification, paths: frozenset[str]) -> None:
         self.server = ScriptServer()
         self.options = Options(root, 1, open_store(root, None, None), run_all=self._run)
         self.session = Session(self.options)
@@ -106,11 +106,11 @@ class Checker:
             raise SystemExit(f"the course has mistakes of its own: {_describe(findings[0])}")
         self.findings = Counter(map(_identity, findings))
         self.texts = {source.path: source.text for source in (course.map, *course.sources)}
-        self.chosen = chosen
+        self.paths = paths
         self.texts = {
             path: text
             for path, text in self.texts.items()
-            if path in chosen or path == course.map.path
+            if path in paths or path == course.map.path
         }
         self.texts |= {
             path.relative_to(root).as_posix(): path.read_text("utf-8")
@@ -121,7 +121,7 @@ class Checker:
         self.keys = script_keys(course)
         self.pages: dict[str, bytes] = {}
         self._owner_pages = {owner.path: urls.owner_path(owner) for owner in course.owners}
-        self._other_pages = {page for path, page in self._owner_pages.items() if path not in chosen}
+        self._other_pages = {page for path, page in self._owner_pages.items() if path not in paths}
 
     def close(self) -> None:
         self.session.close()
@@ -182,7 +182,7 @@ class Checker:
             p: run for p, run in self.runs.items() if keys.get(p) == self.keys.get(p)
         }
         is_alone = keys == self.keys and path in self._owner_pages  # no other page can change
-        documents = frozenset([path]) if is_alone else self.chosen
+        documents = frozenset([path]) if is_alone else self.paths
         verification = verify(course, self.options, documents, known_runs=known_runs_by_path)
         if is_alone:
             results = replace(self.verification.results, trials=verification.results.trials)
@@ -253,8 +253,8 @@ def _prepare(course: Path, top: Path, count: int | None, seed: int) -> None:
     folder = Path(tempfile.mkdtemp(dir=top)) / "course"
     copy_course(course, folder)
     has_results = (course / FOLDER).is_dir()
-    verification, chosen = verify_course(course if has_results else folder, count, seed)
-    _checker = Checker(folder, verification, chosen)
+    verification, paths = verify_course(course if has_results else folder, count, seed)
+    _checker = Checker(folder, verification, paths)
     _checker.draw()
 
 

@@ -70,12 +70,12 @@ def units(rng: random.Random) -> Case:
 
 
 def rates(rng: random.Random) -> Case:
-    """Speeds, energies, angles and scales; revolutions beside angles are of two sorts."""
+    """Speeds, energies, scales, and cycles beside angles, which are wrong only in one reading."""
     a, b = rng.randint(2, 90), rng.randint(2, 9)
     speed, is_speed = state(rng, sympy.Rational(a, b) / sympy.Rational(36, 10), 2)
     energy, is_energy = state(rng, sympy.Rational(a * b, 1000), 3)
     kelvin, is_kelvin = state(rng, a + sympy.Rational("273.15"), 2)
-    turns, _ = state(rng, sympy.Integer(a) * 2 * sympy.pi, 1)
+    turns, is_turns = state(rng, sympy.Integer(a) * 2 * sympy.pi, 1)
     target = rng.choice((a, a + 1))
     tex, truth = rng.choice(
         (
@@ -88,7 +88,7 @@ def rates(rng: random.Random) -> Case:
                 is_energy,
             ),
             (rf"{a}^\circ\mathrm C = {kelvin}\ \mathrm K", is_kelvin),
-            (rf"{a}\ \mathrm{{Hz}} = {turns}\ \mathrm{{rad/s}}", None),
+            (rf"{a}\ \mathrm{{Hz}} = {turns}\ \mathrm{{rad/s}}", is_turns or None),
             (rf"{a * 60}\ \mathrm{{rpm}} = {target}\ \mathrm{{Hz}}", a == target),
             (rf"{a}\ \mathrm m\ {b}\ \mathrm{{cm}} = {a * 100 + b}\ \mathrm{{cm}}", None),
             (rf"{a * b}\,\mathrm W\,\mathrm h = {target * b * 3600}\,\mathrm J", a == target),

@@ -26,7 +26,6 @@ from mjbench.judge import (
     find_parts,
     five_lines,
     judge_setting,
-    largest_of,
     mark_luck,
     rival_row,
 )
@@ -39,7 +38,7 @@ from mjbench.reports.case_report import (
     ReferenceLine,
     StepCost,
 )
-from mjbench.reports.limits import limit_text, map_text
+from mjbench.reports.limits import largest_of, limit_text, map_text
 from mjbench.reports.model_report import SceneReport
 from mjbench.reports.profile_table import profile_text
 from mjbench.reports.scene_report import (

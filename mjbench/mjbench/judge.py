@@ -30,13 +30,11 @@ from mjbench.columns import (
     unresolved_columns,
     worse_columns,
 )
-from mjbench.reports import reach_bound
-from mjbench.reports.limits import stability_text
+from mjbench.reports.limits import stability_text, stray_timestep
 from mjbench.reports.scene_report import (
     ErrorParts,
     RowVerdict,
     ScenarioReport,
-    StableRow,
     WorkPrecisionRow,
 )
 from mjbench.reports.shown_errors import (
@@ -187,7 +185,7 @@ def _judge_rival(
         return f"{none}{claim} here, but {elsewhere} {texts[0]}", False, texts
     if not is_cheap and gain.high > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, but is no better {elsewhere}", False, ()
-    if limit := _strays_from(report, rival):
+    if limit := stray_timestep(report, rival):
         reason = f"leaves the motion of small steps at some timesteps beyond {limit}"
         return f"{none}{claim} here, but {rival.setting.integrator} {reason}", False, ()
     text = f"{rival.name} is better: it {price} and {_gain_text(everywhere, figure)}"
@@ -201,23 +199,6 @@ def _judge_rival(
 
 
 _AS_FAR = ", as far as the reference resolves"
-
-
-def _strays_from(report: ScenarioReport, rival: WorkPrecisionRow) -> str:
-    """From which timestep on a setting may leave the motion of small steps.
-
-    Empty where its own timestep is not longer, and where the scene's own setting leaves it too. Of
-    commands nothing is known: they are late at timesteps that do not divide the time they hold for.
-    """
-    near = {} if report.hold else {row.integrator: row.near for row in report.stable}
-
-    def limit(row: WorkPrecisionRow) -> float:
-        reach = near.get(row.setting.integrator)
-        return math.inf if reach is None else reach_bound(reach)
-
-    baseline = next(row for row in report.rows if row.own)
-    stays = [row.setting.timestep <= limit(row) * (1 + 1e-9) for row in (baseline, rival)]
-    return seconds_text(limit(rival), 2) if stays == [True, False] else ""
 
 
 def _gain(starts: Sequence[Mapping[Column, float]]) -> Spread:
@@ -467,8 +448,3 @@ def _mending_row(
 
     matches = [row for row in report.rows if row.status == "ok" and not row.lucky and halves(row)]
     return min(matches, key=lambda r: r.cost.value if r.cost else math.inf, default=None)
-
-
-def largest_of(rows: Sequence[StableRow]) -> dict[str, float]:
-    """The largest stable timesteps by integrator, of those that have one."""
-    return {r.integrator: reach_bound(r.largest) for r in rows if r.largest != "all"}

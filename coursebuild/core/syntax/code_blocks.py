@@ -104,7 +104,8 @@ def parse_program(fence: Fence) -> Parsed[Script | PlainCode | None]:
     `None` if it is neither: then it is only code, whatever its first line says.
     """
     first = {word.key: word.value or "" for word in reversed(split_words(fence.info).value)}
-    if first.get("file", "").startswith("examples/"):
+    file_path = first.get("file", "")
+    if file_path.startswith("examples/") and not file_path.endswith(".py"):  # of Python
         keys = fence.keys(values=("file", *_PROGRAM_VALUES), flags=("norun", *_SHOWS))
         diagnostics, file = list(keys.diagnostics), keys.value.get("file")
         script = None if file is None else _build_script(fence, file, keys.value, diagnostics)
@@ -290,7 +291,7 @@ def path_mistake(path: str, *, is_python: bool = True) -> str:
         return f"`{path}` is not below `examples/`"
     if is_python and (not path.endswith(".py") or not stem):
         return f"`{path}` does not end in `.py`" if stem else f"`{path}` has no name before `.py`"
-    if not is_python and path.lower().endswith((".py", ".pyc", ".so", ".pyd", ".pth")):
+    if not is_python and path.lower().endswith((".py", ".pyc", ".pyd", ".so")):
         return f"`{path}` would be imported by Python scripts beside it"
     if _UNPORTABLE.search(path) or any(part[-1] in ". " or part[0] == " " for part in parts):
         return f"`{path}` has a character that not every file system and shell takes"

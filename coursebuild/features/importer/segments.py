@@ -336,6 +336,8 @@ def _read_cells(
                 ),
             )
             segments.append(cell_segment)
+        elif source.strip():
+            segments.append(Segment(kind="block", place=place, text=source, head="text"))
     return segments, attachments
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from mjbench.reports import Reach, reach_bound
-from mjbench.reports.scene_report import ScenarioReport, StableRow
+from mjbench.reports.scene_report import ScenarioReport, StableRow, WorkPrecisionRow
 from mjbench.reports.shown_errors import seconds_text
 
 _TOGETHER, _MOST_DIGITS = 0.1, 4
@@ -110,3 +110,25 @@ def stability_text(report: ScenarioReport) -> str:
 def _enumerate(words: Sequence[str]) -> str:
     *first, last = words
     return f"{', '.join(first)} and {last}" if first else last
+
+
+def largest_of(rows: Sequence[StableRow]) -> dict[str, float]:
+    """The largest stable timesteps by integrator, of those that have one."""
+    return {r.integrator: reach_bound(r.largest) for r in rows if r.largest != "all"}
+
+
+def stray_timestep(report: ScenarioReport, rival: WorkPrecisionRow) -> str:
+    """The timestep from which on a setting may leave the motion of small steps, in words.
+
+    Empty where its own timestep is not longer, and where the scene's own setting leaves it too. Of
+    commands nothing is known: they are late at timesteps that do not divide the time they hold for.
+    """
+    near = {} if report.hold else {row.integrator: row.near for row in report.stable}
+
+    def limit(row: WorkPrecisionRow) -> float:
+        reach = near.get(row.setting.integrator)
+        return math.inf if reach is None else reach_bound(reach)
+
+    baseline = next(row for row in report.rows if row.own)
+    stays = [row.setting.timestep <= limit(row) * (1 + 1e-9) for row in (baseline, rival)]
+    return seconds_text(limit(rival), 2) if stays == [True, False] else ""

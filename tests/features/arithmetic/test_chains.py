@@ -279,7 +279,7 @@ DOUBTFUL = r"""
 \prod_{k=1}^3 k\cdot 2 = 12
 \prod_{k=1}^3 k\ \mathrm m = 6\ \mathrm m
 200\ \mathrm g + 10\,\% = 220\ \mathrm g
-50\ \mathrm{Hz} = 314.2\ \mathrm{rad/s}
+1\ \mathrm{Hz} = 1\ \mathrm{rad/s}
 3\,\mathrm h(2) = 6
 7 + 8 = 3 \quad(\mathrm{mod}\ 12)
 1 + 1 = 3, \quad \text{which is false}

@@ -120,10 +120,10 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         ("```\n:name: value\n```\n", "```\n:name: value\n```\n"),
         ("Code `\\a{b}` and\n`c` here.\n", "Code `\\a{b}` and\n`c` here.\n"),
         ("{% file %}run.sh{% endfile %}\n\nText.\n", "run.sh\n\nText.\n"),
-        ('Text {% include "a.html" %}.\n', 'Text `{% include "a.html" %}`.\n'),
+        ('Text {% cycle "a", "b" %}.\n', 'Text `{% cycle "a", "b" %}`.\n'),
         (
             "<!-- ```{note}\nA.\n``` -->\n\nPress {kbd}`a`.\n",
-            "<!-- ```{note}\nA.\n``` -->\n\nPress a.\n",
+            "<!-- ```{note}\nA.\n``` -->\n\nPress <kbd>a</kbd>.\n",
         ),
         ("A [text](https://example.org/\n) here.\n", "A [text](https://example.org/)\n here.\n"),
         ("So\n$\na\n=\nb\n$\n\nand $c$.\n", "So\n$$\na\n=\nb\n$$\n\nand $c$.\n"),

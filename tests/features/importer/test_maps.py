@@ -55,7 +55,7 @@ def test_a_book_of_gitbook_says_where_its_summary_is(tmp_path: Path) -> None:
         "notes/outline.md": "",
     }
     outline, _, left = import_map(tmp_path, files)
-    assert [titles for _, titles in outline] == [["Second", "First"]]
+    assert [titles for _, titles in outline] == [["texts/b/README.md", "texts/a/README.md"]]
     assert [message[:14] for message in left] == ["not taken for "]
 
 
