@@ -73,7 +73,7 @@ class RunExplanation(Struct, frozen=True):
     """Id of its lesson or page."""
     state: State
     reasons: tuple[str, ...] = ()
-    """Why it would run, each a clause."""
+    """Why it would run, or never does, each a clause."""
     depends: tuple[str, ...] = ()
     """What its last result depends on, a line for each."""
     made: int | None = None
@@ -144,7 +144,7 @@ def _run_lines(run: RunExplanation, style: Style, *, full: bool = False) -> list
     again = " again" if run.made is not None else ""
     verdicts = {
         "remembered": style.paint("is remembered", GREEN),
-        "norun": "is never run: its lesson says `norun`, or its language has no runner in the map",
+        "norun": "is never run",
         "would run": style.paint(f"would {verb}{again}", YELLOW),
     }
     lines = [f"{name} {verdicts[run.state]}"]
@@ -266,7 +266,11 @@ class _Explainer:
     def _explain_script(self, path: str) -> RunExplanation:
         extraction, job = self.scripts[path]
         if not extraction.is_run:
-            return RunExplanation("script", path, extraction.owner, "norun")
+            script = extraction.script
+            reason = "its lesson says `norun`"
+            if not script.norun:
+                reason = f"`[runners]` of the map has nothing for `{script.language}`"
+            return RunExplanation("script", path, extraction.owner, "norun", (reason,))
         inputs = self.run_store.inputs(job, extraction.data)
         record = self.run_store.get_record(inputs)
         if record is not None:

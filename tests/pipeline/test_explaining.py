@@ -199,7 +199,7 @@ def test_explain_says_why_a_result_is_not_remembered(make: Make) -> None:
     text = explain(folder, "examples/slow.py")
     assert "because its last result is not remembered: it was stopped after its time limit" in text
     text = explain(folder, "examples/idle.py")
-    assert text.startswith("examples/idle.py is never run: its lesson says `norun`\n")
+    assert text.startswith("examples/idle.py is never run\n  because its lesson says `norun`\n")
 
 
 def test_explain_lessons_and_files_by_any_of_their_names(course: Folder) -> None:
