@@ -3,8 +3,9 @@ r"""Checks arithmetic between numbers: compares each side of a chain of relation
 Entry point: `check_arithmetic(tex, symbols, unit)`.
 
 1. One of two sides is a numeral, as `3.2\cdot10^{-4}\ \mathrm m`. The other must agree with its
-   digits, within half a unit of the last place. After `=` a whole number is exact; after
-   `\approx` its final zeros can be the result of rounding.
+   digits, within half a unit of the last place. After `=` a whole number is exact, but for one of
+   two digits or more that comes of decimals; after `\approx` its final zeros can be the result of
+   rounding.
 2. If some sides of a chain end in the same unit, and there is no other, it holds for all sides.
    Different units are converted.
    A relation holds if it does so for one meaning of each unit that has several.
@@ -255,7 +256,8 @@ def _find_mistake_as_read(
         return FormulaComparison("wrong", right.start, right.end, message)
     index = choose_rounded(numerals, relation)
     numeral, side, value = numerals[index], (left, right)[index], values[1 - index]
-    if decide(agrees(numeral, value, relation), right):
+    of_decimals = (left, right)[1 - index].has_decimals()
+    if decide(agrees(numeral, value, relation, of_decimals=of_decimals), right):
         return None
     digits = max(numeral.digits + 2, 4)
     result = f"{numeral.express(value):.{digits}g}"

@@ -62,6 +62,8 @@ class Numeral(Struct, frozen=True):
     digits: int
     unit_size: Real
     """The size of its unit in base units."""
+    zeros: int = 0
+    """How many zeros end a whole number."""
     zero: Real = _ZERO
     """Where the scale of its unit begins, in this unit."""
 
@@ -83,7 +85,7 @@ def read_numeral(expression: Expression, readings: Readings = FIRST_READINGS) ->
             zeros = len(whole) - len(whole.rstrip("0")) if is_whole and whole.strip("0") else 0
             step = Real.of(Fraction(10) ** (zeros - len(decimals)))
             digits = len(text.replace(".", "").lstrip("0")) or 1
-            return Numeral(Real.of(text), step, is_whole, digits, ONE)
+            return Numeral(Real.of(text), step, is_whole, digits, ONE, zeros)
         case Expression(kind="-", parts=(inner,)):
             numeral = read_numeral(inner, readings)
             if numeral is None:
@@ -151,13 +153,23 @@ def unit_readings(*sides: Expression) -> Iterator[Readings]:
             yield {key: unit.in_radians() for key, unit in readings_of_units.items()}
 
 
-def agrees(numeral: Numeral, value: Real, relation: str) -> bool | None:
-    """Whether a value, rounded to the digits of a numeral, is that number; `None` if unknown."""
-    difference = value - numeral.value
+def agrees(
+    numeral: Numeral, value: Real, relation: str, *, of_decimals: bool = False
+) -> bool | None:
+    """Whether a value, rounded to the digits of a numeral, is that number; `None` if unknown.
+
+    After `=` a whole number is exact, or, if it has two digits or more and the value comes
+    `of_decimals`, rounded to as many digits: 49.05 to 49, but 9.75 to 9.8 and not to 10.
+    """
+    difference, step = (value - numeral.value).abs(), numeral.step
     if numeral.is_whole and relation == "=":
-        sign = difference.sign()
-        return None if sign is None else sign == 0
-    excess = (difference.abs() * Real.of(2) - numeral.step).sign()
+        one = step * Real.of(Fraction(1, 10**numeral.zeros))
+        is_long = (value.abs() - one * Real.of(10 ** (numeral.digits - 1))).sign()
+        if not (of_decimals and numeral.digits > 1 and is_long in (0, 1)):
+            sign = difference.sign()
+            return None if sign is None else sign == 0
+        step = one
+    excess = (difference * Real.of(2) - step).sign()
     return None if excess is None else excess <= 0
 
 

@@ -53,6 +53,10 @@ class Expression(Struct, frozen=True):
         """Whether this expression is or contains one of these kinds."""
         return any(expression.kind in kinds for expression in self.walk())
 
+    def has_decimals(self) -> bool:
+        """Whether it holds a number with a decimal point, which may be rounded."""
+        return any(part.kind == "number" and "." in part.text for part in self.walk())
+
     def ends_in_unit(self, *texts: str) -> bool:
         """Whether this is a number with a unit, or with one of these units."""
         unit = self.parts[1] if self.kind == "*" else self

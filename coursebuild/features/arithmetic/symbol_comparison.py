@@ -241,7 +241,11 @@ class SymbolComparison:
             index = choose_rounded(sized, self.relation)
             numeral, unit_size = sized[index], size if index == bare else ONE
             value = scaled[1 - index]
-            if decide(agrees(numeral, value, self.relation), self.expressions[1]):
+            opposite = self.expressions[1 - index]
+            symbols = (self.known[p.text] for p in opposite.walk() if p.text in self.known)
+            of_decimals = opposite.has_decimals() or any(s.step is not None for s in symbols)
+            agreement = agrees(numeral, value, self.relation, of_decimals=of_decimals)
+            if decide(agreement, self.expressions[1]):
                 return None
             digits = max(numeral.digits + 2, 4)
             result = f"{numeral.express(value / unit_size):.{digits}g}"

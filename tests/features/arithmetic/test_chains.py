@@ -22,6 +22,7 @@ I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168
 \left(1 + \tfrac12\right)^2 = 2.25
 0.25 \approx 0.2
 0.25 \approx 0.3
+5\cdot9.81\ \mathrm N = 49\ \mathrm N, \quad 343 = \sqrt{1.4\cdot8.314\cdot293/0.029}
 2^{53} = 9\,007\,199\,254\,740\,992
 10\ \mathrm{mm}/2\ \mathrm{ms} = 5\ \mathrm{m/s}
 \pi/\sqrt{40000\ \mathrm s^{-2}} = \pi/200\ \mathrm s = 15.7\ \mathrm{ms}
@@ -85,6 +86,17 @@ def test_numbers_are_read_as_other_languages_write_them() -> None:
         assert [comparison.kind for comparison in check_arithmetic(tex)] == [kind], tex
     (comparison,) = check_arithmetic("1{,}5 + 1 = 2{,}6")
     assert comparison.start == len("1{,}5 + 1 = ")
+
+
+def test_a_whole_number_is_rounded_to_its_digits_where_decimals_give_it() -> None:
+    for tex in (
+        r"5\cdot9.81 = 48",
+        r"2.5\cdot3.9 = 10",
+        r"0.7\cdot2 = 1",
+        r"2\pi\cdot50 = 314",
+        r"7\cdot8 = 57",
+    ):
+        assert [comparison.kind for comparison in check_arithmetic(tex)] == ["wrong"], tex
 
 
 def test_sides_without_a_numeral_are_compared_with_each_other() -> None:

@@ -12,6 +12,8 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import pytest
+
 from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
@@ -66,5 +68,12 @@ def test_names_in_right_texts_are_no_mistakes(make_course: MakeCourse) -> None:
     texts = [text for _, text in right_texts() if "$$" not in text and not re.search(r"\$\S", text)]
     sentences = re.sub(r"^.*\$.*$", "", fixture_text("right_texts/sentences.md"), flags=re.M)
     course = make_course("\n\n".join([*texts, sentences]), block("m.py", SIMULATION, "0.0"))
+    report = json.loads(course.main("check", "--format", "json", "-q").out)
+    assert report["diagnostics"] == []
+
+
+@pytest.mark.site
+def test_formulas_of_right_prose_hold(make_course: MakeCourse) -> None:
+    course = make_course(fixture_text("right_texts/prose.md"))
     report = json.loads(course.main("check", "--format", "json", "-q").out)
     assert report["diagnostics"] == []
