@@ -163,12 +163,12 @@ def agrees(
     """
     difference, step = (value - numeral.value).abs(), numeral.step
     if numeral.is_whole and relation == "=":
-        one = step * Real.of(Fraction(1, 10**numeral.zeros))
-        is_long = (value.abs() - one * Real.of(10 ** (numeral.digits - 1))).sign()
+        last_digit = step * Real.of(Fraction(1, 10**numeral.zeros))
+        is_long = (value.abs() - last_digit * Real.of(10 ** (numeral.digits - 1))).sign()
         if not (of_decimals and numeral.digits > 1 and is_long in (0, 1)):
             sign = difference.sign()
             return None if sign is None else sign == 0
-        step = one
+        step = last_digit
     excess = (difference * Real.of(2) - step).sign()
     return None if excess is None else excess <= 0
 
