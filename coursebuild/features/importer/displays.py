@@ -10,11 +10,13 @@ import re
 from coursebuild.features.importer.context import formula_anchor
 
 _DISPLAY = re.compile(
-    r"\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$"
+    r"(?P<ticks>`+)(?!`)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
+    r"|\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$"
     r"(?:[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\}))?"
     r"(?:[ \t]*<br[ ]*/?>)*(?P<behind>[ \t]*(?=[^\s.,;:]|[.,;:][ \t]*\S))?",
     re.DOTALL,
 )
+"""A formula between two dollar signs each, or code, in which there is none."""
 _ENVIRONMENT = re.compile(
     r"\$\$(?>[^$]+)\$\$|^[ \t]*"
     r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
@@ -49,6 +51,8 @@ def display_formula(tex: str, label: str) -> str:
 
 
 def _label_formula(match: re.Match[str]) -> str:
+    if match["tex"] is None:
+        return match[0]
     inside = _LABEL.search(match["tex"])
     label = match["myst"] or match["quarto"] or (inside[1] if inside else "")
     tex = _LABEL.sub("", match["tex"])

@@ -135,6 +135,10 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
             "- Let $$\n  a\n  $$ and\n- let $$\n  b\n  $$\n- $$\n  c\n  $$\n",
             "- Let \n  $$\n  a\n  $$\n  and\n- let \n  $$\n  b\n  $$\n- $$\n  c\n  $$\n",
         ),
+        (
+            "Between `$` or `$$`:\n\n$$\na = 0\n$$\n\nand `$$`.\n",
+            "Between `$` or `$$`:\n\n$$\na = 0\n$$\n\nand `$$`.\n",
+        ),
         ("$$\n\\text{In}\\text{: }x \\\\\ny\n$$\n", "$$\n\\text{In}\\text{: }x \\\\\ny\n$$\n"),
     ],
     ids=[
@@ -155,6 +159,7 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         "formula over lines",
         "break behind a formula",
         "formula behind a text",
+        "dollars in code",
         "lines of a formula",
     ],
 )
