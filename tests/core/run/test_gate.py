@@ -34,6 +34,9 @@ ELSEWHERE = {
     ("coursebuild/core/run/supervisor.py", "os.fork"),
     ("coursebuild/core/run/supervisor.py", "subprocess"),
     ("coursebuild/core/run/supervisor.py", "multiprocessing"),
+    # The process of a script becomes what the map names for its language.
+    ("coursebuild/core/run/script_process.py", "os.execvp"),
+    ("coursebuild/core/run/script_process.py", "subprocess"),
     # mjbench imports nothing of coursebuild: an engine, an exact motion, the processor's name.
     ("mjbench/mjbench/engines/child.py", "subprocess"),
     ("mjbench/mjbench/host.py", "subprocess"),
