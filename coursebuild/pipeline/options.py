@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
@@ -88,8 +88,10 @@ class Progress:
         try:
             yield
         finally:
-            self._stop.set()
-            ticker.join()
+            while ticker.is_alive():  # it writes below nothing that is said after this
+                with suppress(KeyboardInterrupt):  # a further Ctrl-C; one has ended the stage
+                    self._stop.set()
+                    ticker.join()
             with self._lock:
                 self._write(_ERASE)
                 self._running_since.clear()
