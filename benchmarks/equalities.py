@@ -22,12 +22,12 @@ from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).resolve().parents[1])]
 
-from benchmarks.formulas import notations, symbols, values  # noqa: E402
+from benchmarks.formulas import functions, notations, symbols, values  # noqa: E402
 from benchmarks.formulas.terms import Case  # noqa: E402
 from coursebuild.features.arithmetic.chains import check_arithmetic  # noqa: E402
 from coursebuild.features.arithmetic.identities import check_identity, read_domain  # noqa: E402
 
-KINDS = (*values.KINDS, *symbols.KINDS, *notations.KINDS)
+KINDS = (*values.KINDS, *symbols.KINDS, *notations.KINDS, *functions.KINDS)
 
 
 def make_cases(

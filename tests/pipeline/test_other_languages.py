@@ -105,7 +105,7 @@ def test_a_failure_is_shown_at_the_line_that_the_program_names(course: Folder) -
     assert "`examples/bad.sh` was ended by SIGSEGV" in course.run("check").out
     course.write(course.lesson(), "## Bad\n\n```lost file=examples/a\nx\n```\n")
     course.replace("content/course.toml", "lisp = ", 'lost = [["./nowhere", "{file}"]]\nlisp = ')
-    assert "script-failed" in course.run("check").out
+    assert "./nowhere cannot be started: No such file or directory" in course.run("check").out
 
 
 def test_a_sandbox_holds_what_a_runner_starts(course: Folder) -> None:

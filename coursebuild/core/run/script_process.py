@@ -295,18 +295,17 @@ class ScriptProcess:
         `{file}` in an argument is the script's path, `{folder}` the temporary folder of this run;
         the script's arguments follow those of the last command.
         """
-        folder, (*before, last) = self._environment["TMPDIR"], self.job["commands"]
-
-        def words(command: Sequence[str]) -> list[str]:
-            return [
-                w.replace("{file}", self.job["path"]).replace("{folder}", folder) for w in command
-            ]
-
-        for command in before:
-            if status := subprocess.call(words(command), stdin=subprocess.DEVNULL):
+        folder, path, commands = self._environment["TMPDIR"], self.job["path"], self.job["commands"]
+        for number, command in enumerate(commands, 1):
+            words = [w.replace("{file}", path).replace("{folder}", folder) for w in command]
+            try:
+                if number == len(commands):
+                    os.execvp(words[0], [*words, *self.job["args"]])
+                status = subprocess.call(words, stdin=subprocess.DEVNULL)
+            except OSError as error:
+                sys.exit(f"{words[0]} cannot be started: {error.strerror}")
+            if status:
                 sys.exit(abs(status))
-        program, *arguments = words(last)
-        os.execvp(program, [program, *arguments, *self.job["args"]])
 
     def _tracer(self) -> Tracer:
         folders = {os.path.dirname(os.__file__), *site.getsitepackages()}  # noqa: PTH120
