@@ -156,7 +156,9 @@ def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, 
             help = "print less: people read a recorded output"
             return "script-output-limit", f"{path} printed more than 1 MiB", help
         case Outcome.ENCODING:
-            help = "print text; `sys.stdout.buffer` takes bytes as they are"
+            help = "print text"
+            if extraction.script.is_python:
+                help += "; `sys.stdout.buffer` takes bytes as they are"
             return "script-encoding", f"{path} printed bytes that are not UTF-8", help
         case _:
             assert_never(run.outcome)
