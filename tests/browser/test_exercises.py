@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -72,9 +73,10 @@ def test_attempts_are_judged_watched_and_kept(page: Page) -> None:
 
 
 def pytest_of(path: Path) -> tuple[int, str]:
-    """The exit status and the output of `pytest` on a file, as a reader runs it."""
+    """The exit status and the output of `pytest` on a file, as a reader without plugins runs it."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", path.name]
-    process = subprocess.run(command, cwd=path.parent, capture_output=True, text=True)
+    plain = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    process = subprocess.run(command, cwd=path.parent, env=plain, capture_output=True, text=True)
     return process.returncode, process.stdout
 
 

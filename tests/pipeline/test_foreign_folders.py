@@ -179,7 +179,7 @@ def test_no_name_of_a_file_commands_the_terminal(make: Make) -> None:
     course.write(f"content/lessons/1.2-{order}.md", "text")
     course.write(f"models/{order}.xml", "<mujoco><worldbody><geom/></worldbody></mujoco>")
     for arguments in (("check",), ("bench",), ("diet", order), ("rename", "1.1", order)):
-        result = course.run(*arguments)
+        result = course.main(*arguments)
         assert result.status != 0
         assert "\x1b" not in result.out + result.err and "␛]0;x␇" in result.out + result.err
 

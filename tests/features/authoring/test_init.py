@@ -25,6 +25,15 @@ wrote 17 files to {0}, in a new Git repository
 """
 
 
+@pytest.fixture(scope="module")
+def new_course(tmp_path_factory: pytest.TempPathFactory) -> Folder:
+    """A course as `init` writes it, which nobody changes."""
+    folder = Folder(tmp_path_factory.mktemp("new"))
+    result = folder.main("init")
+    assert (result.status, "coursebuild serve " in result.out) == (0, True)
+    return folder
+
+
 @pytest.mark.site
 @pytest.mark.engine
 def test_new_course_passes_check_and_build_as_it_is(tmp_path: Path, stores: Path) -> None:
@@ -51,43 +60,36 @@ def test_new_course_passes_check_and_build_as_it_is(tmp_path: Path, stores: Path
 
 
 @pytest.mark.site
-def test_new_course_has_what_git_and_an_editor_need(tmp_path: Path) -> None:
-    folder = Folder(tmp_path)
-    result = folder.main("init")
-    assert (result.status, "coursebuild serve " in result.out) == (0, True)
-    files = folder.tree()
-    assert {"public/", "examples/", ".coursebuild/"} <= {*folder.text(".gitignore").split()}
+def test_new_course_has_what_git_and_an_editor_need(new_course: Folder) -> None:
+    files = new_course.tree()
+    assert {"public/", "examples/", ".coursebuild/"} <= {*new_course.text(".gitignore").split()}
     for path, data in files.items():
         if path.endswith(".json"):
             assert json.loads(data), path
         if path.endswith(".toml"):
             schema = data.decode().splitlines()[0].removeprefix("#:schema ")
-            assert (folder.root / "content" / schema).is_file()
+            assert (new_course.root / "content" / schema).is_file()
             assert tomllib.loads(data.decode())["verify"] == {"compare": "digits"}
 
 
 @pytest.mark.site
-def test_new_course_names_its_packages_with_hashes(tmp_path: Path) -> None:
-    folder = Folder(tmp_path)
-    assert folder.main("init").status == 0
-    text = folder.text("requirements.lock")
+def test_new_course_names_its_packages_with_hashes(new_course: Folder) -> None:
+    text = new_course.text("requirements.lock")
     requirements = re.split(r"(?m)^(?=[\w.-]+==)", text)[1:]
     assert len(requirements) > 30
     assert [r for r in requirements if not re.search(r"--hash=sha256:[0-9a-f]{64}\b", r)] == []
-    assert f"\ncoursebuild=={__version__}\n" in folder.text(".github/coursebuild.txt")
+    assert f"\ncoursebuild=={__version__}\n" in new_course.text(".github/coursebuild.txt")
     drawing = {f"{name}=={version(name)}" for name in ("matplotlib", "pillow")}
-    assert {*folder.text("requirements.txt").splitlines()[3:]} == drawing
+    assert {*new_course.text("requirements.txt").splitlines()[3:]} == drawing
 
 
 @pytest.mark.site
-def test_new_course_has_one_engine_and_one_lock_at_home_and_for_jobs(tmp_path: Path) -> None:
-    folder = Folder(tmp_path)
-    assert folder.main("init").status == 0
-    (engine,) = re.findall(r"(?m)^mujoco==(\S+)", folder.text("requirements.lock"))
-    assert tomllib.loads(folder.text("content/course.toml"))["course"]["engine"] == engine
+def test_new_course_has_one_engine_and_one_lock_at_home_and_for_jobs(new_course: Folder) -> None:
+    (engine,) = re.findall(r"(?m)^mujoco==(\S+)", new_course.text("requirements.lock"))
+    assert tomllib.loads(new_course.text("content/course.toml"))["course"]["engine"] == engine
     installation = "pip install --require-hashes -r requirements.lock\n"
     texts = ["README.md", ".github/workflows/course.yml", ".github/workflows/weekly.yml"]
-    assert [path for path in texts if installation not in folder.text(path)] == []
+    assert [path for path in texts if installation not in new_course.text(path)] == []
 
 
 @pytest.mark.site
