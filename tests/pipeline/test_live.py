@@ -28,6 +28,7 @@ from coursebuild.preview import rebuild
 from support.built_sites import BuiltCourses
 from support.edited_course import EDITS, WORDS, Edit, breakage, plan, remove
 from support.edited_course import Course as EditedCourse
+from support.fixture_cases import fixture_tables, fixture_text
 from support.live_course import TRIALS, Builds, Live, differences, share
 from support.live_course import builds as builds
 from support.live_course import live as live
@@ -316,61 +317,8 @@ def test_course_of_summaries_tells_what_the_whole_course_tells(tmp_path: Path) -
         assert parts_of_summaries == whole
 
 
-TEXT = "".join(
-    [
-        "## Heading {#here}\n\n",
-        "# Top [a](lesson:1.2#there) $x$\n\n",
-        "Prose: *[a link](lesson:1.2#here)*, ![p](p.png), <b id=b>html</b>, `12.5`{out} more.\n\n",
-        "The [thing]{term} is *a [b](lesson:1.1)*; see [it](term:thing), [no](term:nothing).\n\n",
-        "$$a$$ {#eq:a}\n\nBy [](#eq:a) and [](lesson:1.2#eq:a), $$b$$ [x](lesson:1.1#eq:gone).\n\n",
-        "## A [title]{term}\n\n> The [thing]{term=other} is\n>\n> $$c$$\n\n",
-        "See lesson 1.2, [x](page:about#here) and [y](examples/a.py), [z](model:box).\n\n",
-        "[^n] and [^n] again\n\n[^n]: A note: [l](#nowhere), $y$, `1.5`{out=examples/a.py}\n\n",
-        '<div id="raw">\n<a href="#gone">x</a>\n</div>\n\n',
-        "> [!note]- A *title* [t](lesson:9.9)\n> Inside <i>x</i>\n>\n> ## In it\n\n",
-        "> quoted `2`{out}\n>\n> - item [i](level:1)\n>   - deeper ![q](no.png)\n\n",
-        "| a | `3`{out} |\n| - | - |\n| [b](lesson:1.1) | $c$ |\n\n",
-        block("a.py", 'print("one", 1.5)\nprint(12.5)\n', "one 1.5\n12.5"),
-        block("a.py", "print(2)\n", "2"),
-        block("b.py", 'print("x 1")\nprint("y 2")\n')
-        + "Output:\n\n| n | v |\n| - | - |\n| x | 1 |\n| [y](lesson:1.2) | $2$ |\n\n",
-        "```mjcf\n<mujoco/>\n```\n\n",
-        "```bench box\n```\n\n",
-        "```bench arm scenario=swing show=table\n```\n\n",
-        '```mjcf fragment="worldbody" error="no"\n<body/>\n```\n\n',
-        '```lab simlab\n{"model": "box", "note": "A [n](lesson:1.2) `4`{out}", "key": 1}\n```\n\n',
-        '```lab other\n{"model": "gone"}\n```\n\n',
-        '```quiz\n{"id": "q", "title": "Q", "questions": [{"kind": "output", "q": "[w](#here) $z$",'
-        ' "script": "examples/a.py", "line": 7, "explain": "## E"},'
-        ' {"kind": "mcq", "q": "W?", "options": ["[o](lesson:1.1)", "b"], "answer": 0,'
-        ' "feedback": ["![f](f.png)", ""]}]}\n```\n\n',
-        "```io\ninput: [i](lesson:3.3)\nprocess: `5`{out}\noutput: o\n```\n\n",
-        "    indented\n\n",
-        "Table: *So* {#tab:a}\n\n| a |\n| - |\n| `6`{out} |\n\n",
-        "By [](#tab:a), [](lesson:1.2#fig:a).\n\n",
-        "Figure: ![a](p.png) It. {#fig:a}\n\n```bash {#lst:a}\nls\n```\n\n",
-        "$$\n\\frac{a}{b}\n$$\n\n",
-        "***\n\n",
-    ]
-)
-VISIBLE_CHANGES = [
-    ("{#here}", "{#there}"),
-    ("lesson:1.2#here", "lesson:1.1#here"),
-    ("<b id=b>", "<b id=c>"),
-    ('href="#gone"', 'href="#raw"'),
-    ("[thing]{term}", "[thing]{term=sing}"),
-    ("{#eq:a}", "{#eq:b}"),
-    ("{#tab:a}", "{#tab:b}"),
-    ("{#lst:a}", "{#lst:b}"),
-    ("print(2)", "print(3)"),
-    ("| x | 1 |", "| x | 2 |"),
-    ("<mujoco/>", "<mujoco />"),
-    ('"id": "q"', '"id": "r"'),
-    ('"model": "box"', '"model": "ball"'),
-    ("bench box", "bench arm"),
-    ("[!note]", "[!warning]"),
-    ("![p](p.png)", "![p](q.png)"),
-]
+TEXT = fixture_text("documents/fingerprint.md")
+VISIBLE_CHANGES = fixture_tables("fingerprint")["changes"]
 
 
 @pytest.mark.site

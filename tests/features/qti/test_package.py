@@ -21,7 +21,7 @@ from support.archives import (
     packaging_schema,
     referenced_files,
 )
-from support.fixture_cases import check_lines
+from support.fixture_cases import check_lines, fixture_tables
 from support.hostile_html import HOSTILE, REFUSED_TEXTS
 from support.qti_rules import MATHML, QTI
 from support.qti_rules import mistakes as item_mistakes
@@ -282,27 +282,7 @@ GOOD_ITEM = f"""\
 <setOutcomeValue identifier="SCORE"><baseValue baseType="float">1</baseValue></setOutcomeValue>
 </responseIf></responseCondition></responseProcessing>
 </assessmentItem>"""
-BAD = (
-    ('adaptive="false"', ""),
-    ('identifier="q"', 'identifier="4q"'),
-    ('cardinality="single" baseType="i', 'cardinality="one" baseType="i'),
-    ('shuffle="false"', ""),
-    ('identifier="B">', 'identifier="A">'),
-    ("<value>A</value>", "<value>C</value>"),
-    ("<value>A</value>", "<value>A</value><value>B</value>"),
-    ("<itemBody>", "<itemBody>text"),
-    ("<itemBody>", "<itemBody><b>inline</b>"),
-    ("<itemBody>", "<itemBody><video/>"),
-    ("<itemBody>", "<itemBody><table><tr><td>no body</td></tr></table>"),
-    ("<itemBody>", '<itemBody><p onclick="x()">p</p>'),
-    ("<p>Which", "<p><p>in</p>Which"),
-    ('<variable identifier="RESPONSE"/>', ""),
-    ('<variable identifier="RESPONSE"/>', '<variable identifier="OTHER"/>'),
-    ('setOutcomeValue identifier="SCORE"', 'setOutcomeValue identifier="POINTS"'),
-    ("</itemBody>", "</itemBody><outcomeDeclaration/>"),
-    ("<p>Which", '<p><textEntryInteraction responseIdentifier="RESPONSE"/>Which'),
-    ("<p>Which", '<p><img src="a.png"/>Which'),
-)
+BAD = fixture_tables("bad_items")["replacements"]
 
 
 def test_rules_find_every_mistake_in_an_item() -> None:
