@@ -302,9 +302,9 @@ os.execv(sys.executable, [sys.executable, "-m", pip, option, target, install, *w
 
 
 def test_uv_installs_where_there_is_no_pip(
-    make: Make, wheels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make: Make, wheels: Path, installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    course = make(f"## A\n\n{NUMBER}")
+    course = borrow(make(f"## A\n\n{NUMBER}"), installed, VERSION)
     monkeypatch.setitem(sys.modules, "pip", None)
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
     result = check_against(course, "-q")
@@ -322,8 +322,10 @@ def test_uv_installs_where_there_is_no_pip(
     assert result.err.endswith("the environment variables UV_FIND_LINKS and UV_OFFLINE\n")
 
 
-def test_environment_that_is_not_what_was_installed_is_made_anew(make: Make, wheels: Path) -> None:
-    course = make(f"## A\n\n{NUMBER}")
+def test_environment_that_is_not_what_was_installed_is_made_anew(
+    make: Make, wheels: Path, installed: Path
+) -> None:
+    course = borrow(make(f"## A\n\n{NUMBER}"), installed, VERSION)
     first = check_against(course, "-q")
     assert f"changed by MuJoCo {NEW_VERSION}" in first.out
     (environment,) = environments_folder().glob(f"mujoco-{NEW_VERSION}-*")
@@ -352,9 +354,9 @@ def test_environment_that_is_not_what_was_installed_is_made_anew(make: Make, whe
 
 
 def test_environments_are_kept_apart_by_where_the_installer_looks(
-    make: Make, wheels: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    make: Make, wheels: Path, installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    course = make(f"## A\n\n{NUMBER}")
+    course = borrow(make(f"## A\n\n{NUMBER}"), installed, VERSION)
     check_against(course, "-q")
     mirror = tmp_path / "mirror"
     shutil.copytree(wheels, mirror)
@@ -370,8 +372,10 @@ def test_environments_are_kept_apart_by_where_the_installer_looks(
     assert "printed 9001000" in check_against(course, "-q").out
 
 
-def test_settings_of_installers_in_a_course_are_not_obeyed(make: Make, wheels: Path) -> None:
-    course = make(f"## A\n\n{NUMBER}")
+def test_settings_of_installers_in_a_course_are_not_obeyed(
+    make: Make, wheels: Path, installed: Path
+) -> None:
+    course = borrow(make(f"## A\n\n{NUMBER}"), installed, VERSION)
     for name in ("pip.conf", "uv.toml", "pyproject.toml", "pip/__main__.py", "pip/__init__.py"):
         course.write(name, "raise SystemExit(3)")
     result = course.run("check", "--against", NEW_VERSION, "-q")
