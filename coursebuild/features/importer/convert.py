@@ -26,6 +26,7 @@ from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext, script_path_of, to_anchor
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.jsx import is_mdx
+from coursebuild.features.importer.lost_words import find_lost_words
 from coursebuild.features.importer.prose import find_anchors
 from coursebuild.features.importer.references import complete_texts
 from coursebuild.features.importer.source_files import (
@@ -38,6 +39,12 @@ from coursebuild.features.importer.source_files import (
 
 TRIED = "tried-lessons"
 """The kind of entries that say of what proving made of a file: what it was made from at first."""
+_LOST_WORDS = """
+## Words that are nowhere in the new course
+
+Names by which the other tool is told how a page looks are of no use here. Is there anything else?
+
+"""
 _GITIGNORE = b"public/\nexamples/\n.coursebuild/\n"
 
 
@@ -94,7 +101,10 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     ):
         files.account.taken[kind] += len(paths)
     _leave_unused(files, (path for path in files if path in unused))
-    out["IMPORT.md"] = _encode(files.account.text(files.name))
+    account = files.account.text(files.name)
+    if lost := [*find_lost_words(files, out, account)]:
+        account += _LOST_WORDS + "".join(f"{line}\n" for line in lost)
+    out["IMPORT.md"] = _encode(account)
     return ConvertedCourse(dict(sorted(out.items())), files.account, context.notebook_outputs)
 
 

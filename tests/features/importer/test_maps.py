@@ -204,3 +204,20 @@ def test_a_book_of_its_first_page_alone_has_a_lesson(tmp_path: Path) -> None:
     book = "book:\n  title: Q\n  chapters: [index.qmd]\n"
     outline, pages, _ = import_map(tmp_path, {"_quarto.yml": book, "index.qmd": ""})
     assert (outline, pages) == ([("Q", ["index.qmd"])], [])
+
+
+def test_a_part_within_a_part_is_left_by_its_name_and_a_description_is_a_summary(
+    tmp_path: Path,
+) -> None:
+    files = {
+        "docusaurus.config.js": "module.exports = {title: 'D'}",
+        "docs/a/_category_.json": '{"label": "Outer", "link": {"description": "All of it"}}',
+        "docs/a/one.md": "",
+        "docs/a/b/_category_.yml": "label: Inner\n",
+        "docs/a/b/two.md": "",
+    }
+    outline, _, left = import_map(tmp_path, files)
+    assert outline == [("Outer", ["docs/a/b/two.md", "docs/a/one.md"])]
+    assert [message for message in left if "“Inner”" in message]
+    course = convert(SourceFiles(tmp_path))
+    assert b'summary = "All of it"' in course.files["content/course.toml"]
