@@ -27,6 +27,7 @@ from coursebuild.features.importer.directives import (
     split_options,
 )
 from coursebuild.features.importer.jsx import without_jsx
+from coursebuild.features.importer.other_cells import language_of, write_other_cell
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.segments import lower_titles, read_markdown
 from coursebuild.features.importer.source_files import Segment
@@ -64,6 +65,8 @@ def _convert(segment: Segment, context: LessonContext) -> str:
     if segment.kind == "prose":
         text = rewrite_prose(without_jsx(text, context) if context.is_mdx else text, context)
         return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
+    if language := language_of(segment):
+        return write_other_cell(segment, language, context)
     if segment.kind == "cell":
         return write_cell(segment, context)
     directive = _DIRECTIVE.fullmatch(segment.head)

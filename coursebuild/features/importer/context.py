@@ -52,6 +52,10 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """Of the script that the lesson's cells become."""
     parts: list[str] = field(default_factory=list)
     """The cells that are parts of it by now."""
+    scripts: list[str] = field(default_factory=list)
+    """The scripts that its cells of other languages are."""
+    single_languages: frozenset[str] = frozenset()
+    """The languages of which it has a single cell."""
     figures: list[str] = field(default_factory=list)
     """The files that it draws."""
     notebook_outputs: list[tuple[str, str]] = field(default_factory=list)

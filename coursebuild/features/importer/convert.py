@@ -27,6 +27,7 @@ from coursebuild.features.importer.context import LessonContext, script_path_of,
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.jsx import is_mdx
 from coursebuild.features.importer.lost_words import find_lost_words
+from coursebuild.features.importer.other_cells import languages_of_single_cells
 from coursebuild.features.importer.prose import find_anchors
 from coursebuild.features.importer.references import complete_texts
 from coursebuild.features.importer.source_files import (
@@ -341,6 +342,8 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
         substitutions={**course_context.substitutions, **text.substitutions},
         title=text.title,
         parts=[],
+        scripts=[],
+        single_languages=languages_of_single_cells(text.segments),
         figures=[],
         notes=[],
     )

@@ -117,7 +117,18 @@ MYST: list[Construct] = [
         CHANGED,
         "```{exercise-start}\n:label: ex3\n```\n\n```python\nwa78\n```\n\n```{exercise-end}\n```",
     ),
-    ("directive `{code-cell}`", LEFT, "```{code-cell} julia\nwa79\n```"),
+    ("cell of `julia`", LEFT, "```{code-cell} julia\nwa79\n```"),
+    (
+        "value that is glued",
+        CHANGED,
+        "```{code-cell} python\nfrom myst_nb import glue\nglue('wa93', 2 * 3,\n  display=False)\n```",
+    ),
+    (
+        "figure of a cell",
+        CHANGED,
+        "```{code-cell} python\nimport matplotlib.pyplot as plt\nplt.plot([1])\n"
+        "plt.title('Title wa94')\nplt.savefig('out/wa95.png', dpi=80)\n```",
+    ),
     ("role `{del}`", CHANGED, "{del}`wa80`"),
     ("substitution", CHANGED, "The {{ mass }} wa81"),
     ("link", LEFT, "[wa82](inv:python#print)"),
@@ -150,7 +161,10 @@ QUARTO: list[Construct] = [
         "```{python}\n#| label: fig-cell\n#| fig-cap: Caption wb18\n"
         "import matplotlib.pyplot as plt\nplt.plot([1])\n```\n\nSee @fig-cell.",
     ),
-    ("directive `{r}`", LEFT, "```{r}\nwb19\n```"),
+    ("cell of `r`", LEFT, '```{r, echo=FALSE, fig.cap="Two wb18"}\nwb19\n```'),
+    ("cell of `bash`", LEFT, "```{bash}\n#| label: wb60\necho wb61\n```"),
+    ("cell of `r`", LEFT, "```{r}\nwb62\n```\n\n```{r}\nwb63\n```"),
+    ("cell of `julia`", LEFT, "```{julia}\n#| eval: false\nwb64\n```"),
     ("caption of a table", CHANGED, "| a |\n| - |\n| wb20 |\n\n: Caption wb21 {#tbl-t}"),
     ("attributes", CHANGED, "[words wb22]{.smallcaps}"),
     ("block that is raw", LEFT, "```{=latex}\n\\wb23\n```"),
@@ -375,7 +389,8 @@ def test_every_part_of_a_notebook_is_taken_changed_or_left(tmp_path: Path) -> No
     course = import_files(tmp_path, files)
     table = counts(course)
     expected = {
-        "cell": (0, 5, 2),
+        "cell": (0, 5, 1),
+        "cell of `bash`": (0, 0, 1),
         "figure of a cell": (0, 1, 0),
         "file": (2, 0, 1),
         "magic": (0, 0, 1),
