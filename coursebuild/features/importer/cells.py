@@ -255,8 +255,8 @@ def _without_host(text: str, context: LessonContext) -> str:
             case ast.ImportFrom(module="myst_nb"):
                 pass
             case ast.Expr(ast.Call(ast.Name("glue"), [ast.Constant(str(name)), value, *_])):
-                shown = ast.get_source_segment(text, value)
-                lines[statement.lineno - 1] = f'print("{name}:", {shown})'
+                text_of_value = ast.get_source_segment(text, value)
+                lines[statement.lineno - 1] = f'print("{name}:", {text_of_value})'
                 first, end = statement.lineno, statement.end_lineno or statement.lineno
                 lines[first:end] = [""] * (end - first)
                 change = "printed by its cell: bind the number where the text has it"

@@ -20,6 +20,7 @@ from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model.course import BIBLIOGRAPHY, CALLOUTS
 from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.values import fingerprint
+from coursebuild.features.importer.absent_labs import lab_files
 from coursebuild.features.importer.account import Account
 from coursebuild.features.importer.blocks import convert_segment
 from coursebuild.features.importer.contents import read_contents
@@ -92,6 +93,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     out |= packages | {path: files.read(source) for source, path in models.items()}
     texts_and_models = (data for path, data in out.items() if path.endswith((".md", ".xml")))
     longest = max(map(len, texts_and_models), default=0)
+    out |= {path: _encode(text) for path, text in lab_files(context.labs)}
     lines = map_lines(course, ids, context.callouts, ("src",) if packages else (), longest)
     out["content/course.toml"] = _encode("".join(f"{line}\n" for line in lines))
     out[".gitignore"] = _GITIGNORE
@@ -373,7 +375,7 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
             yield f"src/{module}.py", files.read(path)
 
 
-_OTHER_TEXTS = tuple(".adoc .docx .htm .html .markdown .org .pdf .rmd .rst .tex .txt".split())
+_OTHER_TEXTS = tuple(".adoc .docx .htm .html .org .pdf .rst .tex .txt".split())
 
 
 def _leave_unused(files: SourceFiles, paths: Iterable[str]) -> None:

@@ -30,10 +30,10 @@ def find_lost_words(
     files: SourceFiles, new_files: Mapping[str, bytes], account: str
 ) -> Iterator[str]:
     """Yield a line for each file that was read and of which words are lost, with their places."""
-    known = {*_words(account), *_words(" ".join((*files, *new_files)))}
+    vocabulary = {*_words(account), *_words(" ".join((*files, *new_files)))}
     for path, data in new_files.items():
         if path.endswith(_NEW_TEXTS):
-            known |= {*_words(data.decode("utf-8", "replace"))}
+            vocabulary |= {*_words(data.decode("utf-8", "replace"))}
     for path in sorted(files.read_paths):
         is_map = path.endswith(_MAPS) and f"content/files/{path}" not in new_files
         if not (path.endswith(TEXTS) or is_map):
@@ -44,8 +44,8 @@ def find_lost_words(
             continue  # which is told already
         places = []
         for place, text in _places(path, whole):
-            lost = [word for word in dict.fromkeys(_words(text)) if word not in known]
-            known.update(lost)  # each is named once
+            lost = [word for word in dict.fromkeys(_words(text)) if word not in vocabulary]
+            vocabulary.update(lost)  # each is named once
             if lost:
                 rest = f" and {len(lost) - _MOST_WORDS} more" * (len(lost) > _MOST_WORDS)
                 places.append(f"{place}: {' '.join(lost[:_MOST_WORDS])}{rest}")
@@ -71,6 +71,6 @@ def _places(path: str, text: str) -> Iterable[tuple[str, str]]:
         for output in cell.get("outputs") or ():
             values = (output.get("text"), output.get("evalue"), output.get("traceback"))
             data = output.get("data") or {}
-            shown = (value for kind, value in data.items() if kind.startswith("text/"))
-            parts += (join_lines(value) for value in (*values, *shown) if value)
+            texts = (value for kind, value in data.items() if kind.startswith("text/"))
+            parts += (join_lines(value) for value in (*values, *texts) if value)
         yield f"cell {number}", _MARKUP.sub(" ", "\n".join(parts))

@@ -95,8 +95,8 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     number = f"_{len(context.scripts) + 1}" if context.scripts else ""
     path = f"{stem}{number}.{_EXTENSIONS[language]}"
     context.scripts.append(path)
-    how = how_shown(replace(cell, text="\n".join(f"#| {n}: {v}" for n, v in options.items())))
-    script = marks.fence(f"{language} file={path}{how}", code)
+    word = how_shown(replace(cell, text="\n".join(f"#| {n}: {v}" for n, v in options.items())))
+    script = marks.fence(f"{language} file={path}{word}", code)
     return "\n\n".join((*head, script, *_outputs(cell, language, context)))
 
 

@@ -202,33 +202,37 @@ def _read_ruled(lines: Sequence[str]) -> _Table | None:
     if not has_end and _RULE.fullmatch(body[-1]):
         del body[-1]
     head = _widened(lines[is_long:rule])
-    cuts = [0, *starts[1:], max(map(len, (*body, *head, lines[rule])))]
-    if any(re.match(r"[^\s\0]{2}", line[cut - 1 : cut + 1]) for cut in cuts[1:-1] for line in body):
+    edges = [0, *starts[1:], max(map(len, (*body, *head, lines[rule])))]
+    if any(
+        re.match(r"[^\s\0]{2}", line[edge - 1 : edge + 1]) for edge in edges[1:-1] for line in body
+    ):
         return None  # a word stands where one column ends
     groups = [[*group] for is_text, group in groupby(body, lambda s: bool(s.strip())) if is_text]
     is_of_lines = has_end and len(groups) > 1
-    rows = [_cut(group, cuts) for group in (groups if is_of_lines else ([line] for line in body))]
-    cells = _cut(head, cuts)
+    rows = [
+        _split(group, edges) for group in (groups if is_of_lines else ([line] for line in body))
+    ]
+    cells = _split(head, edges)
     ends = [run.end() for run in re.finditer("-+", lines[rule])]
     sides = [
-        _side(next((line for line in column if line.strip()), ""), cut, start, stop)
-        for column, cut, start, stop in zip(
-            cells if head else rows[0], cuts[:-1], starts, ends, strict=True
+        _side(next((line for line in column if line.strip()), ""), edge, start, stop)
+        for column, edge, start, stop in zip(
+            cells if head else rows[0], edges[:-1], starts, ends, strict=True
         )
     ]
     return _Table(end + has_end, cells, rows, sides)
 
 
-def _cut(lines: Sequence[str], cuts: Sequence[int]) -> Cells:
-    return [[line[first:last] for line in lines] for first, last in pairwise(cuts)]
+def _split(lines: Sequence[str], edges: Sequence[int]) -> Cells:
+    return [[line[first:last] for line in lines] for first, last in pairwise(edges)]
 
 
-def _side(text: str, cut: int, start: int, end: int) -> str:
+def _side(text: str, edge: int, start: int, end: int) -> str:
     """Where the words of a column stand above its hyphens."""
     if not text.strip():
         return ""
-    is_left = cut + len(text) - len(text.lstrip()) <= start
-    is_right = cut + len(text.rstrip()) >= end
+    is_left = edge + len(text) - len(text.lstrip()) <= start
+    is_right = edge + len(text.rstrip()) >= end
     return "" if is_left and is_right else "l" if is_left else "r" if is_right else "c"
 
 

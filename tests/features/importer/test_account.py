@@ -121,7 +121,8 @@ MYST: list[Construct] = [
     (
         "value that is glued",
         CHANGED,
-        "```{code-cell} python\nfrom myst_nb import glue\nglue('wa93', 2 * 3,\n  display=False)\n```",
+        "```{code-cell} python\nfrom myst_nb import glue\n"
+        "glue('wa93', 2 * 3,\n  display=False)\n```",
     ),
     (
         "figure of a cell",
