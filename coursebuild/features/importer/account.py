@@ -45,6 +45,8 @@ class Account:
         self.taken: Counter[str] = Counter()
         self.changed: Counter[tuple[str, str]] = Counter()
         """How often something of a kind was changed in a way."""
+        self._words: dict[tuple[str, str], list[str]] = defaultdict(list)
+        """What a change leaves out, or what it puts in the place of what."""
         self._left: dict[Leftover, None] = {}
 
     @property
@@ -59,6 +61,11 @@ class Account:
     def leave(self, leftover: Leftover) -> None:
         """Note that something is left; the same twice is one."""
         self._left[leftover] = None
+
+    def change(self, kind: str, change: str, words: str) -> None:
+        """Note that something of a kind was changed in a way, and the words that go by that."""
+        self.changed[kind, change] += 1
+        self._words[kind, change].append(" ".join(words.split()))
 
     def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
         """Return what a part of a text becomes, and note what that is: kept, changed or left.
@@ -105,10 +112,9 @@ class Account:
             lines.append(f"| {kind} | {' | '.join(str(count or '') for count in counts)} |")
         if self.changed:
             lines += ["", "## Changed", ""]
-            lines += (
-                f"- {kind}: {change} ({plural(count, 'time')})"
-                for (kind, change), count in sorted(self.changed.items())
-            )
+            for (kind, change), count in sorted(self.changed.items()):
+                lines.append(f"- {kind}: {change} ({plural(count, 'time')})")
+                lines += (f"  - {words}" for words in self._words[kind, change])
         if self._left:
             lines += ["", "## Left", ""]
         places = defaultdict[str, list[str]](list)

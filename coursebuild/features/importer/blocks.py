@@ -13,6 +13,7 @@ from coursebuild.api import marks
 from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
+from coursebuild.features.importer.absent_labs import write_absent_lab
 from coursebuild.features.importer.cells import (
     code_for_readers,
     options_of,
@@ -27,6 +28,7 @@ from coursebuild.features.importer.directives import (
     split_options,
 )
 from coursebuild.features.importer.jsx import without_jsx
+from coursebuild.features.importer.other_cells import language_of, write_other_cell
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.segments import lower_titles, read_markdown
 from coursebuild.features.importer.source_files import Segment
@@ -64,6 +66,8 @@ def _convert(segment: Segment, context: LessonContext) -> str:
     if segment.kind == "prose":
         text = rewrite_prose(without_jsx(text, context) if context.is_mdx else text, context)
         return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
+    if language := language_of(segment):
+        return write_other_cell(segment, language, context)
     if segment.kind == "cell":
         return write_cell(segment, context)
     directive = _DIRECTIVE.fullmatch(segment.head)
@@ -181,14 +185,14 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     if listing := re.search(r"\bfile=((?!examples/)\S+)", head) if kind == "python" else None:
         context.files.account.changed["listing of a file", "its name, and its code, not run"] += 1
         return f"**`{listing[1]}`**\n\n{marks.fence('python', text)}"
+    if kind in ("lab", "quiz") and context.camera_is_position:
+        text = _CAMERA.sub(_reverse_camera, text)
     if (
         kind == "lab"
         and (name := head.partition(" ")[2].split(" ")[0])
         and name not in BUILT_IN_KINDS
     ):
-        return _write_absent_lab(name, text, context)
-    if kind in ("lab", "quiz") and context.camera_is_position:
-        text = _CAMERA.sub(_reverse_camera, text)
+        return write_absent_lab(name, text, context)
     if package := missing_package(kind):
         message = f"a block of `{kind}` is shown as text: install {package}, and name it so"
         context.leave(f"block of `{kind}`", message)
@@ -219,21 +223,6 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     new = marks.fence(language, text)
     context.convert(kind, "without what its tool adds", head, lambda: language)
     return (f"**{words}**\n\n" if words else "") + new
-
-
-def _write_absent_lab(kind: str, text: str, context: LessonContext) -> str:
-    """Return a card for a lab of a kind that there is none of here: its title, note and fields."""
-    context.leave(
-        "lab", f"a lab of the kind `{kind}`: write content/labs/{kind}.js, or choose another kind"
-    )
-    fields: dict[str, object] = {}
-    with contextlib.suppress(ValueError, RecursionError):
-        value = json.loads(text)
-        fields = value if isinstance(value, dict) else {}
-    words = [str(fields[key]) for key in ("title", "note", "caption") if fields.get(key)]
-    head = f"[!note] This lab is not here yet: {kind}"
-    parts = (*words, marks.fence("json" if fields else "text", text))
-    return marks.block_quote("\n\n".join((head, *parts)))
 
 
 def _convert_nested(text: str, context: LessonContext) -> str:

@@ -53,7 +53,9 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
         blocks = [marks.fence(language, shown_code)] if shown_code else []
         return "\n\n".join((*blocks, *write_outputs(cell, context)))
     code, figure = _with_new_paths(code, context), ""
-    if _draws(cell, code):
+    if _SAVED.search(code):
+        code, figure = _take_saved_figures(cell, code, context)
+    elif _draws(cell, code):
         pyplot = next(filter(None, map(_name_of_pyplot, (*context.parts, code))), "")
         if pyplot:
             code, figure = _save_figure(cell, code, pyplot, context)
@@ -91,6 +93,57 @@ def _name_of_pyplot(code: str) -> str:
     return whole if whole in code else ""
 
 
+_SAVED = re.compile(
+    r"(?P<call>\.(?:savefig|imsave)\(\s*)([\"'])(?P<path>[^\"'\n{}]+\.(?:svg|png))\2"
+)
+"""A call that saves a figure under a name."""
+
+
+def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tuple[str, str]:
+    """Return code that saves its figures beside the lesson, and the paragraphs that show them."""
+    names: dict[str, str] = {}
+    for match in _SAVED.finditer(code):
+        path = match["path"]
+        if path in names:
+            continue
+        stem, _, extension = posixpath.basename(path).rpartition(".")
+        name = f"{to_anchor(stem)}.{extension}"
+        if name in context.figures:
+            name = f"{_picture_stem(context)}.{extension}"
+        names[path] = name
+        context.figures.append(name)
+        source = path.removeprefix("content/files/")  # where a file that was there went
+        source = source if source in context.files else context.resolve_path(path)
+        data = context.files.read(source) if source in context.files else b""
+        if cell.picture is not None and cell.picture[0] == f".{extension}":
+            data = data or cell.picture[1]
+        picture = prepare_figure(name, data) if data else ""
+        if isinstance(picture, bytes):
+            context.copies[f"{context.folder}/{name}"] = picture
+        context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
+    code = _SAVED.sub(lambda match: f'{match["call"]}"{names[match["path"]]}"', code)
+    lines = code.rstrip("\n").split("\n")
+    caption = _caption_of(cell, code, context)
+    label = len(names) == 1
+    figures = (_write_figure(cell, name, caption, has_label=label) for name in names.values())
+    return "\n".join(lines[:-1] if lines[-1] == "pass" else lines), "\n\n".join(figures)
+
+
+def _caption_of(cell: Segment, code: str, context: LessonContext) -> str:
+    options, title = options_of(cell), _DRAWN_TITLE.search(code)
+    caption = options.get("fig-cap") or options.get("caption") or (title[2] if title else "")
+    return rewrite_prose(caption.strip("\"' ") or context.title, context).rstrip()
+
+
+def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = True) -> str:
+    options = options_of(cell)
+    alt = options.get("fig-alt", options.get("alt", "")).strip("\"' ") or caption
+    alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)
+    label = options.get("label", "") if has_label else ""
+    mark = f" {{#fig:{to_anchor(label.removeprefix('fig-'))}}}" if label.startswith("fig-") else ""
+    return f"Figure: ![{alt}]({name}) {caption}{mark}"
+
+
 _DRAWN_TITLE = re.compile(
     r"\.(?:set_)?(?:sup)?title\(\s*(?:r|f(?!.*\{))?([\"'])((?:(?!\1).)+)\1"  # none is computed
 )
@@ -109,14 +162,6 @@ def _draws(cell: Segment, code: str) -> bool:
 
 def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) -> tuple[str, str]:
     """Return code that saves what it draws, and the paragraph that shows it."""
-    options = options_of(cell)
-    title = _DRAWN_TITLE.search(code)
-    caption = options.get("fig-cap") or options.get("caption") or (title[2] if title else "")
-    caption = rewrite_prose(caption.strip("\"' ") or context.title, context)
-    alt = options.get("fig-alt", options.get("alt", "")).strip("\"' ") or caption
-    alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)
-    label = options.get("label", "")
-    mark = f" {{#fig:{to_anchor(label.removeprefix('fig-'))}}}" if label.startswith("fig-") else ""
     name = _keep_picture(cell, context) or f"{_picture_stem(context)}.svg"
     context.figures.append(name)
     context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
@@ -124,12 +169,12 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
     if lines[-1] == "pass":
         del lines[-1]
     code = "\n".join((*lines, f'{pyplot}.savefig("{name}")', f'{pyplot}.close("all")'))
-    return code, f"Figure: ![{alt}]({name}) {caption.rstrip()}{mark}"
+    return code, _write_figure(cell, name, _caption_of(cell, code, context))
 
 
 def write_outputs(cell: Segment, context: LessonContext) -> Iterator[str]:
     """Yield what is recorded below code that is only shown: its text, its picture."""
-    if text := _ESCAPE.sub("", f"{cell.printed}{cell.value}").strip("\n"):
+    if text := plain_output(f"{cell.printed}{cell.value}"):
         context.files.account.changed["output of code that is shown", "a block of text"] += 1
         yield marks.fence("text", text)
     if name := _keep_picture(cell, context):
@@ -207,6 +252,16 @@ def _without_host(text: str, context: LessonContext) -> str:
                 alias.name.startswith("google.colab") for alias in statement.names
             ):
                 pass
+            case ast.ImportFrom(module="myst_nb"):
+                pass
+            case ast.Expr(ast.Call(ast.Name("glue"), [ast.Constant(str(name)), value, *_])):
+                text_of_value = ast.get_source_segment(text, value)
+                lines[statement.lineno - 1] = f'print("{name}:", {text_of_value})'
+                first, end = statement.lineno, statement.end_lineno or statement.lineno
+                lines[first:end] = [""] * (end - first)
+                change = "printed by its cell: bind the number where the text has it"
+                context.files.account.changed["value that is glued", change] += 1
+                continue
             case ast.Expr() if names & {
                 n.id for n in ast.walk(statement) if isinstance(n, ast.Name)
             }:
@@ -214,7 +269,7 @@ def _without_host(text: str, context: LessonContext) -> str:
             case _:
                 continue
         end = statement.end_lineno or statement.lineno
-        message = f"`{lines[statement.lineno - 1].strip()}`, which only Colab has"
+        message = f"`{lines[statement.lineno - 1].strip()}`, which only its tool has"
         context.leave("statement of a cell", message)
         lines[statement.lineno - 1 : end] = [""] * (end - statement.lineno + 1)
     return "\n".join(lines)
@@ -229,14 +284,19 @@ def recorded_output(cell: Segment, code: str) -> str:
     prints_value = code.count("print(") > cell.text.count("print(")
     for text in (cell.printed, cell.value if prints_value else ""):
         output += text and text.removesuffix("\n") + "\n"
-    return _ESCAPE.sub("", output).strip("\n")
+    return plain_output(output)
+
+
+def plain_output(text: str) -> str:
+    """Return what is recorded without what colours it or moves the cursor."""
+    return _ESCAPE.sub("", text).strip("\n")
 
 
 def how_shown(cell: Segment) -> str:
     """Return the word for a cell whose code its tool folds or hides, after a blank."""
     options = options_of(cell)
     tags = cell.head + options.get("tags", "")
-    if "remove-input" in tags or options.get("echo") == "false":
+    if "remove-input" in tags or "false" in (options.get("echo"), options.get("include")):
         return " hidden"
     return " folded" if "hide-input" in tags or options.get("code-fold") == "true" else ""
 

@@ -138,7 +138,7 @@ class Chain:
             name
             for number in reasons
             for name in figures
-            if f'.savefig("{name}")' in self.codes[number]
+            if re.search(rf'\.(?:savefig|imsave)\(\s*"{re.escape(name)}"', self.codes[number])
         ]
         cells = [number for number in reasons if number not in imports or reasons[number]]
         numbers = (n for n in range(len(self.parts)) if n not in reasons)
@@ -155,7 +155,7 @@ class Chain:
                 head = " ".join((head, *keys, *([word[0]] if word else [])))
             if number in cells:
                 for name in figure_names:
-                    lines = rf'^[\w.]+\.savefig\("{re.escape(name)}"\)\n.*$'
+                    lines = rf'^[\w.]+\.savefig\("{re.escape(name)}"\)\n[\w.]+\.close\("all"\)$'
                     code = re.sub(lines, "", code, flags=re.MULTILINE).strip("\n")
                 note = f"*Not run here:* {reasons[number]}"
                 new = f"{marks.fence('python', code)}\n\n{note}" if code else note

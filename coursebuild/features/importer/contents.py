@@ -20,6 +20,7 @@ from coursebuild.features.importer.outlines import (
     flatten,
     leave_entry,
     left_setting,
+    make_level,
     read_outline,
 )
 from coursebuild.features.importer.source_files import (
@@ -107,13 +108,19 @@ def _read_substitutions(
     values = [value_at(mapping, *path) for mapping in settings for path in places]
     if (name := "_variables.yml") in files:
         values.append(read_yaml(files.read_text(name)))
-    return {
-        str(key): str(value)
-        for mapping in values
-        if isinstance(mapping, dict)
-        for key, value in mapping.items()
-        if isinstance(value, str | int | float)
-    }
+    if (name := "conf.py") in files:
+        text = re.search(r"(?ms)^myst_substitutions\s*=\s*(\{.*?\})$", files.read_text(name))
+        values.append(read_yaml(text[1]) if text else None)  # a literal is a value of YAML
+    return {key: value for mapping in values for key, value in _named_values(mapping)}
+
+
+def _named_values(value: object, name: str = "") -> Iterator[tuple[str, str]]:
+    """Yield what stands below names, of which inner ones follow a dot."""
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _named_values(inner, f"{name}.{key}".lstrip("."))
+    elif name and isinstance(value, str | int | float):
+        yield name, str(value)
 
 
 def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
@@ -162,16 +169,10 @@ def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | Im
         if pattern := value.get("pattern"):
             names = (name for name in files if fnmatchcase(name, str(pattern)))
             inside += [ImportedText(file=name) for name in names if name.endswith(TEXTS)]
-        for level in inside:
-            if isinstance(level, ImportedLevel) and (
-                path or (title and not _COURSE_KEYS & value.keys())
-            ):
-                message = f"the part “{level.title}” within a part: its lessons are in that one"
-                files.leave("the map", message, "entry of the map")
         heads = [ImportedText(file=path, title=title)] if path else []
         if inside and (path or (title and not _COURSE_KEYS & value.keys())):
-            lessons = tuple(flatten([*heads, *inside]))
-            yield ImportedLevel(title=title or title_of_file(path), lessons=lessons)
+            title = title or title_of_file(path)
+            yield from make_level(title, (*heads, *inside), "the map", files)
         else:
             yield from (*heads, *inside)
 
@@ -183,8 +184,8 @@ def _read_nav(
     for entry in entries if isinstance(entries, list) else ():
         for title, value in entry.items() if isinstance(entry, Mapping) else [("", entry)]:
             if isinstance(value, list):
-                if inside := tuple(flatten(_read_nav(value, folder, files))):
-                    yield ImportedLevel(title=str(title), lessons=inside)
+                parts = _read_nav(value, folder, files)
+                yield from make_level(str(title), parts, "mkdocs.yml", files)
             elif path := find_text(posixpath.join(folder, str(value)), files):
                 yield ImportedText(file=path, title=str(title))
             else:

@@ -52,6 +52,10 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """Of the script that the lesson's cells become."""
     parts: list[str] = field(default_factory=list)
     """The cells that are parts of it by now."""
+    scripts: list[str] = field(default_factory=list)
+    """The scripts that its cells of other languages are."""
+    single_languages: frozenset[str] = frozenset()
+    """The languages of which it has a single cell."""
     figures: list[str] = field(default_factory=list)
     """The files that it draws."""
     notebook_outputs: list[tuple[str, str]] = field(default_factory=list)
@@ -62,6 +66,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """The sources that a text cites."""
     notes: list[str] = field(default_factory=list)
     """The texts of notes that stand within a line."""
+    labs: dict[str, dict[str, object]] = field(default_factory=dict)
+    """The fields of labs that coursebuild does not have, each with a value, by kind."""
     callouts: dict[str, str] = field(default_factory=dict)
     """Labels of kinds of callouts that coursebuild does not have, by kind."""
 
@@ -126,7 +132,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
-        return self.path.endswith(".qmd") or "mkdocs.yml" in self.files
+        return self.path.endswith((".qmd", ".Rmd")) or "mkdocs.yml" in self.files
 
     def resolve_picture(self, source: str) -> str:
         """Return the new address of a picture; empty where the folder and the file lack it."""
@@ -154,7 +160,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
             return file
         if stem_of(resolved) in self.targets:
             return resolved
-        return next((f for f in self.files if f.endswith("/" + path.lstrip("./"))), resolved)
+        return next((f for f in self.files if f"/{f}".endswith("/" + path.lstrip("./"))), resolved)
 
     def resolve_data(self, name: str) -> str:
         """Return the new path of a file that a script names; empty where the folder lacks it."""

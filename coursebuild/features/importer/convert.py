@@ -20,12 +20,15 @@ from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model.course import BIBLIOGRAPHY, CALLOUTS
 from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.values import fingerprint
+from coursebuild.features.importer.absent_labs import lab_files
 from coursebuild.features.importer.account import Account
 from coursebuild.features.importer.blocks import convert_segment
 from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext, script_path_of, to_anchor
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.jsx import is_mdx
+from coursebuild.features.importer.lost_words import find_lost_words
+from coursebuild.features.importer.other_cells import languages_of_single_cells
 from coursebuild.features.importer.prose import find_anchors
 from coursebuild.features.importer.references import complete_texts
 from coursebuild.features.importer.source_files import (
@@ -38,6 +41,12 @@ from coursebuild.features.importer.source_files import (
 
 TRIED = "tried-lessons"
 """The kind of entries that say of what proving made of a file: what it was made from at first."""
+_LOST_WORDS = """
+## Words that are nowhere in the new course
+
+Names by which the other tool is told how a page looks are of no use here. Is there anything else?
+
+"""
 _GITIGNORE = b"public/\nexamples/\n.coursebuild/\n"
 
 
@@ -84,6 +93,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     out |= packages | {path: files.read(source) for source, path in models.items()}
     texts_and_models = (data for path, data in out.items() if path.endswith((".md", ".xml")))
     longest = max(map(len, texts_and_models), default=0)
+    out |= {path: _encode(text) for path, text in lab_files(context.labs)}
     lines = map_lines(course, ids, context.callouts, ("src",) if packages else (), longest)
     out["content/course.toml"] = _encode("".join(f"{line}\n" for line in lines))
     out[".gitignore"] = _GITIGNORE
@@ -94,7 +104,10 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     ):
         files.account.taken[kind] += len(paths)
     _leave_unused(files, (path for path in files if path in unused))
-    out["IMPORT.md"] = _encode(files.account.text(files.name))
+    account = files.account.text(files.name)
+    if lost := [*find_lost_words(files, out, account)]:
+        account += _LOST_WORDS + "".join(f"{line}\n" for line in lost)
+    out["IMPORT.md"] = _encode(account)
     return ConvertedCourse(dict(sorted(out.items())), files.account, context.notebook_outputs)
 
 
@@ -331,6 +344,8 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
         substitutions={**course_context.substitutions, **text.substitutions},
         title=text.title,
         parts=[],
+        scripts=[],
+        single_languages=languages_of_single_cells(text.segments),
         figures=[],
         notes=[],
     )
@@ -360,7 +375,7 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
             yield f"src/{module}.py", files.read(path)
 
 
-_OTHER_TEXTS = tuple(".adoc .docx .htm .html .markdown .org .pdf .rmd .rst .tex .txt".split())
+_OTHER_TEXTS = tuple(".adoc .docx .htm .html .org .pdf .rst .tex .txt".split())
 
 
 def _leave_unused(files: SourceFiles, paths: Iterable[str]) -> None:

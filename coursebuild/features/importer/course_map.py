@@ -276,7 +276,8 @@ def _read_file(
         files.leave(text.file, message, "metadata of a text")
     files.account.changed["text", "a lesson" if id else "a page"] += 1
     if has_own_titles and title and read.title and title.casefold() != read.title.casefold():
-        files.account.changed["title in the map", "the title of the text itself"] += 1
+        words = f"“{title}” is “{read.title}”"
+        files.account.change("title in the map", "the title of the text itself", words)
         title = read.title
     title = _ROLE.sub(r"\1", title or read.title) or title_of_file(text.file)
     title = " ".join(title.split())

@@ -60,7 +60,7 @@ _TITLED = frozenset(
 """Directives whose argument is a title; that of others is their first line."""
 _PROOFS = frozenset(
     "theorem lemma definition algorithm axiom proof remark corollary proposition example property "
-    "criterion conjecture observation assumption".split()
+    "criterion conjecture observation assumption".split()  # `prf:`, which MyST need not say
 )
 _FRAMES = frozenset(
     "div container grid grid-item tab-set tab-set-code "
@@ -144,13 +144,15 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             version, _, rest = argument.partition(" ")
             body = f"{rest}\n{text}".strip()
             return directive.callout("version", f"{_CHANGES[name]} {version}", body, False)
-        case _ if name.startswith("prf:") and name[4:] in _PROOFS:
-            return directive.callout(name[4:], argument, text, False)
+        case _ if (proof := name.removeprefix("prf:")) in _PROOFS and name not in callouts:
+            return directive.callout(proof, argument, text, False)
         case "solution":  # its argument is the label of an exercise
             return directive.callout(name, "", text, True)
         case _ if name in callouts:
             is_folded = name in ("details", "toggle") or "dropdown" in options.get("class", name)
             title = argument if name in _TITLED else ""
+            if subtitle := options.get("subtitle"):
+                text = f"**{subtitle}**\n\n{text}"
             body = text if title else f"{argument}\n{text}"
             return directive.callout(name, title, body, is_folded)
         case _ if package := missing_package(name):
@@ -207,6 +209,8 @@ def _write_file(directive: Directive, context: LessonContext, kind: str) -> str:
 
 def _write_card(directive: Directive, context: LessonContext) -> str:
     parts = re.split(r"^(?:\^{3,}|\+{3,})[ \t]*$", directive.text, flags=re.MULTILINE)
+    header, footer = (directive.options.get(key, "") for key in ("header", "footer"))
+    parts = [header, *parts, footer]
     title = rewrite_prose(directive.argument.strip(), context)
     link = directive.options.get("link", "")
     if link and title:

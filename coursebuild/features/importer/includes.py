@@ -66,7 +66,7 @@ def expand_includes(
         if mark["escape"]:
             return mark[0][1:]
         if mark["command"] == "title":
-            files.account.changed["title of the page", "the map has it"] += 1
+            files.account.change("title of the page", "the map has it", mark["mdbook"])
             return ""
         name = mark["mdbook"] or mark["quarto"] or mark["mkdocs"] or mark["inclusion"]
         name = name or mark["markdown"]
@@ -141,6 +141,9 @@ def lines_of(text: str, options: Mapping[str, str]) -> str:
                 if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
                     lines = lines[node.lineno - 1 : node.end_lineno]
                     break
+    first, last = (options.get(f"{end}-line", "") for end in ("start", "end"))
+    if re.fullmatch(r"-?\d*,-?\d*", f"{first},{last}"):
+        lines = lines[int(first or 0) : int(last) if last else None]
     for option in ("start-after", "start-at", "end-before", "end-at"):
         words = options.get(option)
         at = next((n for n, line in enumerate(lines) if words and words in line), None)

@@ -21,14 +21,17 @@ _MDX = re.compile(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.
 _PART = re.compile(
     r"(?P<code>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`))"
     rf"|(?P<statement>{_STATEMENT})"
-    r"|(?P<comment>\{/\*.*?\*/\})"
+    r"|\{/\*(?P<comment>.*?)\*/\}"
     r"|(?P<expression>(?<![\\$#\w{}^])\{(?!#)[^{}\n`]+\})"
     r"|<(?P<end>/?)(?P<name>[A-Za-z][\w.]*)"
     rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)>",
     re.MULTILINE | re.DOTALL,
 )
 _COMPUTED = re.compile(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
-_LABELS = [re.compile(rf"\s(?:{n})=[\"']([^\"']*)[\"']") for n in ("label|title", "value|alt")]
+_LABELS = [
+    re.compile(rf"\s(?:{names})=(?:\"([^\"]*)\"|'([^']*)')")
+    for names in ("label|title|caption", "value|alt")
+]
 _ADDRESS = re.compile(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
 """The address of a picture where it is computed."""
 
@@ -59,12 +62,14 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
         if expression := part["expression"]:
             message = f"`{expression}`, whose value its tool shows; it is code now"
             context.leave("expression of JavaScript", message)
+        if (comment := part["comment"]) is not None:
+            return f"<!-- {comment.strip().replace('-->', '--›')} -->"
         return f"`{expression}`" if expression else ""
     if name[0].isupper():
         if not part["end"]:
             context.leave("component", f"the component `<{name}>`; what it holds is shown")
         label = next(filter(None, (pattern.search(attributes) for pattern in _LABELS)), None)
-        words = label[1] if label else ""
+        words = (label[1] or label[2] or "") if label else ""
         if picture := _ADDRESS.search(attributes):
             return f"![{words}]({picture[1]})"
         return f"**{words}**" if words else ""

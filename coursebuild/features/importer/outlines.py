@@ -200,7 +200,7 @@ def _read_toctrees(
     """Yield what the trees of a text name, each with what its own trees name; each text once."""
     folder = posixpath.dirname(path)
     for tree in _TOCTREE.finditer(files.read_text(path)):
-        lessons: list[ImportedText] = []
+        parts: list[ImportedText | ImportedLevel] = []
         for line in re.sub(r"(?s)\A---\n.*?\n---\n", "", tree["body"]).split("\n"):
             entry = re.fullmatch(
                 r"(?:(?P<title>.*\S)\s+<(?P<target>[^<>]+)>|(?P<name>\S.*))", line.strip()
@@ -216,10 +216,10 @@ def _read_toctrees(
             for child in [file] if file else names:
                 if child not in paths:
                     paths.add(child)
-                    lessons.append(ImportedText(file=child, title=entry["title"] or ""))
-                    lessons += flatten(_read_toctrees(child, files, paths))
+                    parts.append(ImportedText(file=child, title=entry["title"] or ""))
+                    parts += _read_toctrees(child, files, paths)
         caption = _CAPTION.search(tree["body"])
-        yield from _level(caption[1], lessons) if caption else lessons
+        yield from make_level(caption[1], parts, path, files) if caption else parts
 
 
 # --- Docusaurus
@@ -263,26 +263,39 @@ def _read_sidebar(
                 yield from _read_folder(folder, files)
             case "category":
                 link = items.get("link")
-                if isinstance(link, Mapping) and (words := link.get("description")):
-                    files.leave(name, f"the description of a category: {words}", "entry of the map")
-                first = link.get("id") if isinstance(link, Mapping) else None
+                first, summary = (value_at(link, key) for key in ("id", "description"))
                 inside = items.get("items")
                 if first:
                     inside = [first, *(inside if isinstance(inside, list) else [])]
-                yield from _level(str(items.get("label") or ""), _read_sidebar(inside, name, files))
+                parts = _read_sidebar(inside, name, files)
+                label = str(items.get("label") or "")
+                yield from make_level(label, parts, name, files, str(summary or ""))
             case None:
                 for label, inside in items.items():
-                    yield from _level(str(label), _read_sidebar(inside, name, files))
+                    yield from make_level(
+                        str(label), _read_sidebar(inside, name, files), name, files
+                    )
             case kind:
                 words = items.get("label") or items.get("href") or kind
                 files.leave(name, f"`{words}` of the map, which is no text", "entry of the map")
 
 
-def _level(
-    title: str, parts: Iterable[ImportedText | ImportedLevel]
-) -> Iterator[ImportedText | ImportedLevel]:
+def make_level(
+    title: str,
+    parts: Iterable[ImportedText | ImportedLevel],
+    path: str,
+    files: SourceFiles,
+    summary: str = "",
+) -> Iterator[ImportedLevel]:
+    """Yield the level of these parts if they have lessons; a part within a part is none here."""
+    parts = tuple(parts)
+    for part in parts:
+        if isinstance(part, ImportedLevel):
+            words = f"“{part.title}”{part.summary and f' ({part.summary})'}"
+            message = f"the part {words} within a part: its lessons are in that one"
+            files.leave(path, message, "entry of the map")
     if lessons := tuple(flatten(parts)):
-        yield ImportedLevel(title=title, lessons=lessons)
+        yield ImportedLevel(title=title, summary=summary, lessons=lessons)
 
 
 def flatten(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[ImportedText]:
@@ -324,8 +337,10 @@ def _read_folder(folder: str, files: SourceFiles) -> Iterator[ImportedText | Imp
         if path in files:
             yield ImportedText(file=path)
         else:
-            label = str(_category(path, files).get("label") or title_of_file(path))
-            yield from _level(label, _read_folder(path, files))
+            category = _category(path, files)
+            label = str(category.get("label") or title_of_file(path))
+            words = str(value_at(category, "link", "description") or "")
+            yield from make_level(label, _read_folder(path, files), path, files, words)
 
 
 def _category(folder: str, files: SourceFiles) -> Mapping[str, object]:

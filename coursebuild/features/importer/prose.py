@@ -28,6 +28,7 @@ from coursebuild.features.importer.roles import (
     write_link,
 )
 from coursebuild.features.importer.source_files import title_of_file
+from coursebuild.features.importer.tables import rewrite_tables
 
 _ATTRIBUTES = (
     r"\{(?:[ ]*(?:#[^\s{}\"'#]+|\.[A-Za-z][\w:-]*"
@@ -99,7 +100,9 @@ _EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*--
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
 _ENDS = {"<!--": "-->", "$$": "$$"}
 _COMMENT = re.compile(
-    r"%%[^%\n]+%%|^(?:%(?!%)[^\n]*|\+\+\+(?:[ \t]+[{\[][^\n]*)?[ \t]*$)\n?", re.MULTILINE
+    r"%%(?P<inner>[^%\n]+)%%|^%%[ \t]*\n(?P<lines>(?:(?!%%)[^\n]*\n)+)%%[ \t]*$"
+    r"|^(?:%(?!%)(?P<line>[^\n]*)|\+\+\+(?:[ \t]+(?P<data>[{\[][^\n]*))?[ \t]*)$",
+    re.MULTILINE,
 )
 """A comment of MyST or Obsidian, or the break of MyST between two cells."""
 _COMMENT_AS_HEADING = re.compile(
@@ -177,12 +180,18 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
     account = context.files.account
-    for pattern, kind in ((_CONTENTS, "table of contents"), (_COMMENT, "comment of MyST")):
-        text, count = pattern.subn("", text)
-        if count:
-            account.changed[kind, "dropped: readers did not see it, or the site has its own"] += (
-                count
-            )
+
+    def leave_grid(line: int) -> None:
+        message = "a table whose bars do not stand in columns, shown as it was written"
+        context.line_below(line).leave("table or verse of Pandoc", message)
+
+    text, count = rewrite_tables(text, leave_grid)
+    if count:
+        change = "its rows between bars, a cell in one line; or a verse in lines that end"
+        account.changed["table or verse of Pandoc", change] += count
+    text, count = _CONTENTS.subn("", text)
+    if count:
+        account.changed["table of contents", "dropped: the site has its own"] += count
     text, count = _COMMENT_AS_HEADING.subn(r"\1 `\2`", text)
     if count:
         change = "the words of a heading that has no others: its tool replaces it"
@@ -190,6 +199,9 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     for pattern, kind in _KEPT.items():
         if count := len(pattern.findall(text)):
             account.taken[kind] += count
+    text, count = _COMMENT.subn(_write_comment, text)
+    if count:
+        account.changed["comment of MyST", "a comment of HTML"] += count
     text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
     text, count = _TARGET.subn(write_target, text)
     if count:
@@ -215,6 +227,12 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
             mark = "" if mark else edge[1]
         out.append(line)
     return _FIGURE.sub(_write_figure, "\n".join(out))
+
+
+def _write_comment(match: re.Match[str]) -> str:
+    """Return a comment as one of HTML; nothing for a mark that says nothing."""
+    words = (match["inner"] or match["lines"] or match["line"] or match["data"] or "").strip()
+    return f"<!-- {words.replace('-->', '--›')} -->" if words else ""
 
 
 def _join_lines(match: re.Match[str]) -> str:

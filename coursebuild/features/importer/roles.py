@@ -142,7 +142,8 @@ def convert_substitution(whole: str, context: LessonContext) -> str:
 def convert_wiki_link(whole: str, page: str, part: str, words: str, context: LessonContext) -> str:
     """Return a link or picture of Obsidian; as it is where the folder has no such file."""
     if whole[0] == "!" and (address := page and context.resolve_picture(page)):
-        return f"![{title_of_file(page)}]({address})"
+        size = re.fullmatch(r"\s*\d+(?:x\d+)?\s*", words)
+        return f"![{title_of_file(page) if size or not words else words}]({address})"
     if page and context.resolve_path(f"{page}.md") not in context.files:
         return whole
     address = context.resolve_link(f"{page}.md{part}" if page else part)

@@ -85,7 +85,7 @@ def read_segments(text: str, name: str) -> ReadText:
             kernel, info = (metadata.get(key) or {} for key in ("kernelspec", "language_info"))
             language = str(kernel.get("language") or info.get("name") or "python").lower()
             cells = list(notebook["cells"])
-            first = _join_lines(cells[0].get("source", "")) if cells else ""
+            first = join_lines(cells[0].get("source", "")) if cells else ""
             front, size = read_front_matter(f"{first}\n")  # of MyST, Quarto, in a cell of its own
             if size:
                 metadata = {**metadata, **front}
@@ -298,13 +298,13 @@ def _read_cells(
     segments: list[Segment] = []
     attachments: dict[str, bytes] = {}
     for number, cell in enumerate(cells, 1):
-        place, source = f"cell {number}", _join_lines(cell.get("source", ""))
+        place, source = f"cell {number}", join_lines(cell.get("source", ""))
         if cell.get("cell_type") == "markdown":
             pictures = {}
             for name, kinds in (cell.get("attachments") or {}).items():
                 for data in kinds.values():
                     try:
-                        pictures[name] = base64.b64decode(_join_lines(data))
+                        pictures[name] = base64.b64decode(join_lines(data))
                     except (binascii.Error, ValueError):
                         continue
             for picture, data in pictures.items():
@@ -325,8 +325,8 @@ def _read_cells(
                 text=source,
                 head=tags if is_python else f"{{{language}}}",
                 shows_value=bool(values),
-                printed="".join(_join_lines(stream.get("text") or "") for stream in streams),
-                value="\n".join(map(_join_lines, value_texts)),
+                printed="".join(join_lines(stream.get("text") or "") for stream in streams),
+                value="\n".join(map(join_lines, value_texts)),
                 picture=_recorded_picture(outputs) if outputs else None,
                 lost=tuple(
                     kind
@@ -351,9 +351,10 @@ def _recorded_picture(outputs: Iterable[Mapping[str, Any]]) -> tuple[str, bytes]
     """Return the picture among the outputs of a cell, with its extension; empty for none."""
     data = {kind: text for output in outputs for kind, text in (output.get("data") or {}).items()}
     with contextlib.suppress(binascii.Error, KeyError):
-        return ".png", base64.b64decode(_join_lines(data["image/png"]))
-    return ".svg", _join_lines(data.get("image/svg+xml") or "").encode()
+        return ".png", base64.b64decode(join_lines(data["image/png"]))
+    return ".svg", join_lines(data.get("image/svg+xml") or "").encode()
 
 
-def _join_lines(source: str | list[str]) -> str:
+def join_lines(source: str | list[str]) -> str:
+    """Return a text of a notebook, which may be a list of its lines."""
     return source if isinstance(source, str) else "".join(source)

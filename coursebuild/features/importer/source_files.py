@@ -174,7 +174,7 @@ def title_of_file(path: str) -> str:
     return title[:1].upper() + title[1:]
 
 
-TEXTS = (".md", ".qmd", ".ipynb", ".mdx", ".myst")
+TEXTS = (".md", ".qmd", ".ipynb", ".mdx", ".myst", ".markdown", ".Rmd")
 """Extensions of the files that can be lessons."""
 _SKIPPED = frozenset("__pycache__ _book _build _site node_modules public site-packages".split())
 """Names of folders that tools write."""

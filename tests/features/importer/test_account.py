@@ -26,7 +26,14 @@ MYST: list[Construct] = [
     ("footnote", TAKEN, "Text.[^n]\n\n[^n]: Note wa4."),
     ("item of a list", TAKEN, "- item wa5\n- item wa6"),
     ("comment", TAKEN, "Text.\n\n<!-- wa7 -->"),
-    ("comment of MyST", CHANGED, "% a remark for authors"),
+    ("comment of MyST", CHANGED, '% a remark wa83\n\n+++ {"note": "wa84"}'),
+    ("directive `{proof}`", CHANGED, "```{proof}\nwa85\n```"),
+    (
+        "directive `{card}`",
+        CHANGED,
+        "```{card} wa86\n:header: wa87\n:footer: wa88\nwa89\n```",
+    ),
+    ("directive `{sidebar}`", CHANGED, "```{sidebar} wa90\n:subtitle: wa91\nwa92\n```"),
     ("label", CHANGED, "(here)=\n## Labelled wa8"),
     ("link", TAKEN, "[wa9](https://example.org)"),
     ("link by reference", CHANGED, "See [wa10][two].\n\n[two]: two.md"),
@@ -110,7 +117,19 @@ MYST: list[Construct] = [
         CHANGED,
         "```{exercise-start}\n:label: ex3\n```\n\n```python\nwa78\n```\n\n```{exercise-end}\n```",
     ),
-    ("directive `{code-cell}`", LEFT, "```{code-cell} julia\nwa79\n```"),
+    ("cell of `julia`", LEFT, "```{code-cell} julia\nwa79\n```"),
+    (
+        "value that is glued",
+        CHANGED,
+        "```{code-cell} python\nfrom myst_nb import glue\n"
+        "glue('wa93', 2 * 3,\n  display=False)\n```",
+    ),
+    (
+        "figure of a cell",
+        CHANGED,
+        "```{code-cell} python\nimport matplotlib.pyplot as plt\nplt.plot([1])\n"
+        "plt.title('Title wa94')\nplt.savefig('out/wa95.png', dpi=80)\n```",
+    ),
     ("role `{del}`", CHANGED, "{del}`wa80`"),
     ("substitution", CHANGED, "The {{ mass }} wa81"),
     ("link", LEFT, "[wa82](inv:python#print)"),
@@ -143,7 +162,10 @@ QUARTO: list[Construct] = [
         "```{python}\n#| label: fig-cell\n#| fig-cap: Caption wb18\n"
         "import matplotlib.pyplot as plt\nplt.plot([1])\n```\n\nSee @fig-cell.",
     ),
-    ("directive `{r}`", LEFT, "```{r}\nwb19\n```"),
+    ("cell of `r`", LEFT, '```{r, echo=FALSE, fig.cap="Two wb18"}\nwb19\n```'),
+    ("cell of `bash`", LEFT, "```{bash}\n#| label: wb60\necho wb61\n```"),
+    ("cell of `r`", LEFT, "```{r}\nwb62\n```\n\n```{r}\nwb63\n```"),
+    ("cell of `julia`", LEFT, "```{julia}\n#| eval: false\nwb64\n```"),
     ("caption of a table", CHANGED, "| a |\n| - |\n| wb20 |\n\n: Caption wb21 {#tbl-t}"),
     ("attributes", CHANGED, "[words wb22]{.smallcaps}"),
     ("block that is raw", LEFT, "```{=latex}\n\\wb23\n```"),
@@ -160,6 +182,23 @@ QUARTO: list[Construct] = [
         "import matplotlib.pyplot as plt\nplt.plot([1])\n```",
     ),
     ("heading", TAKEN, "# Second title wb42"),
+    (
+        "table or verse of Pandoc",
+        CHANGED,
+        "+------+------+\n| wb43 | wb44 |\n+======+======+\n| wb45 | wb46 |\n+------+------+\n\n"
+        ": Caption wb47 {#tbl-grid}",
+    ),
+    (
+        "table or verse of Pandoc",
+        LEFT,
+        "+---+---+\n| wb48 | wb49 |\n+---+---+",
+    ),
+    (
+        "table or verse of Pandoc",
+        CHANGED,
+        "  wb50   wb51\n------ ------\n  wb52   wb53\n\nTable: Caption wb54",
+    ),
+    ("table or verse of Pandoc", CHANGED, "| The wb55\n|   day wb56"),
 ]
 MKDOCS: list[Construct] = [
     ("callout", CHANGED, '!!! note inline end "Title wc1"\n    Text wc2'),
@@ -200,6 +239,8 @@ MDBOOK: list[Construct] = [
     ),
     ("picture", CHANGED, "![wd17](<p.png>)"),
     ("link", CHANGED, "[[two|wd18]]"),
+    ("link", CHANGED, "![[p.png|wd19]]"),
+    ("comment of MyST", CHANGED, "Text.\n\n%%\nwd20\n%%"),
 ]
 DOCUSAURUS: list[Construct] = [
     ("callout", CHANGED, ":::tip[Title we1]\nText we2\n:::"),
@@ -211,6 +252,8 @@ DOCUSAURUS: list[Construct] = [
     ("tag of HTML", CHANGED, "<img src={require('./p.png').default} alt='we12' />"),
     ("file that is included", CHANGED, "import P from './two.md';\n\n<P />"),
     ("block of `jsx`", CHANGED, '```jsx title="we9.js"\nwe10\n```'),
+    ("component", LEFT, "<Figure src='/p.png' caption=\"It's we13\" />"),
+    ("link", CHANGED, "{/* we14 */}\n\n[a](./two.md)"),
 ]
 TARGETS = """(here)=
 ## Here
@@ -347,7 +390,8 @@ def test_every_part_of_a_notebook_is_taken_changed_or_left(tmp_path: Path) -> No
     course = import_files(tmp_path, files)
     table = counts(course)
     expected = {
-        "cell": (0, 5, 2),
+        "cell": (0, 5, 1),
+        "cell of `bash`": (0, 0, 1),
         "figure of a cell": (0, 1, 0),
         "file": (2, 0, 1),
         "magic": (0, 0, 1),
@@ -400,3 +444,25 @@ def test_every_field_of_a_course_json_is_taken_changed_or_left(tmp_path: Path) -
     lesson_text = course.files["content/lessons/1.1-free-fall.md"].decode()
     assert lesson_text.count('"azimuth": -170') == lesson_text.count('"elevation": -20') == 2
     assert "[wj15](lesson:1.1)" in lesson_text
+
+
+def test_a_word_that_is_nowhere_in_the_new_course_is_named_with_its_place(tmp_path: Path) -> None:
+    cell = {
+        "cell_type": "code",
+        "source": "1",
+        "outputs": [{"output_type": "display_data", "data": {"text/html": "<b id='x'>zebra</b>"}}],
+    }
+    files = {
+        "_category_.yml": "label: Nobody reads this\n",
+        "one.md": "# One\n\n```{figure} p.png\n:figclass: margin-caption\nA ball.\n```\n",
+        "p.png": PICTURE,
+        "two.ipynb": json.dumps({"cells": [cell], "metadata": {}, "nbformat": 4}),
+    }
+    lost = account_of(import_files(tmp_path, files)).partition("## Words that are nowhere")[2]
+    assert "- one.md, line 4: figclass margin caption\n" in lost
+    assert "- two.ipynb, cell 1: zebra\n" in lost
+
+
+def test_nothing_is_said_of_words_where_the_new_course_has_all(tmp_path: Path) -> None:
+    course = import_files(tmp_path, {"one.md": "# One\n\nA *ball* falls, [see](https://e.org).\n"})
+    assert "## Words" not in account_of(course)

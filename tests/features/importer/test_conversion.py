@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -228,3 +229,31 @@ display(plt.show())
     lesson = course.files["content/lessons/1.1-one.md"].decode()
     assert "Figure: ![y over x](l1-1-one-1.svg) $y$ over $x$\n" in lesson
     assert "show()" not in lesson
+
+
+def test_a_lab_of_another_tool_is_a_card_and_a_module_to_be_written(tmp_path: Path) -> None:
+    first = '{"title": "A walker", "note": "It falls.", "poster": "w.png", "speed": [1, 2]}'
+    second = '{"title": "Again", "camera": {"azimuth": 10}, "odd \\n key": 3}'
+    course = convert_files(
+        tmp_path,
+        {
+            "course.json": json.dumps({"levels": [{"lessons": [{"id": "1.1", "file": "a.md"}]}]}),
+            "texts/a.md": f"# A\n\n```lab walker\n{first}\n```\n\n```lab walker\n{second}\n```\n\n"
+            "```lab Bad/Name\n{}\n```\n",
+            "w.png": "",
+        },
+    )
+    text = next(data for path, data in course.files.items() if path.startswith("content/lessons"))
+    assert b"> [!note] This lab is not here yet: walker\n>\n> A walker\n>\n> It falls.\n" in text
+    assert b"> ![A walker](../files/w.png)" in text
+    assert b'"azimuth": -170' in text
+    modules = {path: data for path, data in course.files.items() if path.endswith(".js")}
+    assert [*modules] == ["content/labs/walker.js"]
+    module = tmp_path / "walker.mjs"
+    module.write_bytes(modules["content/labs/walker.js"])
+    fields = [line for line in module.read_text().splitlines() if line.startswith("//   ")]
+    assert len(fields) == 6
+    assert "//   speed: [1, 2]" in fields
+    script = f"import({json.dumps(module.as_uri())}).then(m => console.log(typeof m.mount))"
+    run = subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True)
+    assert run.stdout == "function\n"

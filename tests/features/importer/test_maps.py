@@ -204,3 +204,36 @@ def test_a_book_of_its_first_page_alone_has_a_lesson(tmp_path: Path) -> None:
     book = "book:\n  title: Q\n  chapters: [index.qmd]\n"
     outline, pages, _ = import_map(tmp_path, {"_quarto.yml": book, "index.qmd": ""})
     assert (outline, pages) == ([("Q", ["index.qmd"])], [])
+
+
+def test_a_part_within_a_part_is_left_by_its_name_and_a_description_is_a_summary(
+    tmp_path: Path,
+) -> None:
+    files = {
+        "docusaurus.config.js": "module.exports = {title: 'D'}",
+        "docs/a/_category_.json": '{"label": "Outer", "link": {"description": "All of it"}}',
+        "docs/a/one.md": "",
+        "docs/a/b/_category_.yml": "label: Inner\n",
+        "docs/a/b/two.md": "",
+    }
+    outline, _, left = import_map(tmp_path, files)
+    assert outline == [("Outer", ["docs/a/b/two.md", "docs/a/one.md"])]
+    assert [message for message in left if "“Inner”" in message]
+    course = convert(SourceFiles(tmp_path))
+    assert b'summary = "All of it"' in course.files["content/course.toml"]
+
+
+def test_a_text_of_r_markdown_is_a_lesson_and_so_is_one_with_a_long_extension(
+    tmp_path: Path,
+) -> None:
+    cell = '```{r first, echo=FALSE, eval=FALSE, fig.cap="A plot"}\nplot(x)\n```'
+    files = {
+        "a.Rmd": f"---\ntitle: In R\n---\n\n{cell}\n",
+        "b.markdown": "# Long\n\n[back](a.Rmd)\n",
+    }
+    ((_, titles),), _, left = import_map(tmp_path, files)
+    assert titles == ["In R", "Long"]
+    assert left == ["a cell of `r`, which its tool does not run, is shown"]
+    course = convert(SourceFiles(tmp_path))
+    assert b"**A plot**\n\n```r\nplot(x)\n```" in course.files["content/lessons/1.1-a.md"]
+    assert b"[back](lesson:1.1)" in course.files["content/lessons/1.2-b.md"]

@@ -158,7 +158,8 @@ def test_a_picture_that_a_notebook_holds_is_shown_until_its_script_has_drawn_it(
     text = lesson(folder / "new", "1.1-a")
     assert "```python file=examples/l1_1_a.py figure=l1-1-a-1.png\n" in text
     assert "Figure: ![A line](l1-1-a-1.png) A line" in text
-    assert "```bash\nls\n```\n\n```text\nlisted\n```\n\n![A](l1-1-a-2.png)" in text
+    shell_script = "```bash file=examples/l1_1_a.sh\nls\n```\n\n```output\nlisted\n```"
+    assert f"{shell_script}\n\n![A](l1-1-a-2.png)" in text
     files = [folder / f"new/content/lessons/l1-1-a-{number}.png" for number in (1, 2)]
     assert [path.read_bytes() for path in files] == [PNG, PNG]
     assert main(["-C", "new", "import", "--prove"]) == 0
@@ -304,3 +305,47 @@ def test_a_proof_that_was_killed_goes_on(folder: Path, capsys: pytest.CaptureFix
     assert main(["-C", "new", "import", "--prove"]) == 0
     assert "```output\n2\n```" in lesson(folder / "new", "1.2-b")
     assert runs_in(progress.read_text() + capsys.readouterr().err)[0] == 2
+
+
+def test_a_figure_that_a_cell_saves_itself_is_shown_and_leaves_no_other_file(
+    folder: Path,
+) -> None:
+    drawing = "import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.title('A rise')\n"
+    write_notebook(
+        folder / "old/a.ipynb",
+        f"{drawing}plt.savefig('plots/First Rise.png', dpi=50)\nplt.show()",
+        "plt.imsave('pixels.png', [[0.0, 1.0], [1.0, 0.0]])\nprint('saved')",
+        "plt.savefig('second.png')\nraise SystemError('late')",
+    )
+    assert main(["import", "old", "--out", "new", "--prove"]) == 0
+    text = lesson(folder / "new", "1.1-a")
+    assert "figure=first-rise.png,pixels.png\n" in text
+    assert "Figure: ![A rise](first-rise.png) A rise" in text
+    assert "Figure: ![A](pixels.png) A" in text
+    assert "second.png)" not in text
+    pictures = {path for path in files_of(folder / "new") if path.endswith(".png")}
+    assert pictures == {"content/lessons/first-rise.png", "content/lessons/pixels.png"}
+    assert main(["-C", "new", "check"]) == 0
+
+
+def test_a_cell_of_a_shell_runs_when_the_map_says_how(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_notebook(folder / "old/a.ipynb", "%%bash\necho 6", printed="7\n")
+    (folder / "old/b.qmd").write_text(
+        "# B\n\n```{sh}\n#| echo: false\necho one\n```\n\n```{sh}\necho two\n```\n"
+    )
+    assert main(["import", "old", "--out", "new"]) == 0
+    assert "`[runners]` of the map says how" in capsys.readouterr().out
+    assert "```bash file=examples/l1_1_a.sh\necho 6\n```" in lesson(folder / "new", "1.1-a")
+    text = lesson(folder / "new", "1.2-b")
+    assert "```sh file=examples/l1_2_b.sh hidden\necho one\n```" in text
+    assert "```sh file=examples/l1_2_b_2.sh\necho two\n```" in text
+    course_map = folder / "new/content/course.toml"
+    runners = '\n[runners]\nbash = [["bash", "{file}"]]\nsh = [["sh", "{file}"]]\n'
+    course_map.write_text(course_map.read_text().replace("\n[[level]]", f"{runners}\n[[level]]", 1))
+    assert main(["-C", "new", "check"]) == 1
+    assert "7" in capsys.readouterr().out
+    assert main(["-C", "new", "import", "--prove"]) == 0
+    assert "```output\n6\n```" in lesson(folder / "new", "1.1-a")
+    assert "echo two\n```\n\n```output\ntwo\n```" in lesson(folder / "new", "1.2-b")

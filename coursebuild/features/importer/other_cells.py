@@ -1,0 +1,110 @@
+"""Cells in languages other than Python: scripts of their own, which a runner of the map runs.
+
+A cell of a shell is a process of its own in every tool, and becomes a script. The cells of other
+languages share what they define, and scripts have parts in Python alone: so one that is alone in
+its text becomes a script, and several are shown.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+
+from msgspec.structs import replace
+
+from coursebuild.api import marks
+from coursebuild.features.importer.cells import (
+    code_for_readers,
+    how_shown,
+    options_of,
+    plain_output,
+    write_outputs,
+)
+from coursebuild.features.importer.context import LessonContext, to_anchor
+from coursebuild.features.importer.prose import rewrite_prose
+from coursebuild.features.importer.source_files import Segment
+
+_EXTENSIONS = {
+    **dict.fromkeys(("bash", "sh", "zsh"), "sh"),
+    **{"c": "c", "cpp": "cpp", "javascript": "js", "julia": "jl", "r": "R"},
+}
+"""The extensions of scripts by their languages, which are the first words of their fences."""
+_SHELLS = ("bash", "sh", "zsh")
+_PRINTING = ("r", *_SHELLS)
+"""Languages of which a script prints the values that a cell shows."""
+_HEAD = re.compile(
+    r"\{code-cell\}[ \t]+(?P<myst>\w+).*|\{(?P<name>\w+)(?:[\s,]+(?P<options>[^{}]*))?\}", re.DOTALL
+)
+_MAGIC = re.compile(r"\s*%%(\w+)[^\n]*\n")
+_KNITR = re.compile(r"([\w.]+)\s*=\s*(\"[^\"]*\"|'[^']*'|[^,\s]+)")
+"""An option of a cell as knitr has it, in the head."""
+
+
+def language_of(segment: Segment) -> str:
+    """Return the language of a cell that is not Python; empty for anything else."""
+    language = ""
+    if segment.kind == "cell":
+        magic = _MAGIC.match(segment.text)
+        language = magic[1] if magic else ""
+        language = "" if language.startswith("j") else language  # it changes the page
+    elif segment.mark[0] in "`~" and (head := _HEAD.fullmatch(segment.head)):
+        language = head["myst"] or head["name"]
+    language = {"shell": "sh", "script": ""}.get(language.lower(), language.lower())
+    return language if language in _EXTENSIONS else ""
+
+
+def languages_of_single_cells(segments: Iterable[Segment]) -> frozenset[str]:
+    """Return the languages of which a text has one cell that is run."""
+    languages = [
+        language_of(segment)
+        for segment in segments
+        if _options_of(segment).get("eval", "").lower() != "false"
+    ]
+    return frozenset(language for language in languages if languages.count(language) == 1)
+
+
+def _options_of(segment: Segment) -> dict[str, str]:
+    head = _HEAD.fullmatch(segment.head)
+    words = _KNITR.findall(head["options"] or "") if head is not None else ()
+    options = {name.replace(".", "-"): value.strip("\"'") for name, value in words}
+    booleans = {"T": "true", "TRUE": "true", "F": "false", "FALSE": "false"}
+    return {**{n: booleans.get(v, v) for n, v in options.items()}, **options_of(segment)}
+
+
+def write_other_cell(cell: Segment, language: str, context: LessonContext) -> str:
+    """Return a cell of this language as a script, or as code that is shown, with its output."""
+    options, kind = _options_of(cell), f"cell of `{language}`"
+    code = code_for_readers(replace(cell, text=_MAGIC.sub("", cell.text, count=1)))
+    captions = (options[name] for name in ("fig-cap", "lst-cap") if options.get(name))
+    caption = rewrite_prose(next(captions, ""), context)
+    label = options.get("label", "")
+    mark = f'<a id="{to_anchor(label)}"></a>' if label else ""
+    head = [part for part in (mark, f"**{caption}**" if caption else "") if part]
+    if not code:
+        return "\n\n".join(head)
+    is_alone = language in _SHELLS or language in context.single_languages
+    if options.get("eval", "").lower() == "false" or not is_alone:
+        reason = "which goes on from others, is shown: to run it, join them to one script"
+        if is_alone or options.get("eval", "").lower() == "false":
+            reason = "which its tool does not run, is shown"
+        context.leave(kind, f"a {kind}, {reason}")
+        return "\n\n".join((*head, marks.fence(language, code), *write_outputs(cell, context)))
+    message = f"a {kind} is a script, which runs when `[runners]` of the map says how"
+    context.leave(kind, message)
+    stem = context.script_path.removesuffix(".py")
+    number = f"_{len(context.scripts) + 1}" if context.scripts else ""
+    path = f"{stem}{number}.{_EXTENSIONS[language]}"
+    context.scripts.append(path)
+    word = how_shown(replace(cell, text="\n".join(f"#| {n}: {v}" for n, v in options.items())))
+    script = marks.fence(f"{language} file={path}{word}", code)
+    return "\n\n".join((*head, script, *_outputs(cell, language, context)))
+
+
+def _outputs(cell: Segment, language: str, context: LessonContext) -> Iterator[str]:
+    printed = cell.printed + (cell.value if language in _PRINTING else "")
+    if output := plain_output(printed):
+        context.files.account.taken["output that is recorded"] += 1
+        context.notebook_outputs.append((context.scripts[-1], output))
+        yield marks.fence("output", output)
+    value = "" if language in _PRINTING else cell.value
+    yield from write_outputs(replace(cell, printed="", value=value), context)
