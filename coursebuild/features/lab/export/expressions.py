@@ -224,7 +224,9 @@ class Expressions:
                     ("jointId",),
                 )
             case "member_expression":
-                return js.text_of(js.field(node, "property")) == "length"
+                name = js.text_of(js.field(node, "property"))
+                is_size = name.startswith("n") and js.dotted_name(node) == ("model", name)
+                return name == "length" or (is_size and self.kind(("model", name)) == "number")
             case _:
                 return False
 

@@ -162,6 +162,8 @@ class _Statements(expressions.Expressions):
     def loop(self, node: Node) -> Iterator[str]:
         loop = js.counting_loop(node)
         limit = self.expression(loop.limit)
+        if not self.is_whole(loop.limit):
+            limit = f"math.{'ceil' if (loop.step > 0) != loop.inclusive else 'floor'}({limit})"
         if loop.inclusive:
             by = 1 if loop.step > 0 else -1
             limit = str(int(limit) + by) if limit.isdecimal() else f"{limit} + {by}"
@@ -274,8 +276,8 @@ class _Statements(expressions.Expressions):
         self.scopes.pop()
 
     def set(self, array: str, values: Node, offset: Node | None = None) -> str:
-        if values.type == "array":
-            items = js.array_items(values)
+        items = js.array_items(values) if values.type == "array" else []
+        if items and all(item.type != "spread_element" for item in items):
             text, count = f"[{self.all(items)}]", str(len(items))
         else:
             text = self.expression(values)
