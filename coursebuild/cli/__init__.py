@@ -31,7 +31,7 @@ def main(arguments: list[str] | tuple[str, ...] | None = None) -> int:
         # What libraries start by themselves, as Dask does, obeys no file of the course either.
         os.environ["PYTHONSAFEPATH"] = "1"
         places = filter(os.path.isabs, os.environ.get("PATH", os.defpath).split(os.pathsep))
-        os.environ["PATH"] = os.pathsep.join(places)
+        os.environ["PATH"] = os.pathsep.join(places) or os.defpath  # empty, it would mean `.`
     try:
         from coursebuild.cli.unchanged import previous_output, split_directory
 

@@ -51,9 +51,9 @@ from coursebuild.core.text.source import Source, Span
 if TYPE_CHECKING:
     from coursebuild.pipeline.reader import Reader
 
-Code: TypeAlias = Literal["run", "known", "none", "refuse"]
-"""What becomes of a course's own features: they run; they do if they have run before; they are left
-out; the course is refused.
+Code: TypeAlias = Literal["run", "known", "run before", "none", "refuse"]
+"""What becomes of a course's own features: they run; they do if they have run before, and if not
+are a mistake of the course, or end the command; they are left out; the course is refused.
 """
 MAP = "content/course.toml"
 _CODE = "code"
@@ -80,6 +80,7 @@ def load(
 
     Raises:
         EffectError: the course brings code that would run here, and `code` refuses it.
+        UsageError: its user has never run that code, and `code` asks for it.
     """
     loader = _Loader(root, reader, open_texts, code)
     course = loader.load()
@@ -94,7 +95,7 @@ def package_files(root: Path, course: Course) -> Iterator[str]:
         yield from (file.relative_to(root).as_posix() for file in files)
 
 
-def load_course(root: Path, *, code: Code = "known") -> Course:
+def load_course(root: Path, *, code: Code = "run before") -> Course:
     """The course below `root`, whatever is wrong in its lessons, for commands that only look.
 
     Raises:
@@ -104,11 +105,6 @@ def load_course(root: Path, *, code: Code = "known") -> Course:
     course = loader.load()
     if course is None:
         raise UsageError("the course map cannot be read; `coursebuild check` says why")
-    if loader.has_unknown_code:
-        raise UsageError(
-            f"`{course.features[0].path}` is code that you have not run in this form",
-            help="look at what it does, and run `coursebuild check`",
-        )
     return course
 
 
@@ -122,7 +118,6 @@ class _Loader:
         self.root = root
         self.open_texts = open_texts
         self.code = code
-        self.has_unknown_code = False
         self.files = read.value
         self.store = Store(root)
         self.unreadable = list(read.value.unreadable)
@@ -307,8 +302,12 @@ class _Loader:
         if course.features:
             store, key = self.store, features_digest(self.root, course)
             is_known = store.peek(_CODE, key, bytes) is not None
+            if self.code == "run before" and not is_known:
+                raise UsageError(
+                    f"`{course.features[0].path}` is code that you have not run in this form",
+                    help="look at what it does, and run `coursebuild check`",
+                )
             if self.code == "known" and not is_known:
-                self.has_unknown_code = True
                 message = "its features are code that you have not run in this form"
                 help = "look at what they do, and run `coursebuild check`"
                 span = course.features[0].span

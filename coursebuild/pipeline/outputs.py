@@ -277,7 +277,7 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
     """Extract; with `adopt` the lessons take over what was edited by hand in `examples/`."""
     with project_lock(options.root, options.progress.say):
         began = time.monotonic()
-        parsed_course = load(options.root)
+        parsed_course = load(options.root, code="run before")
         course = parsed_course.value
         if course is None:
             return judge(None, parsed_course.diagnostics, began)
@@ -287,7 +287,7 @@ def extract(options: Options, *, adopt: bool = False) -> Report:
         if adopt and extracted_scripts.files.blocked:
             adoptions, refusals, files_read = _adopt(options, extracted_scripts)
             if files_read:
-                parsed_course = load(options.root)
+                parsed_course = load(options.root, code="run before")
                 course = parsed_course.value or course
                 # A block holds no line ends of an editor's and no blank lines at the end, and one
                 # parts it from the next: a file that differs would count as edited for ever.

@@ -7,7 +7,6 @@ that have no remembered result which still holds, the longest first.
 from __future__ import annotations
 
 import functools
-import shutil
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.run_store import RunStore, longest_first
+from coursebuild.core.run.script_environment import Interpreter, find_runner
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import is_lost
@@ -142,7 +142,7 @@ def run(
         options = replace(options, on_result=lambda run: tell(complete(run)))
     run_store = options.run_store() if run_store is None else run_store
     all_jobs = jobs(extractions, perturbation, keeps_going=keeps_going)
-    runs = dict(_unrun(extractions))
+    runs = dict(_unrun(extractions, options.interpreter))
     runs |= {**(known_runs or {}), **recorded_runs(extractions, options)}
     inputs = {
         job.path: run_store.inputs(job, extraction.data)
@@ -163,13 +163,15 @@ def run(
     return tuple(runs[job.path] for job in all_jobs)
 
 
-def _unrun(extractions: Iterable[Extraction]) -> Iterator[tuple[str, ScriptRun]]:
+def _unrun(
+    extractions: Iterable[Extraction], interpreter: Interpreter | None
+) -> Iterator[tuple[str, ScriptRun]]:
     """The scripts that are not to be run, or whose runner is not installed, by their paths."""
     for extraction in extractions:
         path, first = extraction.path, next(iter(extraction.commands), ("",))[0]
         if not extraction.is_run:
             yield path, ScriptRun(path, Outcome.NORUN, 0, "", "", 0.0)
-        elif first and "/" not in first and shutil.which(first) is None:
+        elif first and "/" not in first and find_runner(first, interpreter) is None:
             yield path, ScriptRun(path, Outcome.SKIPPED, 0, "", "", 0.0, missing=(first,))
 
 

@@ -195,7 +195,12 @@ def test_commands_that_only_look_run_no_code_that_has_not_run_before(
     course.replace("content/course.toml", title, title + '\nfeatures = ["features/mine.py"]')
     feature = "from coursebuild.core.features import Feature\nFEATURE = Feature(name='mine')\n"
     course.write("features/mine.py", TOUCH.format(str(home / "owned")) + feature)
-    for arguments in (("fmt", "--check"), ("explain", "1.1"), ("rename", "1.1", "1.2")):
+    for arguments in (
+        ("fmt", "--check"),
+        ("explain", "1.1"),
+        ("rename", "1.1", "1.2"),
+        ("extract",),
+    ):
         result = course.main(*arguments)
         assert result.status == 2 and result.err == (
             "coursebuild: `features/mine.py` is code that you have not run in this form; "

@@ -94,6 +94,22 @@ def test_scripts_find_what_is_installed_in_the_environment_of_the_course(course:
     assert f"MuJoCo {engine_version()}" in page and f"Python {python_version()}" in page
 
 
+def test_runners_of_other_languages_may_lie_in_this_environment(make: Make) -> None:
+    """Its programs go before those of PATH, as an activated environment has it."""
+    folder = with_environment(make, "print(1)", "1")
+    folder.write(".venv/bin/no-such-lisp", "#!/bin/sh\necho lisp\n")
+    (folder.root / ".venv/bin/no-such-lisp").chmod(0o755)
+    course_map = folder.text("content/course.toml")
+    runner = '[runners]\nlisp = [["no-such-lisp", "{file}"]]\n'
+    folder.write("content/course.toml", f"{course_map}\n{runner}")
+    script = "```lisp file=examples/a.lisp\n(print 1)\n```\n\n```output\nlisp\n```\n"
+    folder.write(folder.lesson(), folder.text(folder.lesson()) + f"\n{script}")
+    result = folder.run("check", "--strict")
+    assert result.status == 0, result.out
+    (folder.root / ".venv/bin/no-such-lisp").unlink()
+    assert "needs no-such-lisp" in folder.run("check").out
+
+
 def replace_engine(info: Path, version: str) -> None:
     info.unlink()
     new = info.with_name(f"mujoco-{version}.dist-info")

@@ -55,6 +55,13 @@ def test_no_trap_runs(traps: TrapFolder, command: tuple[str, ...]) -> None:
         assert result.stdout.endswith("everything holds\n")  # all that a course needs was started
 
 
+@pytest.mark.site
+def test_a_path_without_absolute_places_counts_as_that_of_the_system(traps: TrapFolder) -> None:
+    result = run(traps, tool("check"), PATH=".:")
+    assert traps.marks() == []
+    assert result.stdout.endswith("everything holds\n"), result.stdout  # `sh` was found
+
+
 @pytest.mark.parametrize("words", OF_MJBENCH, ids=" ".join)
 def test_no_trap_runs_as_a_model_is_measured(traps: TrapFolder, words: tuple[str, ...]) -> None:
     result = run(traps, mjbench(*words))

@@ -76,11 +76,23 @@ Output:
 bodies 2
 ```
 
+```sh file=examples/words.sh
+echo words
+```
+
+```output
+words
+```
+
 ```lab
 {{"model": "box", "title": "A box",
  "controls": [{{"type": "button", "label": "Kick", "run": "data.qvel[2] += 1"}}],
  "readouts": [{{"label": "z", "expr": "data.qpos[2]"}}]}}
 ```
+"""
+RUNNERS = """
+[runners]
+sh = [["sh", "{file}"]]
 """
 BOX = """<mujoco>
   <worldbody>
@@ -102,7 +114,7 @@ class TrapFolder:
     def __init__(self, folder: Folder) -> None:
         self.folder = folder
         self._file_of_marks = folder.root.with_name("marks")
-        folder.write("content/course.toml", course_map(1))
+        folder.write("content/course.toml", course_map(1) + RUNNERS)
         folder.write(folder.lesson(), LESSON)
         folder.write("models/box.xml", BOX)
         folder.write("models/box.toml", SCENARIO)

@@ -12,6 +12,7 @@ import json
 import os
 import platform
 import re
+import shutil
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import Distribution, PathDistribution
@@ -80,6 +81,14 @@ def clean_environment(outer: Mapping[str, str]) -> dict[str, str]:
     """The environment of scripts except TMPDIR, made from the one that the tool runs in."""
     names = (*_SAYS_NOTHING, *DECISIVE)
     return {name: outer[name] for name in names if name in outer} | _FIXED
+
+
+def find_runner(name: str, interpreter: Interpreter | None) -> str | None:
+    """The path of a program that runs scripts, found where they would find it themselves."""
+    environment = clean_environment(os.environ)
+    if interpreter is not None:
+        environment = interpreter.environment(environment)
+    return shutil.which(name, path=environment.get("PATH", os.defpath))
 
 
 def library_folder() -> str:

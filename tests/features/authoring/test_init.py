@@ -145,6 +145,35 @@ def test_new_course_is_a_repository_unless_it_lies_in_one(
 
 
 @pytest.mark.site
+def test_of_a_repository_that_git_cannot_make_nothing_is_left(tmp_path: Path) -> None:
+    """Git copies the user's template first, and then finds that its own folders have no place."""
+    folder = Folder(tmp_path)
+    folder.write("template/refs", "a file")
+    folder.write("template/description", "text")
+    folder.write("home/.gitconfig", f"[init]\ntemplateDir = {tmp_path}/template\n")
+    result = folder.run("init", "course", env={"HOME": str(tmp_path / "home")})
+    assert (result.status, result.out.splitlines()[0]) == (0, "wrote 17 files to course")
+    (line,) = result.err.splitlines()
+    assert line.startswith("no Git repository was made: ")
+    assert "refs" in line
+    assert [*tmp_path.rglob(".git"), *tmp_path.rglob("description")] == [
+        tmp_path / "template/description"
+    ]
+
+
+@pytest.mark.site
+def test_a_repository_goes_again_where_the_course_cannot_be_written(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    folder.write("course/models", "a file")
+    before = folder.tree()
+    result = folder.main("init", "course")
+    assert (result.status, "models/pendulum.xml cannot be written: " in result.err) == (1, True)
+    assert (folder.tree(), [*tmp_path.rglob(".git")]) == (before, [])
+    (tmp_path / "course/models").unlink()
+    assert "in a new Git repository\n" in folder.main("init", "course").out
+
+
+@pytest.mark.site
 @pytest.mark.engine
 def test_doctor_reports_what_works_and_a_cure_for_the_rest(tmp_path: Path) -> None:
     folder = Folder(tmp_path)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import re
 import shlex
+import shutil
 from collections.abc import Iterator
 from importlib.metadata import requires
 from pathlib import Path
@@ -13,7 +15,9 @@ from pathlib import Path
 from coursebuild import __version__
 from coursebuild.api import CLEAN, EffectError, gate, write
 from coursebuild.core.files.errors import reason
+from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.resources import locked_requirements
+from coursebuild.core.files.trust import find_store
 from coursebuild.core.files.write import FileChange, change_files, undo_changes
 from coursebuild.core.run.script_environment import package_version
 from coursebuild.core.syntax.course_schema import json_schema
@@ -83,8 +87,9 @@ def run(arguments: argparse.Namespace) -> int:
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise EffectError(f"{folder} cannot be created: {reason(error)}") from None
-    change_files(root, [FileChange(path, None, data) for path, data in files.items()])
-    repository = ", in a new Git repository" if _make_repository(root) else ""
+    with _new_repository(root) as is_made:
+        change_files(root, [FileChange(path, None, data) for path, data in files.items()])
+    repository = ", in a new Git repository" if is_made else ""
     installed = package_version("mujoco")
     remark = ""
     if installed != engine:  # then `check` would refuse what was recorded with another
@@ -110,14 +115,42 @@ def _installed_extras() -> Iterator[str]:
                 yield f"{match[1]}=={version}\n"
 
 
-def _make_repository(root: Path) -> bool:
-    """Make a Git repository of the course, where there is Git, and no repository around it."""
+@contextlib.contextmanager
+def _new_repository(root: Path) -> Iterator[bool]:
+    """A Git repository for what is written meanwhile; whether one was made.
+
+    None is, where there is no Git, or a repository around the course. It is made in the store, and
+    moved when it is whole; if writing fails, it goes again.
+    """
     git = gate.find_program("git")
-    if git is None or any((folder / ".git").exists() for folder in (root, *root.parents)):
-        return False
-    command = [git, "-c", "init.defaultBranch=main", "init", "--quiet", str(root)]
+    if git is None or any(os.path.lexists(folder / ".git") for folder in (root, *root.parents)):
+        yield False
+        return
+    place, slot = root / ".git", Path(find_store(str(root))[0], "repository")
+    try:
+        with project_lock(root):
+            shutil.rmtree(slot, ignore_errors=True)  # of a command that was killed
+            problem = _make_repository(git, slot, place)
+        try:
+            yield not problem
+        except BaseException:
+            if not problem:
+                place.rename(slot / ".git")
+            raise
+        if problem:
+            Progress().say(f"no Git repository was made: {problem}")
+    finally:
+        shutil.rmtree(slot, ignore_errors=True)
+
+
+def _make_repository(git: str, slot: Path, place: Path) -> str:
+    """Make a repository in a slot, and move it to its place; return why it cannot be."""
+    command = [git, "-c", "init.defaultBranch=main", "init", "--quiet", str(slot)]
     answer = gate.finish(command, gate.environment())
     if answer.status:
-        errors = answer.errors.decode("utf-8", "replace").strip()
-        Progress().say(f"no Git repository was made: {errors}")
-    return answer.status == 0
+        return answer.last_line()
+    try:
+        (slot / ".git").rename(place)
+    except OSError as error:
+        return reason(error)
+    return ""
