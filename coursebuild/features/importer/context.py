@@ -124,6 +124,11 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         return self.add_file(path)
 
     @property
+    def is_gitbook(self) -> bool:
+        """Whether one dollar sign is a dollar sign, and two begin a formula in a line."""
+        return (self.files.folder / ".gitbook.yaml").is_file()
+
+    @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
         return self.path.endswith(".qmd") or "mkdocs.yml" in self.files
