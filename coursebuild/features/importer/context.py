@@ -125,7 +125,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
 
     @property
     def is_gitbook(self) -> bool:
-        """Whether one dollar sign is a dollar sign, and two begin a formula in a line."""
+        """Whether only two dollar signs begin a formula: one is a dollar, `\\(` a bracket."""
         return (self.files.folder / ".gitbook.yaml").is_file()
 
     @property

@@ -323,6 +323,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called
             )
             return _rewrite_line(called, context) if is_path else whole
+        case "paren" if context.is_gitbook:
+            return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":
             return f"${match['inner'].strip()}$"
         case "note":

@@ -32,7 +32,7 @@ _FRONT_MATTER = re.compile(
     re.DOTALL,
 )
 _TITLE = re.compile(
-    r"^[ ]{0,3}#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$"
+    r"^#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$"
     r"|(?:\A|(?<=\n\n))(?P<line>[^\s#>].*)\n=+[ \t]*$",
     re.MULTILINE,
 )
@@ -106,7 +106,7 @@ def read_segments(text: str, name: str) -> ReadText:
         titles.append(heading["text"] or heading["line"] or "")
         if len(titles) == 1 and own_title in ("", titles[0]):
             return ""
-        return f"## {heading['line']}" if heading["line"] else f"#{heading[0].lstrip()}"
+        return f"## {heading['line']}" if heading["line"] else f"#{heading[0]}"
 
     shifted = [
         replace(segment, text=_HEADING.sub(shift_heading, segment.text))

@@ -250,15 +250,16 @@ def test_code_of_a_list_beside_components_keeps_its_indentation(tmp_path: Path) 
     assert lesson.startswith("Words.\n")
 
 
-def test_a_single_dollar_is_a_dollar_in_gitbook(tmp_path: Path) -> None:
-    text = "See $[`a`](two.md)$, $60 \\* 24$ or $x$5; with $$y$$ inline.\n"
+def test_dollars_and_escaped_brackets_are_no_formulas_in_gitbook(tmp_path: Path) -> None:
+    text = "See $[`a`](two.md)$, $60 \\* 24$ or $x$5; \\(as [b](two.md)\\) with $$y$$.\n"
     files = {"one.md": f"# One\n\n{text}", "two.md": "# Two\n\nWords.\n"}
     plain = convert_files(tmp_path / "plain", files)
     assert "$x5$" in plain.files["content/lessons/1.1-one.md"].decode()
     course = convert_files(tmp_path / "gitbook", {**files, ".gitbook.yaml": "root: ./\n"})
     lesson = course.files["content/lessons/1.1-one.md"].decode()
     assert lesson == (
-        "See \\$[`a`](lesson:1.2)\\$, \\$60 \\* 24\\$ or \\$x\\$5; with $$y$$ inline.\n"
+        "See \\$[`a`](lesson:1.2)\\$, \\$60 \\* 24\\$ or \\$x\\$5; "
+        "\\(as [b](lesson:1.2)\\) with $$y$$.\n"
     )
 
 
@@ -268,10 +269,3 @@ def test_a_picture_whose_tag_goes_over_lines_is_taken_along(tmp_path: Path) -> N
     assert course.files["content/files/p.png"] == b""
     lesson = course.files["content/lessons/1.1-one.md"].decode()
     assert '<img src="../files/p.png"\n    alt="A box">' in lesson
-
-
-def test_a_title_may_be_indented(tmp_path: Path) -> None:
-    course = convert_files(tmp_path, {"one.md": "(label)=\n\n # One\n\nWords.\n\n  # Two\n"})
-    assert b'title = "One"' in course.files["content/course.toml"]
-    lesson = course.files["content/lessons/1.1-one.md"].decode()
-    assert "# One" not in lesson and "\n## Two\n" in lesson
