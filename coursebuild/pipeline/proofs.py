@@ -9,6 +9,7 @@ Entry points: `find_proofs`, `find_losses`; `remarks_on_proofs`, which `check` e
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
 from typing import Literal, TypeAlias
@@ -22,6 +23,7 @@ from coursebuild.core.model import (
     Link,
     Recording,
     Table,
+    UrlTarget,
     find_blocks,
     find_inlines,
 )
@@ -37,6 +39,10 @@ KIND = "proofs"
 """That of entries of the store: what was proved of a document, by the hash of its path."""
 
 
+_OPAQUE = re.compile(r"[A-Za-z][\w+.-]*:(?!//)")
+"""An address that nothing looks up, as `mailto:` and a misspelt `lesson:`."""
+
+
 class Proof(Struct, frozen=True):
     """Something that was proved of a document."""
 
@@ -49,6 +55,10 @@ class Proof(Struct, frozen=True):
     """How often the text stood in the document."""
     line: int = 0
     """The line where it stood."""
+    label: str = ""
+    """What readers see of a link, in its brackets: it stays where its address is misspelt."""
+    labels: int = 0
+    """How often the label stood in the document."""
 
     def describe(self) -> str:
         """What it is called in a report."""
@@ -105,10 +115,12 @@ def find_losses(course: Course, path: str, before: Sequence[Proof]) -> Iterator[
         if now[_identity(proof)]:
             now[_identity(proof)] -= 1
             continue
-        places = [*_places(document.source, proof.text)]
-        free = [p for p in places if not any(span.contains(p) for span in spans)]
-        if free and len(places) >= proof.count:
-            yield Loss(proof, min(free, key=lambda place: abs(place.line - proof.line)))
+        for text, count in ((proof.text, proof.count), (proof.label, proof.labels)):
+            places = [*_places(document.source, text)] if text else []
+            free = [p for p in places if not any(span.contains(p) for span in spans)]
+            if free and len(places) >= count:
+                yield Loss(proof, min(free, key=lambda place: abs(place.line - proof.line)))
+                break
 
 
 def remarks_on_proofs(
@@ -180,14 +192,19 @@ def _of_document(document: Document, scripts: Collection[str] | None) -> Iterato
         if is_run(figure.script):
             yield _proved("figure", figure.name, figure.span, figure.script)
     for link in find_inlines(document, Link):
-        if not link.mention and link.target_span.text:
-            yield _proved("link", link.target_span.text, link.span)
+        text = link.target_span.text
+        is_opaque = isinstance(link.target, UrlTarget) and _OPAQUE.match(text)
+        if not link.mention and text and not is_opaque:
+            yield _proved("link", text, link.span)
 
 
 def _proved(kind: Kind, text: str, span: Span, script: str = "") -> _ProvedText:
+    label = span.text.partition("](")[0] + "]" if kind == "link" and span.text[:1] == "[" else ""
     places = [*_places(span.source, text)]
     place = next(filter(span.contains, places), span)
-    return _ProvedText(Proof(kind, text, script, len(places), place.line), span)
+    labels = [*_places(span.source, label)] if label else []
+    proof = Proof(kind, text, script, len(places), place.line, label, len(labels))
+    return _ProvedText(proof, span)
 
 
 def _longest_line(text: str) -> str:
@@ -200,6 +217,6 @@ def _places(source: Source, text: str) -> Iterator[Span]:
     while at >= 0:
         end = at + len(text)
         signs = source.text[at - 1 : at], source.text[end : end + 1]
-        if not any(sign.isalnum() for sign in signs):
+        if text[0] == "[" or not any(sign.isalnum() for sign in signs):
             yield source.span(at, end)
         at = source.text.find(text, end)

@@ -92,6 +92,9 @@ def test_a_table_without_its_caption_is_told(make: Make) -> None:
         ("[there](", "there](", "1.1: the link to `#fall` in line 3 was proved before"),
         ("[there](#fall)", "[here](#fall)", ""),
         ("[there](#fall)", "there", ""),
+        ("[there](#fall)", "[there](pge:fall)", "1.1: the link to `#fall` in line 3 was proved"),
+        ("[there](#fall)", "[there]O#fall)", "1.1: the link to `#fall` in line 3 was proved"),
+        ("[there](#fall)", "[there](https://example.org)", ""),
     ],
 )
 def test_a_link_that_became_text_is_told(make: Make, old: str, new: str, remark: str) -> None:

@@ -215,11 +215,11 @@ def _is_reported(first: model.AnchorOwner, second: model.AnchorOwner) -> bool:
 
 
 _CONFLICT_MARK = re.compile(r"^(?:<{7}|\|{7}|={7}|>{7})(?:[ \t][^\r\n]*)?(?=\r?$)", re.MULTILINE)
-_SHOWN_CONFLICT = re.compile(
-    r"^ {0,3}(`{3,}|~{3,})[ \t]*(?:diff|markdown)\b.*\n(?:.*\n)*? {0,3}\1[`~]*[ \t]*\r?$",
+_FENCED = re.compile(
+    r"^ {0,3}(`{3,}|~{3,})[ \t]*(?P<info>[^`\n]*)\n(?:.*\n)*? {0,3}\1[`~]*[ \t]*\r?$",
     re.MULTILINE,
 )
-"""A block that shows a change, or how a lesson is written."""
+"""A block of code as a whole."""
 _CONFLICT_NOTES = {
     "|": "the text that both versions changed begins here",
     "=": "the other version begins here",
@@ -231,12 +231,13 @@ def find_conflict(source: Source) -> Diagnostic | None:
     """The diagnostic of the first merge conflict in a file, or of a mark that is left of one.
 
     Git writes its marks at the start of a line, so a conflict can be shown on purpose: in a block
-    of kind `diff` or `markdown`, or indented in a list or a quotation.
+    that is only shown, whose first line names at most a kind, or indented in a list or a quotation.
     """
     text, is_markdown = source.text, source.path.endswith(".md")
     if "<<<<<<<" not in text and ">>>>>>>" not in text:
         return None  # a line of `=` alone may be anything
-    examples = [match.span() for match in _SHOWN_CONFLICT.finditer(text)] if is_markdown else []
+    blocks = _FENCED.finditer(text) if is_markdown else ()
+    examples = [block.span() for block in blocks if len(block["info"].split()) < 2]
     marks = [
         Span(source, *match.span())
         for match in _CONFLICT_MARK.finditer(text)
@@ -263,5 +264,5 @@ def find_conflict(source: Source) -> Diagnostic | None:
         notes.append(Note(f"conflicts further down in this file: {more_count}"))
     help = "keep one of the versions, or join them, and delete the marks"
     if is_markdown:
-        help += "; to show a conflict to readers, put it into a block of kind `diff`"
+        help += "; to show a conflict to readers, put all of it into a block of code"
     return diagnose("merge-conflict", conflict[0], message, help=help, notes=notes)

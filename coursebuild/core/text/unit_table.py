@@ -142,6 +142,10 @@ ppb 1e-9 1
 bit* 1 bit bits
 B*! 8 bit byte bytes
 KB 8000,8192 bit
+kB 8000,8192 bit
+MB 8e6,8388608 bit
+GB 8e9,8589934592 bit
+TB 8e12,8796093022208 bit
 Bd* 1 1/s
 bps* 1 bit/s
 FLOPS* 1 1/s

@@ -4,8 +4,8 @@ Entry point: `check_arithmetic(tex, symbols, unit)`.
 
 1. One of two sides is a numeral, as `3.2\cdot10^{-4}\ \mathrm m`. The other must agree with its
    digits, within half a unit of the last place. After `=` a whole number is exact, but for one of
-   two digits or more that comes of decimals; after `\approx` its final zeros can be the result of
-   rounding.
+   two digits or more that comes of decimals, or that no decimal can be exactly; after `\approx` its
+   final zeros can be the result of rounding.
 2. If some sides of a chain end in the same unit, and there is no other, it holds for all sides.
    Different units are converted.
    A relation holds if it does so for one meaning of each unit that has several.
@@ -134,6 +134,8 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
     `0 = 1` ends a proof by contradiction, and of whole numbers `/` may be a division without rest.
     """
     sides = left.get_expression(), right.get_expression()
+    if sides[0].ends_in_unit() and sides[0].parts[0].text == "1" and not sides[1].has("unit"):
+        return "it says how many one of them is"  # `1\text{ dozen} = 12`
     if _may_hold(sides, relation):
         return "its unit may be that of another part"
     units = (part.text for side in sides for part in side.walk() if part.kind == "unit")
@@ -256,9 +258,12 @@ def _find_mistake_as_read(
         return FormulaComparison("wrong", right.start, right.end, message)
     index = choose_rounded(numerals, relation)
     numeral, side, value = numerals[index], (left, right)[index], values[1 - index]
-    of_decimals = (left, right)[1 - index].has_decimals()
-    if decide(agrees(numeral, value, relation, of_decimals=of_decimals), right):
-        return None
+    has_scale = any(number.zero.sign() for number in numerals.values())  # that begins at 273.15 K
+    may_be = {i: n for i, n in numerals.items() if i == index or (n.is_whole and numeral.is_whole)}
+    for i, rounded in may_be.items():
+        of_decimals = has_scale or (left, right)[1 - i].has_decimals()
+        if decide(agrees(rounded, values[1 - i], relation, of_decimals=of_decimals), right):
+            return None
     digits = max(numeral.digits + 2, 4)
     result = f"{numeral.express(value):.{digits}g}"
     message = f"the result is {result}, not this"

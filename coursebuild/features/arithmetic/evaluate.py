@@ -159,13 +159,15 @@ def agrees(
     """Whether a value, rounded to the digits of a numeral, is that number; `None` if unknown.
 
     After `=` a whole number is exact, or, if it has two digits or more and the value comes
-    `of_decimals`, rounded to as many digits: 49.05 to 49, but 9.75 to 9.8 and not to 10.
+    `of_decimals`, rounded to as many digits: 49.05 to 49, but 9.75 to 9.8 and not to 10. So it is
+    where no decimal can be exact, as of 100/3.
     """
     difference, step = (value - numeral.value).abs(), numeral.step
     if numeral.is_whole and relation == "=":
         last_digit = step * Real.of(Fraction(1, 10**numeral.zeros))
         is_long = (value.abs() - last_digit * Real.of(10 ** (numeral.digits - 1))).sign()
-        if not (of_decimals and numeral.digits > 1 and is_long in (0, 1)):
+        may_be_rounded = of_decimals or not numeral.express(value).has_end
+        if not (may_be_rounded and numeral.digits > 1 and is_long in (0, 1)):
             sign = difference.sign()
             return None if sign is None else sign == 0
         step = last_digit

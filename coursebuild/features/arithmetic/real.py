@@ -84,6 +84,12 @@ class Real:
         return int(rational) if rational is not None and rational.denominator == 1 else None
 
     @property
+    def has_end(self) -> bool:
+        """Whether it is known that its decimals end."""
+        divisor = 0 if self.rational is None else self.rational.denominator
+        return divisor != 0 and pow(10, divisor.bit_length(), divisor) == 0
+
+    @property
     def is_finite(self) -> bool:
         """Whether it is certainly a number."""
         return self.form is not None or bool(self.ball.is_finite())

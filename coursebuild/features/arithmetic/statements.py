@@ -20,7 +20,8 @@ _MAX_LENGTH = 5_000
 _DIGITS = re.compile("[0-9],[0-9]")
 _COMMA = re.compile(r"([0-9]+)\{,\}([0-9]+)")
 _PLAIN_COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")
-_POINT_OF_THOUSANDS = re.compile(r"(?<![0-9.])[1-9][0-9]{0,2}\.[0-9]{3}(?![0-9])")
+_COMMA_OF_TWO = re.compile(r"[0-9],[0-9]|[0-9](?:,|\{,\})\([0-9]")
+_POINT = re.compile(r"(?<=[0-9])\s*\.\s*(?=[0-9])")
 _CERTAIN_COMMA = re.compile(r"(?<![0-9.])0\{,\}[0-9]|[0-9]\{,\}(?:[0-9]{1,2}|[0-9]{4,})(?![0-9])")
 """A comma that parts no thousands."""
 _ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x66B: "."}
@@ -120,9 +121,9 @@ def point_decimals(tex: str, comma: bool = False) -> str:
 
 def second_reading(tex: str) -> str:
     """How the signs in numbers may be meant where commas stand before decimals; empty if not."""
-    if _PLAIN_COMMA.search(tex):
+    if _COMMA_OF_TWO.search(tex):
         return "a comma in it may part two numbers"
-    return "a point in it may part thousands" if _POINT_OF_THOUSANDS.search(tex) else ""
+    return "a point in it may part thousands or factors" if _POINT.search(tex) else ""
 
 
 @lru_cache(maxsize=2048)

@@ -130,6 +130,11 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         return self.add_file(path)
 
     @property
+    def is_gitbook(self) -> bool:
+        """Whether only two dollar signs begin a formula: one is a dollar, `\\(` a bracket."""
+        return (self.files.folder / ".gitbook.yaml").is_file()
+
+    @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
         return self.path.endswith((".qmd", ".Rmd")) or "mkdocs.yml" in self.files

@@ -27,6 +27,12 @@ _PART = re.compile(
     rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)>",
     re.MULTILINE | re.DOTALL,
 )
+_INDENT = re.compile(
+    r"(?P<kept>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`)|</?[A-Z][^<>]*>)"
+    r"|(?<=\n\n)[ ]{4,}(?![ ]*[-*+`\d])",
+    re.DOTALL,
+)
+"""The indentation of what a component holds; code and tags are passed over."""
 _COMPUTED = re.compile(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
 _LABELS = [
     re.compile(rf"\s(?:{names})=(?:\"([^\"]*)\"|'([^']*)')")
@@ -43,11 +49,7 @@ def is_mdx(text: str) -> bool:
 
 def without_jsx(text: str, context: LessonContext) -> str:
     """Return prose without JavaScript."""
-    chunks = re.split(r"(</?[A-Z][^<>]*>)", text)  # what a component holds may be indented
-    text = "".join(
-        chunk if number % 2 else re.sub(r"(?<=\n\n)[ ]{4,}(?![ ]*[-*+`\d])", "", chunk)
-        for number, chunk in enumerate(chunks)
-    )
+    text = _INDENT.sub(lambda match: match["kept"] or "", text)
     return _PART.sub(lambda part: _convert_part(part, context), text)
 
 

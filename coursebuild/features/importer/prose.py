@@ -132,6 +132,7 @@ _OVER_LINES = re.compile(
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
 )
 """A role, a note, a citation or the address of a link that goes on in the next line."""
+_TAG_OVER_LINES = re.compile(r"<(?i:a|img|source|video)[ \t\n](?=[^<>\n]*\n)[^<>]*>")
 _FIGURE = re.compile(
     r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"
     r"\{#fig-(?P<label>[\w-]+)(?:[^{}\n]*?fig-alt=\"(?P<alternative>[^\"\n]*)\")?[^{}\n]*\}(?=\n|\Z)"
@@ -203,6 +204,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     if count:
         account.changed["comment of MyST", "a comment of HTML"] += count
     text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
+    text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
     text, count = _TARGET.subn(write_target, text)
     if count:
         account.changed["label", "an anchor"] += count
@@ -339,12 +341,16 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called
             )
             return _rewrite_line(called, context) if is_path else whole
+        case "paren" if context.is_gitbook:
+            return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":
             return f"${match['inner'].strip()}$"
         case "note":
             context.notes.append(_rewrite_line(match["remark"], context))
             return f"[^note-{len(context.notes)}]"
         case "math":
+            if context.is_gitbook and whole[:2] != "$$":
+                return rf"\${_rewrite_line(whole[1:-1], context)}\$"
             return (
                 whole if _WORD.search(whole) else _TIGHT.sub(lambda m: f"${m[1].strip()}$", whole)
             )
@@ -352,6 +358,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)
             return re.sub(r"(?<!\\)\|", r"\\|", code) if is_cell else code
+        case "digits" if context.is_gitbook:
+            return whole.replace("$", r"\$")
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":

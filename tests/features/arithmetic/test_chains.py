@@ -93,7 +93,7 @@ def test_a_whole_number_is_rounded_to_its_digits_where_decimals_give_it() -> Non
         r"5\cdot9.81 = 48",
         r"2.5\cdot3.9 = 10",
         r"0.7\cdot2 = 1",
-        r"2\pi\cdot50 = 314",
+        r"2\pi\cdot50 = 315",
         r"7\cdot8 = 57",
     ):
         assert [comparison.kind for comparison in check_arithmetic(tex)] == ["wrong"], tex
@@ -304,6 +304,54 @@ def test_a_form_with_two_readings_is_not_judged() -> None:
     thousands = check_arithmetic("1.250 + 500 = 1.750", comma=True)
     assert {c.kind for c in thousands} <= {"unread"}
     assert {c.kind for c in check_arithmetic("1.250 + 500 = 1.750")} == {"wrong"}
+
+
+ROUNDED = r"""
+\frac{1}{2\pi\cdot 10^4\cdot 10^{-7}} = 159\ \mathrm{Hz}
+230\sqrt2 = 325
+2/3 = 67\,\%
+37\,^\circ\mathrm C = 310\ \mathrm K
+10^5\ \mathrm{Pa} = 750\ \mathrm{mmHg}
+1\ \mathrm{pc} = 206265\ \mathrm{au}
+1\ \mathrm{MB} = 1024\ \mathrm{KB}
+1\ \mathrm{GB} = 1000\ \mathrm{MB}
+"""
+WRONGLY_ROUNDED = r"""
+230\sqrt2 = 326
+2/3 = 76\,\%
+\sqrt{10} = 3
+2^{10} = 1000
+99/2 = 50
+37\,^\circ\mathrm C = 311\ \mathrm K
+1\ \mathrm{in} = 25\ \mathrm{mm}
+2\ \mathrm{MB} = 3000\ \mathrm{KB}
+"""
+COMMAS_OF_TWO_READINGS = r"""
+0,(3) = \frac13
+0{,}1(6) = \frac16
+2.3.5 = 30
+2.3 = 6
+"""
+
+
+def test_what_no_decimal_can_hold_is_rounded_after_an_equals_sign() -> None:
+    for texts, kind in ((ROUNDED, "holds"), (WRONGLY_ROUNDED, "wrong")):
+        for tex in texts.strip().splitlines():
+            assert {c.kind for c in check_arithmetic(tex)} == {kind}, tex
+
+
+def test_how_many_one_is_of_a_word_is_said_and_not_computed() -> None:
+    for tex in (r"1\text{ dozen} = 12", r"1\ \mathrm{mol} = 6.022\times10^{23}"):
+        assert {c.kind for c in check_arithmetic(tex)} == {"unread"}
+    for tex in (r"2\cdot6 = 13\text{ eggs}", r"1\ \mathrm m = 99\ \mathrm{cm}"):
+        assert {c.kind for c in check_arithmetic(tex)} == {"wrong"}
+
+
+def test_periods_and_points_between_factors_are_not_judged_beside_commas() -> None:
+    for tex in COMMAS_OF_TWO_READINGS.strip().splitlines():
+        assert {c.kind for c in check_arithmetic(tex, comma=True)} <= {"unread"}, tex
+    assert {c.kind for c in check_arithmetic("2,5 + 1 = 3,6", comma=True)} <= {"unread"}
+    assert {c.kind for c in check_arithmetic(r"2{,}5 + 1 = 3{,}6", comma=True)} == {"wrong"}
 
 
 def test_symbols_with_values_are_computed_and_units_compared() -> None:

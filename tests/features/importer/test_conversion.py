@@ -257,3 +257,44 @@ def test_a_lab_of_another_tool_is_a_card_and_a_module_to_be_written(tmp_path: Pa
     script = f"import({json.dumps(module.as_uri())}).then(m => console.log(typeof m.mount))"
     run = subprocess.run(["node", "-e", script], capture_output=True, text=True, check=True)
     assert run.stdout == "function\n"
+
+
+def test_code_of_a_list_beside_components_keeps_its_indentation(tmp_path: Path) -> None:
+    code = """- A class:
+
+  ```python
+  class A:
+      x = 1
+
+      def f(self): ...
+
+      # A comment
+  ```
+"""
+    course = convert_files(
+        tmp_path, {"one.mdx": f"# One\n\n<Tip>\n\n    Words.\n\n</Tip>\n\n{code}"}
+    )
+    lesson = course.files["content/lessons/1.1-one.md"].decode()
+    assert code in lesson
+    assert lesson.startswith("Words.\n")
+
+
+def test_dollars_and_escaped_brackets_are_no_formulas_in_gitbook(tmp_path: Path) -> None:
+    text = "See $[`a`](two.md)$, $60 \\* 24$ or $x$5; \\(as [b](two.md)\\) with $$y$$.\n"
+    files = {"one.md": f"# One\n\n{text}", "two.md": "# Two\n\nWords.\n"}
+    plain = convert_files(tmp_path / "plain", files)
+    assert "$x5$" in plain.files["content/lessons/1.1-one.md"].decode()
+    course = convert_files(tmp_path / "gitbook", {**files, ".gitbook.yaml": "root: ./\n"})
+    lesson = course.files["content/lessons/1.1-one.md"].decode()
+    assert lesson == (
+        "See \\$[`a`](lesson:1.2)\\$, \\$60 \\* 24\\$ or \\$x\\$5; "
+        "\\(as [b](lesson:1.2)\\) with $$y$$.\n"
+    )
+
+
+def test_a_picture_whose_tag_goes_over_lines_is_taken_along(tmp_path: Path) -> None:
+    text = '# One\n\n<figure>\n  <img src="../p.png"\n    alt="A box">\n</figure>\n'
+    course = convert_files(tmp_path, {"a/one.md": text, "p.png": "", "b/two.md": "# Two\n"})
+    assert course.files["content/files/p.png"] == b""
+    lesson = course.files["content/lessons/1.1-one.md"].decode()
+    assert '<img src="../files/p.png"\n    alt="A box">' in lesson
