@@ -230,13 +230,13 @@ class BoundNumber(Struct, frozen=True, dict=True):
 
     def places(self) -> list[PrintedPlace]:
         """Where it holds: in recorded text, or else in the run, if only that has its unit."""
-        found: list[list[PrintedPlace]] = []
+        choices: list[list[PrintedPlace]] = []
         for outputs in self.groups:
             places = self.look_up(outputs)
             if places and all(map(self.text.shows, places)):
-                found.append(places)
-        of_unit = (p for p in found if self.text.wrong_unit(p, self.following) is None)
-        return next(of_unit, found[0] if found else [])
+                choices.append(places)
+        of_unit = (p for p in choices if self.text.wrong_unit(p, self.following) is None)
+        return next(of_unit, choices[0] if choices else [])
 
     def look_up(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers at its addresses; those that it may mean where none is known.

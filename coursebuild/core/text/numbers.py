@@ -276,10 +276,10 @@ def _round_with_power(sample: Number, value: Decimal) -> str | None:
     if power is None or factor is None or not 1 <= abs(factor.value) < 10 or not value:
         return None
     rounded, _, exponent = f"{value:.{-factor.place}e}".partition("e")
-    shown, group = str(int(exponent)), "caret" if power["caret"] else "raised"
+    power_text, group = str(int(exponent)), "caret" if power["caret"] else "raised"
     if group == "raised":
-        shown = shown.translate(_RAISED)
+        power_text = power_text.translate(_RAISED)
     elif "\u2212" in power["caret"]:
-        shown = shown.replace("-", "\u2212")
-    mantissa = round_like(factor, Decimal(rounded))
-    return f"{mantissa}{text[power.start() : power.start(group)]}{shown}{text[power.end(group) :]}"
+        power_text = power_text.replace("-", "\u2212")
+    ten = text[power.start() : power.start(group)]
+    return f"{round_like(factor, Decimal(rounded))}{ten}{power_text}{text[power.end(group) :]}"

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coursebuild.core.model import Document, Script, document_blocks
-from coursebuild.core.model.walk import without_prose
 from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.model.walk import without_prose
 from coursebuild.core.scripts.bindings import PrintedOutputs, check_bindings, dependent_bindings
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.text.diagnostics import Diagnostic
