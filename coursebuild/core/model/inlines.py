@@ -67,7 +67,7 @@ class NumberBinding(Located, frozen=True):
     """Its source from `{given="…"}`, empty for a symbol's value without one; `None` where a script
     has printed it."""
     unit: str = ""
-    """That of a symbol whose value it is."""
+    """That of a symbol whose value it is, or of a field that says it for a number in JSON."""
     comma: bool = False
     """Whether a comma may stand before its decimals, as in the language of the text."""
     words: str = ""

@@ -273,8 +273,9 @@ def without_prose(document: Document) -> Document:
     """The summary of a document, of the same type: all but what only its own page shows.
 
     Blocks come out of their containers, since no other page asks what contains what. Formulas
-    are left out, except those in recorded tables: they are checked in the whole document. If
-    only prose was left out, a thematic break stands for it, so that the summary is not blank.
+    are left out, except those in tables that are recorded or bind numbers, whose header says the
+    units: they are checked in the whole document. If only prose was left out, a thematic break
+    stands for it, so that the summary is not blank.
     """
     recorded_ids: set[int] = set()
     blocks: list[Block] = []
@@ -289,6 +290,8 @@ def without_prose(document: Document) -> Document:
         match block:
             case Paragraph() if block.figure:
                 blocks.append(replace(block, children=inlines))
+            case Table() if any(isinstance(inline, NumberBinding) for inline in inlines):
+                blocks.append(replace(block, label=None))
             case Paragraph() | HtmlFlow() | Table():
                 blocks += _paragraph_of(block.span, inlines)
             case Heading():

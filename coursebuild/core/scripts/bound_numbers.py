@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from decimal import Decimal
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -77,14 +76,12 @@ class BoundText(Struct, frozen=True):
     def rewrite(self, place: PrintedPlace) -> str:
         """The binding's text with printed numbers in it, rounded to the digits that it shows.
 
-        Empty where its notation is not that of a printed number, or one would be rounded to zero.
+        Empty where its notation cannot hold a printed number, or one would be rounded to zero.
         """
         places: list[tuple[int, int, str]] = []
         for number, printed in zip(self.numbers, place.numbers, strict=True):
             rounded = round_like(number, printed.value) if printed.is_finite else None
-            if rounded is None or (
-                printed.value and not Decimal(plain_text(rounded).replace(",", ""))
-            ):
+            if rounded is None or (printed.value and not any(n.value for n in scan_prose(rounded))):
                 return ""
             rounded = write_comma(rounded) if self.comma else rounded
             places.append((number.start, number.end, rounded))

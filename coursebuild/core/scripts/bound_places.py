@@ -229,12 +229,14 @@ class BoundNumber(Struct, frozen=True, dict=True):
         return (is_label and unit_of_label(label).text) or rest
 
     def places(self) -> list[PrintedPlace]:
-        """Where it holds: in recorded text, or else in the run."""
+        """Where it holds: in recorded text, or else in the run, if only that has its unit."""
+        choices: list[list[PrintedPlace]] = []
         for outputs in self.groups:
             places = self.look_up(outputs)
             if places and all(map(self.text.shows, places)):
-                return places
-        return []
+                choices.append(places)
+        of_unit = (p for p in choices if self.text.wrong_unit(p, self.following) is None)
+        return next(of_unit, choices[0] if choices else [])
 
     def look_up(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers at its addresses; those that it may mean where none is known.

@@ -21,7 +21,13 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Filter, Mode
-from coursebuild.core.text.numbers import Number, scan, within_half_unit, within_tolerance
+from coursebuild.core.text.numbers import (
+    Number,
+    scan,
+    with_powers,
+    within_half_unit,
+    within_tolerance,
+)
 from coursebuild.core.text.patterns import replacements
 
 _LINE_END = re.compile(r"\r\n?|\n")
@@ -182,9 +188,12 @@ class CanonicalText(Struct, frozen=True):
 
 
 @lru_cache(maxsize=8192)
-def canonicalize(text: str, offset: int = 0) -> CanonicalText:
-    """The skeleton and the numbers of a text that stands at `offset` of its line."""
-    numbers = scan(text)
+def canonicalize(text: str, offset: int = 0, *, has_powers: bool = False) -> CanonicalText:
+    """The skeleton and the numbers of a text that stands at `offset` of its line.
+
+    `has_powers`: a person wrote it, with numbers such as `3.9 × 10⁻¹¹`.
+    """
+    numbers = with_powers(text, scan(text)) if has_powers else scan(text)
     places = ((number.start, number.end, MARK) for number in numbers)
 
     def fold_space(match: re.Match[str]) -> str:

@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache, cached_property
 from itertools import accumulate
@@ -43,6 +44,7 @@ _Words: TypeAlias = tuple[tuple[str, bool], ...]
 
 
 _IN_BRACKETS = re.compile(r"[(\[]([^()\[\]]+)[)\]]")
+_UNIT_IN_BRACKETS = re.compile(r"\s*[(\[][^()\[\]]*[)\]][\s:=]*\Z")
 _REST_OF_ROW = re.compile(r"\A(?:[-+]?\d[\d.e+-]*(?=[\s)\],])|(?:and|to)\s|[\s)\],])*")
 _FORBIDDEN = re.compile(r'["{}]')
 """What the words of `{out="words"}` cannot hold."""
@@ -195,8 +197,20 @@ class PrintedText:
         return tuple(tuple(number.text for number in line.numbers) for line in self.lines)
 
     def heading(self, at: int) -> str:
-        """The heading of a line, by its index."""
-        return self._words[self._headings[at]] if self._headings[at] >= 0 else ""
+        """The heading of a line, by its index; behind its own where it has those words twice."""
+        return self._names_of_headings[self._headings[at]]
+
+    @cached_property
+    def _names_of_headings(self) -> dict[int, str]:
+        places = sorted({*self._headings} - {-1})
+        counts = Counter(self._words[at] for at in places)
+        names = {-1: ""}
+        for at in places:
+            words, outer = self._words[at], self._headings[at]
+            is_told = outer >= 0 and self._words[outer] != words and not self.lines[at].numbers
+            is_named = counts[words] > 1 and is_told
+            names[at] = f"{self._words[outer]} / {words}" if is_named else words
+        return names
 
     def headings(self, at: int) -> str:
         """The heading of a line behind its own: what stands above a table, and its titles."""
@@ -235,7 +249,10 @@ class PrintedText:
     def _by_words(self) -> dict[tuple[str, str], list[int]]:
         lines: dict[tuple[str, str], list[int]] = {}
         for at, words in enumerate(self._words):
-            lines.setdefault((self.heading(at), words), []).append(at)
+            heading = self._headings[at]
+            names = {self.heading(at), self._words[heading] if heading >= 0 else ""}
+            for name in names:  # records may hold the shorter one
+                lines.setdefault((name, words), []).append(at)
         return lines
 
     def words(self, at: int) -> str:
@@ -325,7 +342,7 @@ class PrintedText:
     def _read_contexts(self, at: int, first: int) -> list[_Words]:
         """All words before a number, also the heading's, and again with the title of the column.
 
-        The title may stand right behind what its row begins with.
+        The title may stand right behind what its row begins with, and without its unit.
         """
         line = self.lines[at]
         number = line.numbers[first]
@@ -334,8 +351,11 @@ class PrintedText:
         texts = [before, f"{before} {title}"] if title else [before]
         if title and first > 0:
             end = line.numbers[0].end + len(unit_behind(line.text, line.numbers[0].end).text) + 1
-            texts.append(f"{heading} {line.text[:end]} {title}")
-        return list(map(_split, texts))
+            above = self.heading(self._headings[at]) if line.title(number) is None else ""
+            texts += (f"{words} {line.text[:end]} {title}" for words in (heading, above))
+            texts.append(f"{above} {title}")
+        bare_texts = [_UNIT_IN_BRACKETS.sub("", text) for text in texts]
+        return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
 
 
 def masked(text: str) -> str:

@@ -48,7 +48,7 @@ def table_rows(
     with_point = point_decimals if table.comma else str
     rows = (
         tuple(
-            RowCell(cell, column, mapped, canonicalize(with_point(mapped.text)))
+            RowCell(cell, column, mapped, canonicalize(with_point(mapped.text), has_powers=True))
             for column, cell in enumerate(row)
             if (mapped := cell_text(cell, rules)).text not in ("", *ELISIONS)
         )

@@ -166,7 +166,7 @@ def value_text(value: Excerpt | None) -> str:
 _UNREAD = re.compile(
     r"(?<!\\)\{\s*(?P<given>given)\b[^{}`\n]*\}?"
     r"|(?<=`)(?<!\\`)\{\s*(?P<binding>out|code)\b[^{}`\n]*\}?"
-    r"|(?<=\$)(?<!\\\$)\{\s*(?P<symbol>symbol|unit|value)\b[^{}\n]*\}?"
+    r"|(?<=\$)(?<!\\\$)\{\s*(?P<symbol>symbol|unit|value|out)\b[^{}\n]*\}?"
     r"|(?<=\])(?<!\\\])\{\s*(?P<term>term)\b[^{}\n]*\}?"
 )
 """Braces that begin as an attribute does: after code, a formula, a bracket, or for a source
@@ -179,6 +179,9 @@ _GIVEN_HELP = (
     'write `{given="its source"}` behind a number in backticks, a formula or a paragraph, or alone '
     "below a paragraph, a list or a table, after an empty line; write `\\{` for a brace that "
     "readers should see"
+)
+_FORMULA_HELP = (
+    "bind a number in backticks, as in `` `4.9 m`{out} ``, or a value: `{value=4.9 out}`"
 )
 _HELPS = {
     "binding": _BINDING_HELP,
@@ -197,6 +200,8 @@ def check_unread_attributes(content: Excerpt, start: int, text: str) -> Iterator
         message, help = f"`{collapse_spaces(match[0])}` cannot be read", _HELPS[kind]
         if re.fullmatch(r'\{given(?:="\s*")?\}', match[0]):
             message, help = NO_SOURCE, SOURCE_HELP
+        elif match["symbol"] == "out":
+            message, help = f"`{match[0]}` binds no formula", _FORMULA_HELP
         place, rule = content.span(*match.span()), "binding" if kind == "given" else kind
         yield diagnose(f"{rule}-attribute", place, message, help=help)
 

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from markdown_it.common.utils import unescapeAll
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.model import Block, CodeBlock, Inline, NumberBinding
 from coursebuild.core.syntax.attributes import check_quotes, split_label
@@ -268,6 +269,17 @@ class TextParser(Protocol):
     def inlines(self, excerpt: Excerpt) -> Parsed[tuple[Inline, ...]]:
         """The inlines of a text of at most one paragraph; line ends are soft. Never raises."""
         ...
+
+
+def with_units(
+    numbers: Iterable[NumberBinding], units: Iterable[tuple[Node, str]]
+) -> tuple[NumberBinding, ...]:
+    """Bound numbers with the units that fields beside them say: to each in a node, its unit."""
+    places = [(node.span, unit) for node, unit in units]
+    return tuple(
+        replace(b, unit=next((unit for span, unit in places if span.contains(b.span)), b.unit))
+        for b in numbers
+    )
 
 
 class Prose(Struct, frozen=True):

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Iterable
 from decimal import Context, Decimal
 
 from msgspec import Struct
@@ -69,8 +70,9 @@ _EXACT = Context(prec=40_000)
 _QUOTIENT = Context(prec=34)
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻", "0123456789+-")
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _POWER = re.compile(
-    rf"\s*[×·]\s*10(?:\^\{{?(?P<caret>{_SIGN}?[0-9]{{1,4}})\}}?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{{1,4}}))(?!\w)"
+    rf"\s*(?:[×·]|\\cdot|\\times)\s*10(?:\^\{{?(?P<caret>{_SIGN}?[0-9]{{1,4}})\}}?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{{1,4}}))(?!\w)"
 )
 
 _UNREAD = re.compile(rf"\^\W*[0-9]+|(?P<bad>(?<![\w)\]]){_SIGN}(?={_SIGN}+\.?[0-9])|[0-9]+)")
@@ -164,8 +166,13 @@ def only_number(text: str) -> Number | None:
 
 def scan_prose(text: str) -> tuple[Number, ...]:
     """The numbers of a text that a person wrote: `3.9 × 10⁻¹¹` and `3.9·10^-11` are one number."""
+    return with_powers(text, scan(text, has_groups(text)))
+
+
+def with_powers(text: str, scanned_numbers: Iterable[Number]) -> tuple[Number, ...]:
+    """The numbers of a text, each with the power of ten that follows it."""
     numbers: list[Number] = []
-    for number in scan(text, has_groups(text)):
+    for number in scanned_numbers:
         if numbers and number.start < numbers[-1].end:
             continue
         power = _POWER.match(text, number.end)
@@ -237,11 +244,11 @@ def round_like(sample: Number, value: Decimal) -> str | None:
     """`value` (finite) rounded to as many decimals as `sample` shows, in its notation.
 
     A plus sign and a U+2212 minus are kept where `sample` has them, exponents keep their width.
-    `None` where the notation is not a machine's (`3.9 × 10⁻¹¹`, `nan`).
+    `None` where the notation is none of a finite number (`nan`).
     """
     match = _NOTATION.fullmatch(sample.text)
     if match is None:
-        return None
+        return _round_with_power(sample, value)
     decimals = len(match["decimals"] or "")
     if match["mark"]:
         mantissa, _, power = f"{abs(value):.{decimals}e}".partition("e")
@@ -260,3 +267,19 @@ def round_like(sample: Number, value: Decimal) -> str | None:
     negative = value < 0 and any(c in "123456789" for c in mantissa)
     minus = "\u2212" if match["sign"] == "\u2212" else "-"
     return f"{minus if negative else '+' if match['sign'] == '+' else ''}{mantissa}{exponent}"
+
+
+def _round_with_power(sample: Number, value: Decimal) -> str | None:
+    """`value` in a notation such as `3.9 × 10⁻¹¹`; `None` where its factor is not from 1 to 10."""
+    text, power = sample.text, _POWER.search(sample.text)
+    factor = None if power is None else only_number(text[: power.start()])
+    if power is None or factor is None or not 1 <= abs(factor.value) < 10 or not value:
+        return None
+    rounded, _, exponent = f"{value:.{-factor.place}e}".partition("e")
+    power_text, group = str(int(exponent)), "caret" if power["caret"] else "raised"
+    if group == "raised":
+        power_text = power_text.translate(_RAISED)
+    elif "\u2212" in power["caret"]:
+        power_text = power_text.replace("-", "\u2212")
+    ten = text[power.start() : power.start(group)]
+    return f"{round_like(factor, Decimal(rounded))}{ten}{power_text}{text[power.end(group) :]}"

@@ -48,6 +48,8 @@ Not so `0.5 ± 0.8 %`, which may be relative.
 _REST_OF_LIST = re.compile(rf"(?:[,; \t]++{_NUMBER})*[ \t]*[)\]]")
 _BEGIN_OF_LIST = frozenset("([ \t,;+-−.eE0123456789")
 """What may stand in a list before a number of it."""
+_REFERENCE = re.compile(r" ?\[[\^@][^\[\]]*\]")
+"""A footnote or a source behind a unit."""
 _FRACTION = (re.compile(r"\\[td]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}"), r"(\1)/(\2)")
 _TEX_SIGNS = (
     (re.compile(r"\^\{([-−]?\d+)\}"), r"^\1"),
@@ -160,6 +162,7 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
         at = spread.end()
     rest = _UPRIGHT.sub(lambda match: plain_unit(match[1]), text[at : at + _REACH])
     rest = re.sub(r"\A-(?=[^\W\d_])|&nbsp;|\\(?= )", " ", rest)  # `a 2-kg ball`
+    rest = _REFERENCE.sub("", rest)
     phrase = _GAP.split(rest.lstrip("*_` \n"))[0]
     phrase = re.sub(r"\A\[([^\[\]]*)\]", r"(\1)", phrase)
     words = phrase.split()[: _LONGEST_PRODUCT + 1]

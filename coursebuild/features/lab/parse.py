@@ -31,7 +31,7 @@ from coursebuild.core.syntax.nodes import JSON, ObjectNode, StringNode
 from coursebuild.core.text.diagnostics import sort_diagnostics
 from coursebuild.features.lab.equations.equation_lab import parse_equations
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab, values_in
-from coursebuild.features.lab.relations import check_lab
+from coursebuild.features.lab.relations import check_lab, plotted_numbers
 from coursebuild.features.lab.schema import (
     OVERLAYS,
     CommonLab,
@@ -107,7 +107,8 @@ def parse_lab(
             fields = SimLab(title=common.title, height=common.height, dock=common.dock)
             note = prose.blocks(node.get("note"))
             lab = Lab(span, kind, kind_span, to_one_line(node).text, fields, note)
-    lab = None if lab is None else replace(lab, numbers=prose.numbers)
+    if lab is not None and isinstance(node, ObjectNode):
+        lab = replace(lab, numbers=plotted_numbers(prose.numbers, node))
     return Parsed(None if diagnostics else lab, sort_diagnostics(diagnostics))
 
 

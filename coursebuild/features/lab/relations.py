@@ -21,8 +21,10 @@ from coursebuild.api import (
     did_you_mean,
     find_blocks,
 )
+from coursebuild.core.model import NumberBinding
 from coursebuild.core.run.mjcf import read_tags
 from coursebuild.core.syntax.decode import check_unique, require_one_of
+from coursebuild.core.syntax.fence import with_units
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
     Node,
@@ -31,6 +33,7 @@ from coursebuild.core.syntax.nodes import (
     StringNode,
     format_value,
 )
+from coursebuild.core.text.quantities import unit_of_header
 from coursebuild.features.lab.model import BUILT_IN_KINDS, LONGEST_MODEL, Lab
 from coursebuild.features.lab.schema import Button, Expect, Select, SimLab, Slider
 
@@ -256,3 +259,15 @@ def check_model_names(
                     message = f"the model has no {element} `{name}`"
                     help = did_you_mean(name, names)
                     yield diagnose("lab-name", lab.place((field,)), message, help=help)
+
+
+def plotted_numbers(numbers: Iterable[NumberBinding], lab: ObjectNode) -> tuple[NumberBinding, ...]:
+    """The bound numbers of a lab; heights of lines have the unit of the axis, as `v (m/s)`."""
+    heights = (
+        (height, unit_of_header(label.value).text)
+        for plot in lab.objects("plots")
+        if isinstance(label := plot.get("ylabel"), StringNode)
+        for line in plot.objects("refLines")
+        if isinstance(height := line.get("y"), StringNode)
+    )
+    return with_units(numbers, heights)

@@ -29,6 +29,7 @@ from coursebuild.api import (
     parse_json,
 )
 from coursebuild.core.syntax.decode import Decoding, check_unique, has_value
+from coursebuild.core.syntax.fence import with_units
 from coursebuild.core.syntax.json_text import to_one_line
 from coursebuild.core.syntax.nodes import JSON, Node, ObjectNode, StringNode
 from coursebuild.core.text.diagnostics import sort_diagnostics
@@ -89,8 +90,15 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[model.Qui
     elif isinstance(id_node, StringNode) and all(d.span != id_node.mark for d in diagnostics):
         id = id_node.value
     question_keys = tuple(question.key for question in questions)
+    units = (
+        (answer, unit.value)
+        for question_node in nodes
+        if isinstance(answer := question_node.get("answer"), StringNode)
+        and isinstance(unit := question_node.get("unit"), StringNode)
+    )
+    numbers = with_units(prose.numbers, units)
     quiz = model.Quiz(
-        span, id, node.place("id"), title, tuple(questions), question_keys, numbers=prose.numbers
+        span, id, node.place("id"), title, tuple(questions), question_keys, numbers=numbers
     )
     return Parsed(quiz, sort_diagnostics(diagnostics))
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model import Document, Script, document_blocks
 from coursebuild.core.model.results import Outcome, ScriptRun
+from coursebuild.core.model.walk import without_prose
 from coursebuild.core.scripts.bindings import PrintedOutputs, check_bindings, dependent_bindings
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -72,6 +73,19 @@ def test_every_way_to_print_a_float_is_one_number(value: float, spec: str) -> No
     assert [n.text for n in numbers] == ([printed] if len(printed) <= 1000 else [])
 
 
+def test_powers_of_ten_are_rounded_in_their_own_notation() -> None:
+    for text, value, expected in (
+        ("3.9 × 10⁻¹¹", "4.94e-10", "4.9 × 10⁻¹⁰"),
+        ("3.9·10^{-11}", "-9.97e-10", "-1.0·10^{-9}"),
+        ("−3.90·10^\u22125", "-0.125", "−1.25·10^\u22121"),
+        (r"3\cdot10^{4}", "0.2", r"2\cdot10^{-1}"),
+        ("3.9 × 10⁻¹¹", "0", None),
+        ("39 × 10⁻¹¹", "4.94e-10", None),
+    ):
+        (number,) = scan_prose(text)
+        assert round_like(number, Decimal(value)) == expected, text
+
+
 PIECES = ["1-", "00:", "1", "1.1111", "1+", "a", "1 ", "1e", "1f", "-", "1/", ".", "a-1", "nan"]
 
 
@@ -121,7 +135,9 @@ def check(
     ]
     verdicts = verify(course(lesson, *documents), runs)
     printed = PrintedOutputs(verdicts, runs, [*paths, *scripts])
-    return check_bindings(lesson, printed)
+    findings = check_bindings(lesson, printed)
+    assert check_bindings(without_prose(lesson), printed) == findings  # as a whole course is read
+    return findings
 
 
 def find_mistake(binding: str, printed: str = OUTPUT) -> Diagnostic | None:
@@ -357,3 +373,52 @@ def test_a_number_in_a_caption_is_one_of_its_own_output() -> None:
     assert check(text, make_run("t 1.5\n")) == ()
     (diagnostic,) = check(text.replace("`1.5`", "`2.5`"), make_run("t 1.5\n"))
     assert diagnostic.rule == "binding-mismatch"
+
+
+UNIT_PLACES = (
+    "| depth ({}) |\n| --- |\n| `33.6`{{out}} |",
+    "| what | value ({}) |\n| --- | --- |\n| depth | `33.6`{{out}} |\n| again | `33.6`{{out}} |",
+    "The depth is `33.6`{{out}} {}.[^deep]\n\n[^deep]: Below the surface.",
+    '```quiz\n{{"id": "q", "questions": [{{"kind": "numeric", "q": "How deep?", '
+    '"answer": "`33.6`{{out}}", "unit": "{}"}}]}}\n```',
+    '```lab\n{{"model": "rod", "plots": [{{"ylabel": "depth ({})", "refLines": '
+    '[{{"y": "`33.6`{{out}}"}}], "traces": [{{"label": "a", "expr": "data.time"}}]}}]}}\n```',
+    '```lab plot\nx = {{max = 3}}\nplots = [{{ylabel = "depth ({})", refLines = '
+    '[{{y = "`33.6`{{out}}"}}], traces = [{{label = "a", expr = "x"}}]}}]\n```',
+)
+
+
+def test_the_unit_of_a_number_may_stand_in_a_header_or_field_beside_it() -> None:
+    printed = "depth 33.6 cm, width 2.5 m\n"
+    for place in UNIT_PLACES:
+        for unit, holds in (("cm", True), ("m", False), ("mm", False)):
+            text = f"{script()}{output(printed)}\n{place.format(unit)}\n"
+            messages = {d.message for d in check(text, make_run(printed))}
+            expected = f"`examples/a.py` printed `33.6 cm`, and the unit here is `{unit}`"
+            assert messages == (set() if holds else {expected}), (place, unit)
+
+
+def test_a_number_with_the_right_unit_is_found_beside_a_table_that_leaves_it_out() -> None:
+    printed = "mass 2.000 kg\nspeed (m/s)  way (m)\n1.0  0.17\n2.0  0.68\n"
+    rows = "| speed (m/s) | way (m) |\n| --- | --- |\n| 1.0 | 0.17 |\n| 2.0 | 0.68 |"
+    text = f"{script()}\nOutput:\n\n{rows}\n\nIt has "
+    for binding, holds in (("`2.0 kg`{out}", True), ("`2.0 N`{out}", False)):
+        assert (check(text + binding, make_run(printed)) == ()) is holds, binding
+
+
+def test_a_title_chooses_without_its_unit_and_with_what_stands_above_it() -> None:
+    head = "step (s)  Euler (m)  RK4 (m)\n"
+    printed = f"errors\n{head}0.1  2.5  0.2\n0.2  4.5  0.3\norders\n{head}0.1  1.5  2.5\n"
+    for words, holds in (
+        ("errors 0.1 Euler", True),
+        ("errors 0.2 Euler", False),
+        ("orders RK4", True),
+        ("orders 0.1 RK4", True),
+        ("orders 0.1 Euler", False),
+        ("orders 0.1 RK4 (m)", True),
+    ):
+        mistake = find_mistake(f'`2.5`{{out="{words}"}}', printed)
+        assert (mistake is None) is holds, (words, mistake)
+    mistake = find_mistake("`2.5`{out}", printed)
+    assert mistake is not None and mistake.rule == "output-ambiguous"
+    assert all(note.edits for note in mistake.notes)

@@ -136,6 +136,26 @@ def test_a_table_under_digits_keeps_its_decimals() -> None:
     )
 
 
+def test_cells_are_numbers_as_people_write_them() -> None:
+    printed = "Euler 5.507e-04 2.0\n"
+    for row in (
+        "| Euler | 5.51·10⁻⁴ | 2 |",
+        "| Euler | $5.5\\cdot10^{-4}$ | 2.0 |",
+        "| Euler | 5.5 × 10^-4 | 2.00 |",
+    ):
+        assert compare(table(EDITED_HEAD + row), DIGITS, printed).status == "verified", row
+    for row in (
+        "| Euler | 5.52·10⁻⁴ | 2 |",
+        "| Euler | 5.51·10⁻³ | 2 |",
+        "| Euler | 5.5e-04 | 3 |",
+    ):
+        assert compare(table(EDITED_HEAD + row), DIGITS, printed).status == "drift", row
+    row = "| Euler | 5.51·10⁻⁴ | $2.5\\times10^{-3}$ |"
+    assert table_after(row, "Euler -0.123 1.5e12\n", DIGITS) == (
+        "| Euler | -1.23·10⁻¹ | $1.5\\times10^{12}$ |"
+    )
+
+
 def test_a_decimal_comma_stays_in_a_table_of_its_language() -> None:
     rows = "| 0.5 | 0,71 | −2,5e-03 |"
     recording = table(EDITED_HEAD + rows)

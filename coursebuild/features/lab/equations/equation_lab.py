@@ -92,7 +92,7 @@ def parse_equations(
                 note=prose.blocks(node.get("note")),
                 goal=prose.inlines(goal.get("text") if isinstance(goal, ObjectNode) else None),
                 places=tuple((path, value.mark) for path, value in values_in(node, ())),
-                numbers=prose.numbers,
+                numbers=relations.plotted_numbers(prose.numbers, node),
             )
     return Parsed(None if diagnostics else lab, sort_diagnostics(diagnostics))
 
