@@ -28,7 +28,7 @@ _ROUNDED = 1e-9
 _NEGLIGIBLE = 1e-3
 """The part of an error over the whole run below which it is none in a part of it."""
 LABELS = {
-    "step_error": "what is seen",
+    "step_error": "what is seen of steps",
     "seen": "what is seen",
     "position": "the error of position",
     "attitude": "the error of attitude",
@@ -164,6 +164,12 @@ def times_text(low: float, high: float) -> str:
 def number_text(number: float) -> str:
     """A factor with two digits and no exponent where zeros do: `610`."""
     return f"{float(f'{number:.2g}'):g}" if number < 1e4 else "over 10000"
+
+
+def rounded_text(value: float, digits: int) -> str:
+    """A number in so many digits; large ones without a power of ten."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):,.0f}" if value >= 100 else text
 
 
 def mark_dominated(report: ScenarioReport) -> Rows:
