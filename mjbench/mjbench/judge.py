@@ -361,9 +361,8 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     """
     row, failures = report.own_row, dict[str, list[str]]()
     for failure in report.failures:
-        failures.setdefault(failure.reason, []).append(
-            failure.part.removeprefix(f"{report.name}: ")
-        )
+        part = failure.part.removeprefix(f"{report.name}: ")
+        failures.setdefault(failure.reason, []).append(part)
     missing = [f"{', '.join(names)}: {reason}" for reason, names in failures.items()]
     if row is None:
         missing.insert(0, "the scene's own setting was not measured")
@@ -373,6 +372,8 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     speed += (
         "not timed" if row.realtime is None else f"{rounded_text(row.realtime, 3)} times real time"
     )
+    if report.overlaps:
+        speed += f"; it begins with one inside the other: {report.overlaps}"
     error = "its error is not known" if row.parted is None else ""  # chaos is told by the verdict
     if row.status != "ok":
         error = "it is lost"

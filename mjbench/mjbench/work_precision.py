@@ -112,6 +112,7 @@ def measure_scenario(
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
         notes=tuple(filter(None, notes)),
+        overlaps=pilot.overlaps,
         figure=measure.quantity_name(model, scene),
         rows=tuple(rows),
         orders=measure.fit_scene_orders(model, rows, baseline, states, reference.floor)
@@ -406,9 +407,7 @@ def _notes(
         notes.append(f"no run that begins 1e-10 away comes to be off by {error}: it is not chaotic")
     if int(model.opt.enableflags) & mujoco.mjtEnableBit.mjENBL_SLEEP:
         notes.append("nothing sleeps in the reference, so errors hold what sleep changes")
-    if pilot.overlaps:
-        notes.append(f"it begins with one inside the other: {pilot.overlaps}")
-    elif pilot.peaks.sunk > 1:
+    if not pilot.overlaps and pilot.peaks.sunk > 1:
         names = pair_names(model, pilot.peaks.overlap[:2])
         notes.append(f"{names} are so soft that the middle of one comes to lie in the other")
     if drivers := driving_force(model, pilot.scene.scenario):

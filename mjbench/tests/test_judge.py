@@ -229,6 +229,14 @@ def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
     assert small.parts is not None and small.parts.dominant == "", "none is resolved"
 
 
+def test_a_start_inside_something_is_told_before_any_error() -> None:
+    lines = judged(rows_of((1, 0.5)), overlaps="the world and wheel by 0.0921 m").verdict.lines
+    assert lines[0].endswith(
+        "; it begins with one inside the other: the world and wheel by 0.0921 m"
+    )
+    assert "begins" not in judged(rows_of((1, 0.5))).verdict.lines[0]
+
+
 def test_five_lines_say_speed_error_verdict_and_limits() -> None:
     limit = StableRow(
         "Euler", 0.0181, (1e-3, 0.1), None, 1.0, 55, 20, None, bracket=(0.0181, 0.0181),
