@@ -420,12 +420,12 @@ def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
 
 def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
     row = _mending_row(report, baseline, name)
-    if row is None or baseline.seen is None:
+    if row is None or row.seen is None or baseline.seen is None:
         return ""
-    text = (
-        f"{row.name} errs {number_text(baseline.seen / row.seen) if row.seen else 'far'} times less"
-    )
-    text += " in all" + ("" if row.cost is None else f" and {_price(row)}")
+    least = "at least " if 0 < row.seen <= report.least_seen * (1 + 1e-9) else ""
+    factor = number_text(baseline.seen / row.seen) if row.seen else "far"
+    text = f"{row.name} errs {least}{factor} times less in all"
+    text += "" if row.cost is None else f" and {_price(row)}"
     pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
     worse = next(worse_columns(spreads([ratios(pair[0], pair[1], leasts_of(report))])), None)
     return text if worse is None else f"{text}, but {worse.text(report.figure)}"

@@ -335,6 +335,13 @@ def test_a_mend_of_the_model_of_contacts_says_that_steps_err_more() -> None:
     )
 
 
+def test_a_mend_that_errs_less_than_is_known_errs_at_least_so_many_times_less() -> None:
+    rows, parts = rows_of((1, 0.6), (0.5, 0.25)), ErrorParts(0.6, None, None, 1e-9, 0.25)
+    report = judged(rows, least_seen=0.25, parts=parts)
+    assert report.parts is not None
+    assert report.parts.mend.startswith("RK4 at 10 ms errs at least 2.4 times less in all")
+
+
 def test_verdicts_claim_only_what_holds() -> None:
     small = [
         row("Euler", 0.002, cost=1.0, seen=1e-3, own=True, velocity=None, position=None),
@@ -373,13 +380,13 @@ def test_what_leaves_the_motion_of_small_steps_is_not_better() -> None:
 def test_an_error_of_the_model_that_settings_share_is_not_one_that_is_resolved() -> None:
     """Of steps nothing is known: a stone falls twice as far off below what the reference knows."""
     rows = masked(position=(0.0049, 0.0049))
-    for least, said in (
+    for least, text in (
         (0.5, "implicit at 4.16667 ms is better: it takes 0.47 of the time and errs no more in any "
          "column, as far as the reference resolves; "),
         (1.5, "no setting can be called better: the reference resolves no error of implicit at "),
     ):  # fmt: skip
         verdict = judged(rows, contact_model=CONES, least_seen=least, floor=0.01).verdict
-        assert verdict.text.startswith(said)
+        assert verdict.text.startswith(text)
 
 
 def test_rounding_after_an_error_is_gone_makes_no_setting_better() -> None:
