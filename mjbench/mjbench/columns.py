@@ -189,6 +189,8 @@ def mark_dominated(report: ScenarioReport) -> Rows:
         return (0.0 if cost is None else cost.value) * max(visible, leasts.get(report.main, 0.0))
 
     def beats(rival: int, baseline: int) -> bool:
+        if rows[rival].parted is not None and rows[baseline].parted is None:
+            return False  # it has no error that is known, for it is off
         prices = [FrontPoint(cost, 0.0) for n in (rival, baseline) if (cost := rows[n].cost)]
         changes = ratios(columns[baseline], columns[rival], leasts).values()
         if any(change > 1 + ERROR_SLACK for change in changes):

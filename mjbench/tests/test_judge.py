@@ -229,6 +229,15 @@ def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
     assert small.parts is not None and small.parts.dominant == "", "none is resolved"
 
 
+def test_what_is_off_before_the_horizon_is_not_better() -> None:
+    none = {"position": None, "step_error": None, "seen": None}
+    off = masked(**none, parted=0.9)
+    assert judged(off, contact_model=CONES).verdict.better is None
+    good = judged(masked(position=(0.0049, 0.0049)), contact_model=CONES)
+    (first, _) = derive_seeds([good, replace(judged(off, contact_model=CONES), name="b")])
+    assert "here, but in b it is off at 0.9 s; " in first.verdict.text
+
+
 def test_a_start_inside_something_is_told_before_any_error() -> None:
     lines = judged(rows_of((1, 0.5)), overlaps="the world and wheel by 0.0921 m").verdict.lines
     assert lines[0].endswith(
