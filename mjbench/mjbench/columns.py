@@ -28,7 +28,7 @@ _ROUNDED = 1e-9
 _NEGLIGIBLE = 1e-3
 """The part of an error over the whole run below which it is none in a part of it."""
 LABELS = {
-    "step_error": "what is seen",
+    "step_error": "what is seen of steps",
     "seen": "what is seen",
     "position": "the error of position",
     "attitude": "the error of attitude",
@@ -166,6 +166,12 @@ def number_text(number: float) -> str:
     return f"{float(f'{number:.2g}'):g}" if number < 1e4 else "over 10000"
 
 
+def rounded_text(value: float, digits: int) -> str:
+    """A number in so many digits; large ones without a power of ten."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):,.0f}" if value >= 100 else text
+
+
 def mark_dominated(report: ScenarioReport) -> Rows:
     """Rows that say whether another is better in cost or an error, and in no column worse.
 
@@ -183,6 +189,8 @@ def mark_dominated(report: ScenarioReport) -> Rows:
         return (0.0 if cost is None else cost.value) * max(visible, leasts.get(report.main, 0.0))
 
     def beats(rival: int, baseline: int) -> bool:
+        if rows[rival].parted is not None and rows[baseline].parted is None:
+            return False  # it has no error that is known, for it is off
         prices = [FrontPoint(cost, 0.0) for n in (rival, baseline) if (cost := rows[n].cost)]
         changes = ratios(columns[baseline], columns[rival], leasts).values()
         if any(change > 1 + ERROR_SLACK for change in changes):

@@ -156,6 +156,8 @@ def _why_worse(report: ScenarioReport, setting: MeasuredSetting) -> str:
         return ""
     if row.status != "ok":
         return f"in {report.name} it is lost"
+    if row.parted is not None and baseline.parted is None:
+        return f"in {report.name} it is off at {row.parted:.3g} s"
     pair, leasts = [columns_of(r, report.contact_model) for r in (baseline, row)], leasts_of(report)
     worse = next(worse_columns(spreads([ratios(pair[0], pair[1], leasts)])), None)
     if worse is None:

@@ -77,8 +77,6 @@ class Peaks(Struct, frozen=True):
     sunk: float = 0.0
     """The same relative to the half thickness of the thinner body, where thicknesses are known: at
     1 its middle is at the other's surface."""
-    overlap: tuple[int, int, float] = (-1, -1, 0.0)
-    """Two geoms that lie deepest in each other, by number, and when, s."""
     energy: float = -math.inf
     """Potential and kinetic, J: under RK4 of the state, else of that before the last step, where
     MuJoCo computes it."""
@@ -118,21 +116,18 @@ def update_peaks(data: Any, before: Peaks, thickness: Array | None = None) -> Pe
             mujoco.mj_energyVel,
         ):
             compute(data.model, data)
-    penetration, sunk, overlap = before.penetration, before.sunk, before.overlap
+    penetration, sunk = before.penetration, before.sunk
     if data.ncon:
-        geoms, depths = data.contact.geom, -data.contact.dist
-        shares = depths if thickness is None else depths / thickness[geoms].min(axis=1)
-        worst, largest = int(shares.argmax()), float(shares.max())
-        if largest > (penetration if thickness is None else sunk):
-            overlap = (int(geoms[worst][0]), int(geoms[worst][1]), float(data.time))
+        depths = -data.contact.dist
         penetration = max(penetration, float(depths.max()))
-        sunk = sunk if thickness is None else max(sunk, largest)
+        if thickness is not None:
+            shares = depths / thickness[data.contact.geom].min(axis=1)
+            sunk = max(sunk, float(shares.max()))
     return Peaks(
         _larger(before.position, data.qpos),
         _larger(before.velocity, data.qvel),
         penetration,
         sunk,
-        overlap,
         max(before.energy, float(data.energy[0] + data.energy[1])),
         max(before.kinetic, float(data.energy[1])),
     )

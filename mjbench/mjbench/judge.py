@@ -6,7 +6,6 @@
 2. Another setting is better where it costs less, or errs less, and no column is worse: over the
    whole run and over its halves, from starts nearby too. Where that is not so, or is not known, the
    sentence says in which.
-3. All is computed from the report, so that one that was recorded can be judged anew.
 """
 
 from __future__ import annotations
@@ -25,6 +24,7 @@ from mjbench.columns import (
     leasts_of,
     number_text,
     ratios,
+    rounded_text,
     spreads,
     times_text,
     unresolved_columns,
@@ -165,6 +165,8 @@ def _judge_rival(
     leasts, figure, none = leasts_of(report), report.figure, "no difference that holds: "
     pair = [columns_of(row, report.contact_model) for row in (baseline, rival)]
     own_ratios = ratios(pair[0], pair[1], leasts)
+    if baseline.setting.cone == rival.setting.cone:  # the model errs alike under both
+        own_ratios.pop(("contact_model", WHOLE), None)
     resolved = [c for c in own_ratios if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
     if not resolved and (baseline.seen is None or report.least_seen >= 1):
         return f"{_UNRESOLVED}{rival.name}, or of the scene's own setting", False, ()
@@ -190,6 +192,8 @@ def _judge_rival(
         return f"{none}{claim} here, but {rival.setting.integrator} {reason}", False, ()
     text = f"{rival.name} is better: it {price} and {_gain_text(everywhere, figure)}"
     quantity = quantity_of(report)
+    if quantity.name == "seen" and rival.step_error is not None:
+        quantity = Quantity("step_error", "", report.least_seen)
     if not resolved:
         text += _AS_FAR
     elif (value := quantity.value_of(rival)) is not None and value <= quantity.least:
@@ -295,7 +299,7 @@ def compared_rows(report: ScenarioReport) -> dict[int, WorkPrecisionRow]:
 
 
 def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
-    text = f"the motion is chaotic: it is {error} from the exact one at {row.parted:.3g} s"
+    text = f"the motion is chaotic: off by {error} at {row.parted:.3g} s"
     usable = [r for r in rows if r.status == "ok" and not r.lucky]
     whole = [r for r in usable if r.parted is None and r.seen is not None]
     if whole:
@@ -357,27 +361,28 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     """
     row, failures = report.own_row, dict[str, list[str]]()
     for failure in report.failures:
-        failures.setdefault(failure.reason, []).append(
-            failure.part.removeprefix(f"{report.name}: ")
-        )
+        part = failure.part.removeprefix(f"{report.name}: ")
+        failures.setdefault(failure.reason, []).append(part)
     missing = [f"{', '.join(names)}: {reason}" for reason, names in failures.items()]
     if row is None:
         missing.insert(0, "the scene's own setting was not measured")
         return (f"not known: {'; '.join(missing)}",)
     quantity = quantity_of(report)
     speed = f"{setting_text(row.setting)}: "
-    speed += "not timed" if row.realtime is None else f"{_rounded(row.realtime)} times real time"
-    error = "its error is not known"
+    speed += (
+        "not timed" if row.realtime is None else f"{rounded_text(row.realtime, 3)} times real time"
+    )
+    if report.overlaps:
+        speed += f"; it begins with one inside the other: {report.overlaps}"
+    error = "its error is not known" if row.parted is None else ""  # chaos is told by the verdict
     if row.status != "ok":
         error = "it is lost"
-    elif row.parted is not None:
-        off = horizon_error_text(report.horizon_error)
-        error = f"it is chaotic: off by {off} at {row.parted:.3g} s"
     elif (value := quantity.value_of(row)) is not None:
         is_known = value > quantity.least * (1 + 1e-9)
-        error = f"errs by {'' if is_known else 'less than '}{value:.2g} in {quantity.label}"
+        error = f"errs by {'' if is_known else 'less than '}{rounded_text(value, 2)}"
+        error += f" in {quantity.label}"
         if quantity.name == "step_error" and row.seen is not None and row.seen > value:
-            error += f", and by {row.seen:.2g} with the model of contacts"
+            error += f", and by {rounded_text(row.seen, 2)} with the model of contacts"
     better, *_ = report.verdict.text.split("; the scene's own error")
     lines = [speed, error + parts_text(report.parts), better, stability_text(report)]
     if report.horizon < report.duration * (1 - 1e-9):
@@ -387,11 +392,6 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     if missing:
         lines.append("not known: " + "; ".join(missing))
     return tuple(filter(None, lines))
-
-
-def _rounded(value: float) -> str:
-    """A number in three digits, without a power of ten."""
-    return f"{float(f'{value:.3g}'):,.0f}" if value >= 100 else f"{value:.3g}"
 
 
 def parts_text(parts: ErrorParts | None) -> str:
@@ -420,12 +420,12 @@ def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
 
 def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
     row = _mending_row(report, baseline, name)
-    if row is None or baseline.seen is None:
+    if row is None or row.seen is None or baseline.seen is None:
         return ""
-    text = (
-        f"{row.name} errs {number_text(baseline.seen / row.seen) if row.seen else 'far'} times less"
-    )
-    text += " in all" + ("" if row.cost is None else f" and {_price(row)}")
+    least = "at least " if 0 < row.seen <= report.least_seen * (1 + 1e-9) else ""
+    factor = number_text(baseline.seen / row.seen) if row.seen else "far"
+    text = f"{row.name} errs {least}{factor} times less in all"
+    text += "" if row.cost is None else f" and {_price(row)}"
     pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
     worse = next(worse_columns(spreads([ratios(pair[0], pair[1], leasts_of(report))])), None)
     return text if worse is None else f"{text}, but {worse.text(report.figure)}"

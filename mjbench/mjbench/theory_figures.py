@@ -115,8 +115,9 @@ def _check_expected(
             exact, source = expected[name]
             value = next(run[name] for run in runs if run[name] is not None)
             message = f"the expected {name}, {exact:g}, is not this scene's: it is {value:.6g}"
-            help = f"in small steps, and {', '.join(f'{gap:.2g}' for gap in gaps)} from it with "
-            help += "contacts and equalities 1, 2, 4 and 8 times as stiff; `precision` says how far"
+            message += " in small steps"
+            help = "with contacts and equalities 1, 2, 4 and 8 times as stiff it is off by "
+            help += f"{', '.join(f'{gap:.2g}' for gap in gaps)}; `precision` says how far"
             is_declared = source == "as declared"
             place = scene.declaration.place("expected") if is_declared else Place(source)
             raise SceneError(message, place, f"{help} it may be off")

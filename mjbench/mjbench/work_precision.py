@@ -23,7 +23,7 @@ from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
 from mjbench.costs import Clock, costs
 from mjbench.delays import loop_note
 from mjbench.derive import derive_charts, derive_failures, derive_profile, derive_scenario
-from mjbench.detector import driving_force, pair_names
+from mjbench.detector import driving_force
 from mjbench.judge import compared_rows
 from mjbench.measured_setting import Basis, measure_setting
 from mjbench.parts import Parts
@@ -112,6 +112,7 @@ def measure_scenario(
         horizons=None if pilot.lyapunov is None else pilot.horizons,
         smooth=pilot.smooth,
         notes=tuple(filter(None, notes)),
+        overlaps=pilot.overlaps,
         figure=measure.quantity_name(model, scene),
         rows=tuple(rows),
         orders=measure.fit_scene_orders(model, rows, baseline, states, reference.floor)
@@ -406,11 +407,6 @@ def _notes(
         notes.append(f"no run that begins 1e-10 away comes to be off by {error}: it is not chaotic")
     if int(model.opt.enableflags) & mujoco.mjtEnableBit.mjENBL_SLEEP:
         notes.append("nothing sleeps in the reference, so errors hold what sleep changes")
-    if pilot.overlaps:
-        notes.append(f"it begins with one inside the other: {pilot.overlaps}")
-    elif pilot.peaks.sunk > 1:
-        names = pair_names(model, pilot.peaks.overlap[:2])
-        notes.append(f"{names} are so soft that the middle of one comes to lie in the other")
     if drivers := driving_force(model, pilot.scene.scenario):
         notes.append(f"energy is not judged: {drivers}")
     states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))

@@ -285,3 +285,13 @@ def test_theory_ends_where_longer_steps_have_another_rest() -> None:
     (rk4, euler), (rk4_beside, euler_beside) = limits
     assert rk4_beside is not None and rk4_beside.timestep == pytest.approx(rk4.timestep, rel=1e-3)
     assert euler.timestep > 0.01 and euler_beside is None
+
+
+@pytest.mark.parametrize(("height", "words"), [(0.05, "the world and ball by 0.05 m"), (0.099, "")])
+def test_what_begins_inside_something_is_named_with_its_depth(height: float, words: str) -> None:
+    ball = f"<body name='ball' pos='0 0 {height}'><freejoint/><geom size='.1'/></body>"
+    floor = "<geom type='plane' size='1 1 1'/>"
+    mjcf = f"<mujoco><worldbody>{floor}{ball}</worldbody></mujoco>"
+    model = mujoco.MjModel.from_xml_string(mjcf)
+    (scene,) = scenes(model, parse_declared('[[scenario]]\nname = "s"\nduration = 0.1\n'))
+    assert run_pilot(model, scene).overlaps == words

@@ -160,9 +160,9 @@ def test_what_is_worse_from_starts_nearby_is_not_better() -> None:
     for starts, said_of in (
         (
             [{column: 0.9}, {column: 1.4}],
-            "what is seen is 0.9 to 1.4 times as large over",
+            "what is seen of steps is 0.9 to 1.4 times as large over",
         ),
-        ([{column: 1.3}], "what is seen is 1 to 1.3 times as large"),
+        ([{column: 1.3}], "what is seen of steps is 1 to 1.3 times as large"),
         ([{("lost", "over the whole run"): math.inf}], "it is lost"),
     ):
         verdict = judged(masked(position=(0.0049, 0.0049)), starts, contact_model=CONES).verdict
@@ -177,7 +177,10 @@ def test_what_is_worse_with_drawn_parameters_is_not_better() -> None:
     starts = [{("step_error", "over the whole run"): ratio} for ratio in (0.9, 1.4)]
     rows, draws = masked(position=(0.0049, 0.0049)), ("joint.damping = 0.1",)
     text = judged(rows, starts, contact_model=CONES, drawn=draws).verdict.text
-    assert "here, but from starts nearby or with drawn parameters what is seen is 0.9 to" in text
+    assert (
+        "here, but from starts nearby or with drawn parameters what is seen of steps is 0.9 to"
+        in text
+    )
 
 
 def test_what_is_better_under_one_seed_and_worse_under_another_is_not_better() -> None:
@@ -205,7 +208,7 @@ def test_gains_are_told_with_their_spread() -> None:
     starts = [{("step_error", "over the whole run"): ratio} for ratio in (0.4, 0.5)]
     rows = masked(position=(0.0049, 0.0049), step_error=0.05)
     text = judged(rows, starts, contact_model=CONES).verdict.text
-    assert "errs 2 to 2.5 times less (what is seen over the whole run); " in text
+    assert "errs 2 to 2.5 times less (what is seen of steps over the whole run); " in text
 
 
 def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
@@ -224,6 +227,23 @@ def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
     )
     small = judged(masked(), contact_model=CONES, parts=ErrorParts(1e-4, None, None, None, 0.001))
     assert small.parts is not None and small.parts.dominant == "", "none is resolved"
+
+
+def test_what_is_off_before_the_horizon_is_not_better() -> None:
+    none = {"position": None, "step_error": None, "seen": None}
+    off = masked(**none, parted=0.9)
+    assert judged(off, contact_model=CONES).verdict.better is None
+    good = judged(masked(position=(0.0049, 0.0049)), contact_model=CONES)
+    (first, _) = derive_seeds([good, replace(judged(off, contact_model=CONES), name="b")])
+    assert "here, but in b it is off at 0.9 s; " in first.verdict.text
+
+
+def test_a_start_inside_something_is_told_before_any_error() -> None:
+    lines = judged(rows_of((1, 0.5)), overlaps="the world and wheel by 0.0921 m").verdict.lines
+    assert lines[0].endswith(
+        "; it begins with one inside the other: the world and wheel by 0.0921 m"
+    )
+    assert "begins" not in judged(rows_of((1, 0.5))).verdict.lines[0]
 
 
 def test_five_lines_say_speed_error_verdict_and_limits() -> None:
@@ -310,6 +330,27 @@ def test_what_mends_an_error_says_what_it_makes_worse() -> None:
     )
 
 
+def test_a_mend_of_the_model_of_contacts_says_that_steps_err_more() -> None:
+    cone = row("Euler", 0.002, cost=1.0, seen=60.0, step_error=50.0, cone="elliptic")
+    cone = replace(cone, setting=replace(masked()[0].setting, cone="elliptic"), velocity=None)
+    rows = [*masked(seen=130.0), cone]
+    rows[0] = replace(rows[0], seen=130.0, step_error=7.0)
+    report = judged(rows, contact_model=CONES, parts=ErrorParts(7.0, None, 130.0, 1e-9, 0.001))
+    assert report.verdict.lines[1].startswith("errs by 7 in what is seen of steps (1: just visible")
+    assert ", and by 130 with the model of contacts; " in report.verdict.lines[1]
+    assert (
+        "in all and takes about as long, but what is seen of steps is 7.1 times as large"
+        in (report.verdict.lines[1])
+    )
+
+
+def test_a_mend_that_errs_less_than_is_known_errs_at_least_so_many_times_less() -> None:
+    rows, parts = rows_of((1, 0.6), (0.5, 0.25)), ErrorParts(0.6, None, None, 1e-9, 0.25)
+    report = judged(rows, least_seen=0.25, parts=parts)
+    assert report.parts is not None
+    assert report.parts.mend.startswith("RK4 at 10 ms errs at least 2.4 times less in all")
+
+
 def test_verdicts_claim_only_what_holds() -> None:
     small = [
         row("Euler", 0.002, cost=1.0, seen=1e-3, own=True, velocity=None, position=None),
@@ -343,6 +384,18 @@ def test_what_leaves_the_motion_of_small_steps_is_not_better() -> None:
         "but implicit leaves the motion of small steps at some timesteps beyond 3 ms"
         in verdict.text
     )
+
+
+def test_an_error_of_the_model_that_settings_share_is_not_one_that_is_resolved() -> None:
+    """Of steps nothing is known: a stone falls twice as far off below what the reference knows."""
+    rows = masked(position=(0.0049, 0.0049))
+    for least, text in (
+        (0.5, "implicit at 4.16667 ms is better: it takes 0.47 of the time and errs no more in any "
+         "column, as far as the reference resolves; "),
+        (1.5, "no setting can be called better: the reference resolves no error of implicit at "),
+    ):  # fmt: skip
+        verdict = judged(rows, contact_model=CONES, least_seen=least, floor=0.01).verdict
+        assert verdict.text.startswith(text)
 
 
 def test_rounding_after_an_error_is_gone_makes_no_setting_better() -> None:
@@ -379,10 +432,8 @@ def test_chaotic_scene_is_judged_by_how_long_runs_last() -> None:
         row("RK4", 0.002, cost=4.0, seen=None, parted=12.4, **none),
     ]
     text = judged(rows, horizon_error={"m": 0.002}).verdict.text
-    assert text == (
-        "the motion is chaotic: it is 0.002 m from the exact one at 2.4 s, under RK4 at 2 ms at "
-        "12.4 s"
-    )
+    assert text == ("the motion is chaotic: off by 0.002 m at 2.4 s, under RK4 at 2 ms at 12.4 s")
+    assert judged(rows, horizon_error={"m": 0.002}).verdict.lines[1] == text, "once"
     whole_row = row("Euler", 0.004, cost=0.5, seen=0.1, **none)
     report = judged([*rows, whole_row])
     assert report.rows[2].lucky == "with shorter timesteps it is off sooner"

@@ -385,6 +385,8 @@ class ScenarioReport(Record, frozen=True):
     """Whether accelerations are a smooth function of the state; else there are no orders."""
     notes: tuple[str, ...] = ()
     """Remarks for reading the figures."""
+    overlaps: str = ""
+    """What lies inside something else at the beginning, and how deep; empty where nothing does."""
     figures: tuple[FigureLine, ...] = ()
     """What the scenario says is known in theory, measured with its own timestep."""
     horizons: tuple[float, float] | None = None
