@@ -136,7 +136,38 @@ def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: 
     wait_for_change(page, view, rear_view)
     text.fill("<mujoco/>")
     press(lab_element, "Compile and run")
-    expect(lab_element.locator(".lab-model")).to_have_text(re.compile("no actuators, sensors"))
+    expect(push).to_have_count(0)
+    expect(lab_element.get_by_label("Body, joint or geom")).to_be_visible()
+    lab_element.get_by_text("Model", exact=True).click()
+
+
+def test_panel_of_a_model_has_its_tree_with_live_numbers(page: Page) -> None:
+    lab_element, text = editor_of(page)
+    text.fill(CART)
+    press(lab_element, "Compile and run")
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    lab_element.get_by_text("Model", exact=True).click()
+    tree = lab_element.get_by_label("Body, joint or geom")
+    names = [name.strip("\u2003") for name in tree.locator("option").all_inner_texts()]
+    assert names == ["–", "body world", "body 1", "joint slide", "geom 0"]
+    tree.select_option(index=3)
+    place = lab_element.locator(".lab-model dt", has_text=re.compile("^qpos$")).locator("+ dd")
+    expect(place).to_have_text(re.compile("0$"))
+    lab_element.get_by_label("push").fill("4")
+    expect(place).to_have_text(re.compile(r"\d\.\d{3}"))
+    assert violations(page, ".lab") == []
+    press(lab_element, "Pause")
+    expect(lab_element).to_have_attribute("data-state", "paused")
+    view = lab_element.locator(".lab-view")
+    plain = wait_until_still(page, view)
+    lab_element.get_by_label("inertia boxes").check()
+    wait_for_change(page, view, plain)
+    tree.select_option(index=4)
+    size = lab_element.locator(".lab-model dt", has_text="geom_size").locator("+ dd")
+    expect(size).to_have_text(re.compile(r"0\.1"))
+    tree.select_option(index=0)
+    expect(size).to_have_count(0)
+    lab_element.get_by_label("inertia boxes").uncheck()
     lab_element.get_by_text("Model", exact=True).click()
 
 
@@ -221,6 +252,7 @@ def test_reader_opens_a_model_with_its_meshes_and_nothing_is_sent(page: Page) ->
     expect(lab_element).to_have_attribute("data-state", "playing")
     lab_element.evaluate(DROP, ["cart.xml", list(CART.encode())])
     expect(text).to_have_value(CART)
+    expect(lab_element.get_by_label("Start from")).to_have_js_property("selectedIndex", -1)
     expect(lab_element).to_have_attribute("data-state", "playing")
     bare = archive({"scene.xml": ROBOT["robot/scene.xml"]})
     lab_element.evaluate(DROP, ["bare.zip", list(bare)])
