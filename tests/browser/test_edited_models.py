@@ -141,36 +141,6 @@ def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: 
     lab_element.get_by_text("Model", exact=True).click()
 
 
-def test_panel_of_a_model_has_its_tree_with_live_numbers(page: Page) -> None:
-    lab_element, text = editor_of(page)
-    text.fill(CART)
-    press(lab_element, "Compile and run")
-    expect(lab_element).to_have_attribute("data-state", "playing")
-    lab_element.get_by_text("Model", exact=True).click()
-    tree = lab_element.get_by_label("Body, joint or geom")
-    parts = ["–", "body world", "body 1", "joint slide", "geom 0"]
-    expect(tree.locator("option")).to_have_text(parts)
-    tree.select_option(index=3)
-    place = lab_element.locator(".lab-model dt", has_text=re.compile("^qpos$")).locator("+ dd")
-    expect(place).to_have_text(re.compile("0$"))
-    lab_element.get_by_label("push").fill("4")
-    expect(place).to_have_text(re.compile(r"\d\.\d{3}"))
-    assert violations(page, ".lab") == []
-    press(lab_element, "Pause")
-    expect(lab_element).to_have_attribute("data-state", "paused")
-    view = lab_element.locator(".lab-view")
-    plain = wait_until_still(page, view)
-    lab_element.get_by_label("inertia boxes").check()
-    wait_for_change(page, view, plain)
-    tree.select_option(index=4)
-    size = lab_element.locator(".lab-model dt", has_text="geom_size").locator("+ dd")
-    expect(size).to_have_text(re.compile(r"0\.1"))
-    tree.select_option(index=0)
-    expect(size).to_have_count(0)
-    lab_element.get_by_label("inertia boxes").uncheck()
-    lab_element.get_by_text("Model", exact=True).click()
-
-
 def test_link_carries_the_edited_model(page: Page, base: str) -> None:
     lab_element, text = editor_of(page)
     mine = '<mujoco>\n  <worldbody><geom name="μ" size="0.3"/></worldbody>\n</mujoco>'
