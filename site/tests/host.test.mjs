@@ -367,6 +367,12 @@ test('a model that the reader wrote is compiled here; what MuJoCo says of it is 
     if (distance) assert.deepEqual([scene.camera.distance, scene.floor], [7, 0], 'the camera of a model as large')
     else assert.deepEqual([scene.camera.distance > 10, scene.floor], [true, null], 'the camera of this model')
   }
+  bench.take()
+  const xml = world('<body pos="0 0 3"><freejoint/><geom size="1.1"/></body>')
+  await bench.load('a', { xml, camera: { azimuth: 90, distance: 7 }, extent: 2, floor: 5, isOther: true }, 'plain', 'missing')
+  const { scene } = bench.of('ready')[0]
+  assert.notEqual(scene.camera.distance, 7, 'no camera of the lab for another model, though it is as large')
+  assert.ok(scene.floor < 1.9 && scene.floor > 1, 'and a floor below that model')
   bench.send({ type: 'ping' })
   assert.equal(bench.of('pong').length, 1)
 })

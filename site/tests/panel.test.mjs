@@ -47,9 +47,47 @@ test('a model is described by its names, and by kind and number where it has non
       { name: 'camera 2', index: 2 },
     ],
     keys: ['far', 'keyframe 1'],
+    parts: [
+      { kind: 'body', index: 0, depth: 0, name: 'world' },
+      { kind: 'body', index: 1, depth: 1, name: '1' },
+      { kind: 'joint', index: 0, depth: 2, name: 'slide' },
+      { kind: 'geom', index: 0, depth: 2, name: '0' },
+    ],
   })
   assert.equal(lab.inspect(false), null)
   assert.equal(lab.panel, null)
+})
+
+test('the tree goes down each branch, and a part is read under the names of MuJoCo', (t) => {
+  const lab = labOf(
+    t,
+    engine,
+    `<mujoco><worldbody><geom type="plane" size="1 1 1"/>
+      <body name="left" pos="0 0 1"><joint name="free" type="free"/><geom name="ball" size="0.1" mass="3"/></body>
+      <body name="right"><joint name="lift" type="slide" axis="0 0 1" damping="5"/><geom size="0.1"/>
+        <body name="hand" pos="1 0 0"><joint name="wrist" type="ball"/><geom size="0.1"/></body></body>
+    </worldbody></mujoco>`,
+  )
+  const { parts } = lab.inspect(true)
+  const bodies = parts.filter(({ kind }) => kind === 'body').map(({ name, depth }) => [name, depth])
+  assert.deepEqual(bodies, [['world', 0], ['left', 1], ['right', 1], ['hand', 2]]) // prettier-ignore
+  const read = (kind, name) => {
+    lab.panel.choose(parts.find((part) => part.kind === kind && part.name === name))
+    return Object.fromEntries(lab.panel.read().rows.map(([key, values]) => [key, Array.from(values)]))
+  }
+  lab.step(100)
+  const { data } = lab.sync()
+  assert.deepEqual(read('body', 'left').body_mass, [3])
+  assert.deepEqual(read('body', 'hand').xpos, Array.from(data.xpos.subarray(9, 12)))
+  assert.deepEqual(read('geom', 'ball').geom_size, [0.1, 0, 0])
+  assert.deepEqual(read('joint', 'lift').qpos, [data.qpos[7]])
+  assert.deepEqual(read('joint', 'lift').dof_damping, [5])
+  assert.deepEqual(read('joint', 'free').qvel, Array.from(data.qvel.subarray(0, 6)))
+  assert.deepEqual(read('joint', 'wrist').qpos, Array.from(data.qpos.subarray(8, 12)))
+  assert.deepEqual(read('joint', 'wrist').qfrc_bias, Array.from(data.qfrc_bias.subarray(7, 10)))
+  lab.panel.choose(null)
+  assert.equal(lab.panel.read().rows, null)
+  assert.throws(() => lab.panel.choose({ kind: 'geom', index: 4 }), /no geom 4/)
 })
 
 test('an actuator that is set pushes from the next step on, until a reset', (t) => {

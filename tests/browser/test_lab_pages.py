@@ -67,6 +67,11 @@ def test_on_a_desk_picture_curves_and_controls_share_a_screen(
             assert box["x"] > view["x"] + view["width"], boxes
         height = max(box["y"] + box["height"] for box in (play, *parts_beside)) - view["y"]
         assert height < 760, boxes
+        tape, side = (swing.locator(part).bounding_box() for part in (".lab-tape", ".lab-side"))
+        assert tape and side
+        assert play["y"] - view["y"] - view["height"] < 16, "the picture reaches to Play"
+        hole = side["y"] + side["height"] - tape["y"] - tape["height"]
+        assert hole < 1, "the picture grows until there is none under the tape"
         page.set_viewport_size({"width": 1000, "height": 800})
         plot = swing.locator(".lab-live .lab-plot").first.bounding_box()
         view_below = swing.locator(".lab-view").bounding_box()

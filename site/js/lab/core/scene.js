@@ -26,7 +26,7 @@ export function describeScene(engine, { model, displayData: data }, config, came
   const list = (count, make) => Array.from({ length: count }, (_, i) => make(i))
   const { stat, vis } = model
   const { extent = stat.extent } = config // of the model for which camera and floor were computed
-  const fits = stat.extent < 1.5 * extent && extent < 1.5 * stat.extent
+  const fits = !config.isOther && stat.extent < 1.5 * extent && extent < 1.5 * stat.extent
   return {
     layout: { ...layout },
     timestep: model.opt.timestep,

@@ -78,11 +78,12 @@ export class Desk extends Shell {
     charts.addEventListener('keydown', (event) => this.onKey(event))
     const link = () => this.share({ values: this.values, steps: 0, time: this.place, physics: new Float64Array() })
     const foot = h('div', { class: 'lab-foot' }, this.makeButton('link', link), this.makeHelp(['keys_curve']))
-    const panel = h('div', { class: 'lab-panel' }, this.controls.element, this.readouts.element, foot)
+    const panel = h('div', { class: 'lab-panel' }, this.controls.element, this.readouts.element)
     this.show(
       'lab-live lab-desk',
       [h('div', { class: 'lab-screen' }, charts, this.transport.full), this.slider, this.transport.element, this.notices.message],
       [this.goal?.element ?? null, panel],
+      foot,
       (isVisible) => {
         this.visible = isVisible
         this.schedule()

@@ -11,7 +11,7 @@ import { buildControls, buildOverlays, buildReadouts, switchButton } from './con
 import { download, h, icon, textButton } from './dom.js'
 import { curvesText, fillScript } from './export.js'
 import { History } from './history.js'
-import { formatReadout, formatTime } from './numbers.js'
+import { digitsOfStep, formatReadout, formatTime } from './numbers.js'
 import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
@@ -28,6 +28,7 @@ const PLOT_EVERY = 30
 const SETTLE_TIME = 400 // ms, after which the last picture of a paused lab has arrived
 const HEIGHT = 300 // CSS pixels, of a view that is 480 wide
 const MOST_NUMBERS = 500_000 // in all poses of a run, 4 MB
+const FLAGS = ['frames', 'joints', 'com', 'inertia', 'contacts', 'forces'] // overlays that any model has
 const HELP = ['keys_mouse', 'keys_touch', 'keys_camera', 'keys_run']
 
 export class Instrument extends Shell {
@@ -85,13 +86,19 @@ export class Instrument extends Shell {
       set: (index, value) => this.simulation.set(index, value, !this.hasStarted),
       press: (index) => this.simulation.press(index, config.controls[index].play),
     })
-    const { arrows, boxes } = buildOverlays(config, words, (name, isOn) => this.simulation.overlay(name, isOn))
+    const overlay = (name, isOn) => this.simulation.overlay(name, isOn)
+    const isEdited = config.kind === 'mjcf' // then the picture has all of the width, and what can be drawn stands in the panel
+    const { arrows, boxes } = buildOverlays({ ...config, toggles: isEdited ? [] : config.toggles }, words, overlay)
     if (arrows !== null) this.transport.speed.after(arrows)
     const grab = switchButton(icon('hand'), 'lab-icon', words('lab.live.grab'), this.hands.grabs, (isOn) => (this.hands.grabs = isOn))
     this.transport.speed.after(grab)
     this.readouts = buildReadouts(config.readouts, formatReadout)
-    this.panel = new ModelPanel(words, {
+    const others = isEdited ? new Set([...FLAGS, ...config.toggles]) : FLAGS.filter((name) => !config.toggles.includes(name))
+    const toggles = [...others].filter((name) => !config.arrows?.[name])
+    const flags = buildOverlays({ toggles, overlays: config.overlays, arrows: null }, words, overlay).boxes
+    this.panel = new ModelPanel(words, flags, {
       inspect: (on) => this.simulation.inspect(on),
+      examine: (part) => this.simulation.examine(part),
       actuate: (index, value) => this.simulation.actuate(index, value, !this.hasStarted),
       startAt: (index) => this.simulation.startAt(index),
       look: (camera) => this.view.look(camera),
@@ -103,13 +110,14 @@ export class Instrument extends Shell {
     this.controls.show(this.values)
     this.transport.setTime(0)
     const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full)
-    const panel = h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element, this.makeFoot())
+    const panel = h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element)
     const plots = this.plots.map((plot) => plot.element)
     const reason = config.still ? h('p', { class: 'lab-reason' }, config.still) : null // why nothing moves when a reader presses Play
     this.show(
       'lab-live',
       [screen, this.transport.element, this.tape.element, reason],
       [this.motion, this.notices.message, this.goal?.element ?? null, ...plots, panel],
+      this.makeFoot(),
       (isVisible) => this.simulation.setVisible(isVisible),
     )
   }
@@ -156,7 +164,7 @@ export class Instrument extends Shell {
     return {
       ...this.faults(this.config, this.view),
       state: (state, reason) => this.onStateChange(state, reason),
-      ready: ({ values }) => this.onReady(values),
+      ready: (message) => this.onReady(message),
       model: (model) => this.panel.open(model),
       samples: (samples, fresh) => this.collect(samples, fresh),
       refresh: (frame, now) => this.refresh(frame, now),
@@ -174,7 +182,8 @@ export class Instrument extends Shell {
     }
   }
 
-  onReady(values) {
+  onReady({ values, scene }) {
+    this.digits = Math.min(4, Math.max(2, digitsOfStep(scene.timestep))) // of the time at rest, so that a step is seen
     this.poses = this.makePoses()
     this.update(values)
     const { pendingAction, playRequested: pressed } = this
@@ -244,7 +253,7 @@ export class Instrument extends Shell {
       this.textAt = now
       if (readouts !== null) this.readouts.show(readouts)
       this.panel.show(panel)
-      this.transport.setTime(time)
+      this.transport.setTime(time, resting ? this.digits : undefined)
       this.tape.show(tape, time)
       this.showPlay(!resting)
       this.transport.setRatio(resting ? 1 : realtime)

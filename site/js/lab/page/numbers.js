@@ -47,9 +47,9 @@ export function digitsOfStep(step) {
 /** A number's text and its unit; only the degree stands at the digits. */
 export const withUnit = (text, unit) => (unit ? `${text}${unit === '°' ? '' : '\u00a0'}${unit}` : text)
 
-/** Simulated time, in hundredths of a second. */
-export function formatTime(seconds) {
-  return `${seconds < 0 ? MINUS : ''}${Math.abs(seconds).toFixed(2)}`
+/** Simulated time, in hundredths of a second, or with more digits. */
+export function formatTime(seconds, digits = 2) {
+  return `${seconds < 0 ? MINUS : ''}${Math.abs(seconds).toFixed(digits)}`
 }
 
 /** `0.4` for 0.412, `0.03` for 0.0312. */

@@ -1,4 +1,7 @@
-/** What the model of a lab offers, in a folded panel: sliders of its actuators, values of its sensors, its cameras and keyframes. */
+/**
+ * What the model of a lab offers, in a folded panel: sliders of its actuators, values of its sensors, its cameras and keyframes, what MuJoCo
+ * draws beside it, and the numbers of its bodies, joints and geoms.
+ */
 
 import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
@@ -6,18 +9,21 @@ import { formatNumber, formatReadout } from './numbers.js'
 import { PLAIN_PLOT, Plot } from './plots.js'
 
 const DIGITS = 3 // of sensors
-const MOST_VALUES = 6 // of a sensor that are shown
+const MOST_VALUES = 9 // of a sensor or a row that are shown; a matrix has as many
+const INDENT = '\u2003' // of a part in the tree
 const WINDOW = 10 // s, of its curve
 
 export class ModelPanel {
   /**
    * @param {(key: string, values?: Record<string, any>) => string} words
-   * @param {{inspect: (on: boolean) => void, actuate: (index: number, value: number) => void, startAt: (index: number) => void,
+   * @param {Node | null} flags boxes for what MuJoCo draws
+   * @param {{inspect: (on: boolean) => void, examine: (part: {kind: string, index: number} | null) => void, actuate: (index: number, value: number) => void, startAt: (index: number) => void,
    *   look: (camera: number) => void, seek: (time: number) => void}} actions `look`: through a camera of the model, or the free one
    *   (-1); `seek`: the reader points at a time (s) of a curve
    */
-  constructor(words, actions) {
+  constructor(words, flags, actions) {
     this.words = words
+    this.flags = flags
     this.actions = actions
     this.curves = new Map() // the plots of sensors, by their numbers
     this.body = h('div', { class: 'lab-model' })
@@ -29,7 +35,7 @@ export class ModelPanel {
   open(model) {
     if (model === null) return
     const { words, actions } = this
-    const { actuators, sensors, cameras, keys } = model
+    const { actuators, sensors, cameras, keys, parts } = model
     this.closeCurves()
     let start = 0
     this.sensors = sensors.map(({ name, size }) => ({ name, start, end: (start += size) }))
@@ -50,14 +56,25 @@ export class ModelPanel {
       keys.map((label) => ({ type: 'button', label })),
       { set: () => {}, press: actions.startAt },
     )
+    const tree = parts.map(({ kind, index, depth, name }) => [`${INDENT.repeat(depth)}${kind} ${name}`, { kind, index }])
+    const chooser = buildControls([{ type: 'select', label: words('lab.live.part'), unit: '', options: [['–', null], ...tree] }], {
+      set: (_, part) => {
+        this.rows.replaceChildren()
+        actions.examine(/** @type {{kind: string, index: number} | null} */ (part))
+      },
+      press: () => {},
+    })
+    this.rows = h('div')
     this.driven = h('p', { class: 'lab-driven', hidden: true }, words('lab.live.driven'))
     this.body.replaceChildren(
       ...this.section('actuators', actuators, this.sliders.element, this.driven),
       ...this.section('sensors', sensors, this.readouts.element, ...this.makeCurves(sensors)),
       ...this.section('keyframes', keys, buttons.element),
       ...(cameras.length > 0 ? [menu.element] : []),
+      ...(this.flags === null ? [] : [this.flags]),
+      chooser.element,
+      this.rows,
     )
-    if (!this.body.hasChildNodes()) this.body.append(h('p', {}, words('lab.live.panel_empty')))
     actions.look(-1)
   }
 
@@ -105,16 +122,30 @@ export class ModelPanel {
     }
   }
 
+  /** The numbers of the chosen part. @param {[string, Float64Array][] | null} rows */
+  showRows(rows) {
+    if (rows === null) return this.rows.replaceChildren()
+    if (!this.rows.hasChildNodes()) {
+      this.table = buildReadouts(
+        rows.map(([label]) => ({ label, digits: null })),
+        formatReadout,
+      )
+      this.rows.append(this.table.element)
+    }
+    this.table.show(rows.map(([, values]) => textOf(values, null)))
+  }
+
   section(key, items, ...content) {
     if (items.length === 0) return []
     const label = this.words(`lab.live.${key}`)
     return [h('p', { 'aria-hidden': 'true', class: 'lab-kind' }, label), h('div', { role: 'group', 'aria-label': label }, ...content)]
   }
 
-  /** Show the values of a frame. @param {{ctrl: Float64Array, sensors: Float64Array, driven: Uint8Array} | null} panel */
+  /** Show the values of a frame. @param {{ctrl: Float64Array, sensors: Float64Array, driven: Uint8Array, rows: [string, Float64Array][] | null} | null} panel */
   show(panel) {
     if (panel === null || this.sensors === undefined) return
-    const { ctrl, sensors, driven } = panel
+    const { ctrl, sensors, driven, rows } = panel
+    this.showRows(rows)
     this.readouts.show(this.sensors.map(({ start, end }) => textOf(sensors.subarray(start, end))))
     this.sliders.show(Array.from(ctrl))
     this.driven.hidden = !driven.includes(1)
@@ -122,8 +153,8 @@ export class ModelPanel {
   }
 }
 
-/** The value of a sensor; of a long one the first numbers. */
-function textOf(values) {
-  const texts = Array.from(values.subarray(0, MOST_VALUES), (x) => formatNumber(x, DIGITS))
+/** The values of a sensor or a row; of a long one the first numbers. */
+function textOf(values, digits = DIGITS) {
+  const texts = Array.from(values.subarray(0, MOST_VALUES), (x) => formatNumber(x, digits))
   return values.length > MOST_VALUES ? `${texts.join(' ')} …` : texts.join(' ')
 }

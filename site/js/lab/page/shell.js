@@ -46,10 +46,11 @@ export class Shell {
    * Make the body and show it.
    *
    * @param {string} kind its class, beside that of all labs @param {(Node | null)[]} stage @param {(Node | null)[]} side
+   * @param {Node} foot below both
    * @param {(isVisible: boolean) => void} see the lab comes into sight or leaves it
    */
-  show(kind, stage, side, see) {
-    const parts = [h('div', { class: 'lab-stage' }, ...stage), h('div', { class: 'lab-side' }, ...side), this.notices.announcement]
+  show(kind, stage, side, foot, see) {
+    const parts = [h('div', { class: 'lab-stage' }, ...stage), h('div', { class: 'lab-side' }, ...side), foot, this.notices.announcement]
     this.put(h('div', { class: kind }, ...parts), see)
     this.element.classList.add('lab-on')
   }

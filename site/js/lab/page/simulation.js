@@ -135,6 +135,11 @@ export class Simulation {
     this.choose('inspect', { type: 'inspect', on })
   }
 
+  /** Receive the numbers of a part of an inspected model with each frame, or of none. @param {{kind: string, index: number} | null} part */
+  examine(part) {
+    this.send({ type: 'examine', part })
+  }
+
   /** Set the control signal of an actuator of the model; `play`: and run. */
   actuate(index, value, play = false) {
     this.send({ type: 'actuate', index, value, play })
@@ -172,9 +177,13 @@ export class Simulation {
     this.view?.setMoving(this.state === 'playing' && on)
   }
 
-  /** Start again with another model, MJCF, and the files that it may name (page/files.js). */
-  load(xml, own = null) {
-    this.config = { ...this.config, xml }
+  /**
+   * Start again with another model, MJCF, and the files that it may name (page/files.js).
+   *
+   * @param {string} xml @param {any} own @param {boolean} isOther whether it is no edition of the lab's model, whose camera then stays
+   */
+  load(xml, own = null, isOther = false) {
+    this.config = { ...this.config, xml, isOther }
     this.own = own
     this.restart()
   }

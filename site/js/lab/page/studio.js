@@ -14,6 +14,7 @@ const GREY = 0.5 // of lines, on light and on dark paper
 const SHADOW = 0.32 // part of the light that is left in the middle of a shadow
 const POINTS = 10 // of the light, at most
 const MOST = 360 // meshes that are projected onto the floor
+const MOST_TRIANGLES = 100_000 // of the projected meshes, and of those that are outlined
 const WIDTH = 0.08 // radius of the light, for a distance of 1
 const GOLDEN = Math.PI * (3 - Math.sqrt(5)) // multiples of this angle spread points evenly over a disc
 const EDGE = 1.1 // CSS pixels
@@ -35,7 +36,7 @@ export class Floor {
     this.grid.layers.set(STUDIO_LAYER)
     scene.add(this.grid)
     this.bodies = bodies
-    const points = Math.max(1, Math.min(POINTS, Math.floor(MOST / Math.max(1, bodies.length))))
+    const points = Math.max(1, Math.min(POINTS, Math.floor(MOST / Math.max(1, bodies.length)), Math.floor(MOST_TRIANGLES / countTriangles(bodies))))
     this.layers = Array.from({ length: points }, (_, i) => this.layer(i, points))
     for (const { group } of this.layers) scene.add(group)
   }
@@ -120,6 +121,14 @@ function gridMaterial(cell, far) {
       }`,
   })
 }
+
+/** @param {import('three').Mesh[]} meshes @returns {number} at least 1 */
+function countTriangles(meshes) {
+  return meshes.reduce((sum, { geometry }) => sum + (geometry.index ?? geometry.attributes.position).count / 3, 1)
+}
+
+/** Whether meshes are few enough to be drawn once more for their outlines. @param {import('three').Mesh[]} meshes */
+export const canOutline = (meshes) => countTriangles(meshes) <= MOST_TRIANGLES
 
 /** Outlines of meshes, against a ground of like colour: the back of each mesh, a little larger, is drawn behind it. */
 export class Edges {

@@ -42,8 +42,8 @@ export function buildTransport(words, actions) {
       shown = label.textContent = next
       sign.replaceChildren(icon(isPlaying ? 'pause' : 'play'))
     },
-    setTime(seconds) {
-      this.setText(`${formatTime(seconds)} s`)
+    setTime(seconds, digits = 2) {
+      this.setText(`${formatTime(seconds, digits)} s`)
     },
     setText(text) {
       if (time.textContent !== text) time.textContent = text

@@ -31,6 +31,7 @@ export class Workbench extends Instrument {
     super.build()
     const { words, config } = this
     this.own = null // the files beside the reader's model
+    this.isOther = false // whether that began as another than the lab's
     const texts = {
       label: words('lab.live.model'),
       run: words('lab.live.compile'),
@@ -48,7 +49,7 @@ export class Workbench extends Instrument {
     const { words, config, body } = this
     const options = [[config.title, ''], ...(config.starts ?? []).map(({ name, source }) => [name, source])]
     const start = (_, source) => this.startFrom(source)
-    const menu = buildControls([{ type: 'select', label: words('lab.live.start_from'), unit: '', options }], { set: start, press: () => {} })
+    this.starts = buildControls([{ type: 'select', label: words('lab.live.start_from'), unit: '', options }], { set: start, press: () => {} })
     const picker = h('input', { type: 'file', multiple: true, hidden: true })
     picker.addEventListener('change', async () => {
       await this.openFiles(picker.files)
@@ -64,12 +65,12 @@ export class Workbench extends Instrument {
     })
     const button = textButton(words('lab.live.open_file'), () => picker.click())
     const files = h('div', { class: 'lab-buttons' }, button, picker, h('span', {}, words('lab.live.open_note')))
-    return h('div', { class: 'lab-sources' }, options.length > 1 ? menu.element : null, files)
+    return h('div', { class: 'lab-sources' }, options.length > 1 ? this.starts.element : null, files)
   }
 
-  onReady(values) {
+  onReady(message) {
     this.editor.clear()
-    super.onReady(values)
+    super.onReady(message)
   }
 
   /** Compile the text. */
@@ -78,12 +79,14 @@ export class Workbench extends Instrument {
     this.editor.clear()
     this.playRequested = play
     const { text } = this.editor
-    this.simulation.load(text, text === this.config.xml ? null : this.own)
+    const isLessons = text === this.config.xml
+    this.simulation.load(text, isLessons ? null : this.own, this.isOther && !isLessons)
   }
 
   /** Put another model into the editor, with the files beside it, and run it. */
   openModel(text, own = null) {
     this.own = own
+    this.isOther = text !== this.config.xml
     this.editor.text = text
     this.run()
   }
@@ -104,6 +107,7 @@ export class Workbench extends Instrument {
     try {
       const { main, text, files: others } = await readModel(files)
       this.openModel(text, { main, files: others })
+      this.starts.show([null]) // none of them
       notices.show(words('lab.live.opened', { name: main, n: others.size }), 'note')
     } catch (error) {
       const limits = { most: MOST_BYTES >> 20, letters: LONGEST_MODEL }

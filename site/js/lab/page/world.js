@@ -10,7 +10,7 @@ import { Coil, Pin, Trail } from './marks.js'
 import { Materials } from './materials.js'
 import { Mirror } from './mirror.js'
 import { Solid } from './solid.js'
-import { Edges, Floor } from './studio.js'
+import { Edges, Floor, canOutline } from './studio.js'
 import { Flex, Skin } from './surfaces.js'
 
 const SHOWN_GROUPS = 3 // groups 0, 1 and 2, as in MuJoCo's viewer
@@ -50,11 +50,11 @@ export class World {
     this.raycaster = new Raycaster()
   }
 
-  /** Outline all bodies; returns the floor of a model that has none and no lights, or null. */
+  /** Outline all bodies, unless they have very many triangles; returns the floor of a model that has none and no lights, or null. */
   makeFloor() {
     const solids = this.geoms.filter((solid) => solid !== null && !solid.plane)
     const bodies = solids.flatMap(({ meshes }) => meshes)
-    for (const { meshes, material } of solids) for (const mesh of meshes) this.edges.add(mesh, material)
+    if (canOutline(bodies)) for (const { meshes, material } of solids) for (const mesh of meshes) this.edges.add(mesh, material)
     return this.ground === null ? null : new Floor(this.scene, this.ground, this.description.camera.distance, bodies)
   }
 

@@ -10,7 +10,7 @@
  *   warm {wasm}                       start to fetch and compile the engine (an address)
  *   load {config, module, mjb, wasm, own}  fetch what is missing and start the lab; `module`, `mjb` and `wasm` are absolute addresses. A
  *                                     model in `config.xml` replaces `mjb`, and may name the files of `own`, `{main, files}`, where it lies
- *                                     at the path `main`; without a `module` the lab has no code but a start from the first keyframe
+ *                                     at the path `main`, and with `config.isOther` is none to which the lab's camera belongs; without a `module` the lab has no code but a start from the first keyframe
  *   ping                              answered by `pong`, unless something takes all the worker's time
  *   play, pause, reset
  *   step {n}                          pause and make `n` steps, or go back by as many if it is negative
@@ -19,6 +19,7 @@
  *   control {index, value, play}      set a number or an option; with `play` the lab then runs, unless its code pauses
  *   press {index, play}               press a button; `play` likewise
  *   inspect {on}                      begin or stop to send what the model offers (core/panel.js)
+ *   examine {part}                    send the numbers of a part with each frame: `{kind, index}`, a body, joint or geom; `null`: of none
  *   actuate {index, value, play}      set the control signal of an actuator; `play` as above
  *   keyframe {index}                  begin again at a keyframe of the model
  *   overlay {name, on}                one of `OVERLAYS` in core/frame.js
@@ -51,10 +52,11 @@
  * `from` no longer belongs to it. `tape` is the `range` of core/tape.js. `realtime` is how
  * much of the time due in the last second was simulated: 1 unless the model is too slow. `goal` is `null` or `{held, reached,
  * counts}`: for how long its condition has held (s), when it was reached (s or `null`), and whether the reader has used the controls
- * alone. `panel` is `null` or, of a lab that is inspected, `{ctrl, sensors, driven}`.
+ * alone. `panel` is `null` or, of a lab that is inspected, `{ctrl, sensors, driven, rows}`; `rows` has the numbers of the part that is examined.
  */
 
 import { Clock } from '../core/clock.js'
+import { Framing } from '../core/framing.js'
 import { Lab } from '../core/lab.js'
 import { Tape } from '../core/tape.js'
 
@@ -91,6 +93,7 @@ export class Session {
     })
     if (this.lab === null) return
     const scene = this.lab.scene()
+    if (config.isOther) scene.floor = floorOf(this.lab, scene.camera)
     const { values, time } = this.lab
     this.post('ready', { version: engine.version, scene, values: values ?? [], time }, arrayBuffers(scene))
     this.report()
@@ -277,6 +280,10 @@ const HANDLERS = {
     session.post('model', { model: session.lab.inspect(on) })
     session.stale = true
   },
+  examine(session, { part }) {
+    session.lab.panel?.choose(part)
+    session.stale = true
+  },
   actuate: (session, { index, value, play }) => session.act((lab) => lab.actuate(index, value), play),
   keyframe(session, { index }) {
     session.lab.startAt(index)
@@ -310,6 +317,14 @@ const HANDLERS = {
     session.afterChange()
     session.play()
   },
+}
+
+/** The height of the floor of a model as it begins, or null. */
+function floorOf(lab, camera) {
+  const framing = new Framing(lab, camera)
+  framing.begin()
+  framing.observe(lab)
+  return framing.floor()
 }
 
 /** The buffers of all arrays inside a value, without duplicates. */
