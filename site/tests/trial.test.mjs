@@ -30,8 +30,8 @@ function attempt(xml, data, pieces = {}, request = {}) {
   ]
   const code = `({${members.join(', ')}})`
   let clock = 0
-  const { guard = null, ...rest } = request
-  return runTrial(engine, { config: config(data), code, ...rest }, compile(engine, xml), () => (clock += 0.01), guard)
+  const { guard = null, tick = 0.01, ...rest } = request
+  return runTrial(engine, { config: config(data), code, ...rest }, compile(engine, xml), () => (clock += tick), guard)
 }
 
 const set = (target) => `{set: (${HEAD.slice(1, -1)}, value) => { (${target}) = value }}`
@@ -269,6 +269,23 @@ test('a lab that is to diverge proves it, and nothing of a time after it', () =>
   const sound = attempt(PENDULUM, { expect: [claim(0.1, true)] }, { expect: ['0'] })
   assert.deepEqual(told(sound).map(([entry, kind]) => [entry, kind]), [['expect.0', 'expect']])
   assert.equal(sound.main.diverged, false)
+})
+
+test('where a run takes no millisecond of the clock, the run that is timed once more tells nothing of the last claim', () => {
+  const expect = [
+    { after: [], t: 1, diverges: true, min: null, max: null },
+    { after: [{ mend: 1 }], t: 1, min: null, max: 1 },
+  ]
+  const controls = [control({ label: 'mend', min: 0, max: 1, value: 0, reset: true, param: 'mend' })]
+  const pieces = {
+    controller: 'if (data.time > 0.1 && !ctx.mend) data.qvel[0] = NaN',
+    controls: ['{set: ({ctx}, value) => { ctx.mend = value }}'],
+    expect: ['0', '0'],
+  }
+  for (const tick of [0.01, 0]) {
+    const entries = attempt(PENDULUM, { controls, expect }, pieces, { tick }).failures.map(({ entry }) => entry.join('.'))
+    assert.deepEqual(entries, ['', 'controls.0', 'expect.0'])
+  }
 })
 
 test('a state that is no number can be drawn, even in the first picture that has something to draw', () => {

@@ -172,14 +172,17 @@ class Trial {
     if (hasArrows) main.pictures[0] = packed(this.fresh({ ...this.config, arrows: main.arrows }, picture))
   }
 
-  /** Do something with a fresh lab whose failures are known. */
+  /** Do something with a fresh lab whose failures are known: they are not noted again, nor under another attempt. */
   fresh(config, action) {
+    const { failures, reportedKeys } = this
     const lab = new Lab(this.engine, this.bytes, config, this.code)
     try {
+      Object.assign(this, { failures: [], reportedKeys: new Set() })
       lab.start()
       return action(lab)
     } finally {
       lab.dispose()
+      Object.assign(this, { failures, reportedKeys })
     }
   }
 
