@@ -245,8 +245,9 @@ def test_single_file_is_imported_with_what_it_names(
     ]
     assert main(["import", "README.md"]) == 0
     assert "content/lessons/1.1-readme.md" in texts(tmp_path / "README")
-    message = "is neither a folder nor a file with the extension .md, .qmd, .ipynb, .mdx or .myst"
-    assert f"model.xml {message}; " in import_refused(capsys, "model.xml")
+    extensions = ".md, .qmd, .ipynb, .mdx, .myst, .markdown or .Rmd"
+    message = f"model.xml is neither a folder nor a file with the extension {extensions}; "
+    assert message in import_refused(capsys, "model.xml")
 
 
 def test_cells_of_strangers_run_in_the_sandbox_or_not_at_all(
