@@ -17,6 +17,7 @@ from coursebuild.features.importer.context import (
     to_anchor,
 )
 from coursebuild.features.importer.displays import normalize_formulas
+from coursebuild.features.importer.pandoc_tables import rewrite_tables
 from coursebuild.features.importer.roles import (
     convert_attributes,
     convert_code,
@@ -28,7 +29,6 @@ from coursebuild.features.importer.roles import (
     write_link,
 )
 from coursebuild.features.importer.source_files import title_of_file
-from coursebuild.features.importer.tables import rewrite_tables
 
 _ATTRIBUTES = (
     r"\{(?:[ ]*(?:#[^\s{}\"'#]+|\.[A-Za-z][\w:-]*"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from coursebuild.features.importer.tables import rewrite_tables
+from coursebuild.features.importer.pandoc_tables import rewrite_tables
 
 
 def rewrite(text: str) -> str:
