@@ -119,11 +119,14 @@ def test_a_course_of_a_hundred_lessons_moves_in_without_an_edit(
     report = capsys.readouterr().out
     assert "90 lessons, 0 scripts run: holds" in report
     assert "error[" not in report and "warning[" not in report
-    left = (tmp_path / "new/IMPORT.md").read_text(encoding="utf-8").partition("## Left")[2]
+    account = (tmp_path / "new/IMPORT.md").read_text(encoding="utf-8")
+    left, words = account.partition("## Left")[2].split("## Words that are nowhere")
     assert set(re.findall(r"^- (.*)", left, re.MULTILINE)) == {
         "a block `debug`, which is shown as JSON",
         "a link to `#the-end`, which no text sets",
     }
+    names = re.findall(r"line \d+: (\w+)", words)
+    assert sorted(names) == ["description", "done", "estimated", "stub", "toc"]
 
 
 def test_a_cold_build_finds_nothing_but_the_results_of_scripts(tmp_path: Path) -> None:
