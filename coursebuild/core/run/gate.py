@@ -105,7 +105,7 @@ def find_program(name: str) -> str | None:
     """The absolute path of a program on PATH, whose relative places do not count."""
     if "/" in name and not Path(name).is_absolute():
         return None
-    return shutil.which(name, path=_absolute_places(os.environ.get("PATH", os.defpath)))
+    return shutil.which(name, path=absolute_places(os.environ.get("PATH", os.defpath)))
 
 
 def environment(*names: str, **variables: str) -> dict[str, str]:
@@ -118,12 +118,13 @@ def environment(*names: str, **variables: str) -> dict[str, str]:
         if name in patterns or name.startswith(prefixes)
     }
     if "PATH" in values:
-        values["PATH"] = _absolute_places(values["PATH"])
+        values["PATH"] = absolute_places(values["PATH"])
     return {**values, "PYTHONSAFEPATH": "1", **variables}
 
 
-def _absolute_places(path: str) -> str:
-    return os.pathsep.join(filter(os.path.isabs, path.split(os.pathsep)))
+def absolute_places(path: str) -> str:
+    """The absolute places of a PATH; those of the system if it has none, as empty it means `.`."""
+    return os.pathsep.join(filter(os.path.isabs, path.split(os.pathsep))) or os.defpath
 
 
 def python_command(*arguments: str, program: str = sys.executable) -> list[str]:

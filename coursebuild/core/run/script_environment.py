@@ -73,14 +73,15 @@ class Interpreter(Struct, frozen=True):
     def environment(self, clean: Mapping[str, str]) -> dict[str, str]:
         """The environment of scripts there, made from the one that they have here."""
         programs = f"{self.prefix}/bin"
-        path = f"{programs}:{clean['PATH']}" if clean.get("PATH") else programs
+        path = f"{programs}:{clean['PATH']}"
         return {**clean, "PATH": path, "VIRTUAL_ENV": self.prefix}
 
 
 def clean_environment(outer: Mapping[str, str]) -> dict[str, str]:
     """The environment of scripts except TMPDIR, made from the one that the tool runs in."""
     names = (*_SAYS_NOTHING, *DECISIVE)
-    return {name: outer[name] for name in names if name in outer} | _FIXED
+    path = gate.absolute_places(outer.get("PATH", os.defpath))
+    return {name: outer[name] for name in names if name in outer} | {**_FIXED, "PATH": path}
 
 
 def find_runner(name: str, interpreter: Interpreter | None) -> str | None:
@@ -88,7 +89,7 @@ def find_runner(name: str, interpreter: Interpreter | None) -> str | None:
     environment = clean_environment(os.environ)
     if interpreter is not None:
         environment = interpreter.environment(environment)
-    return shutil.which(name, path=environment.get("PATH", os.defpath))
+    return shutil.which(name, path=environment["PATH"])
 
 
 def library_folder() -> str:
