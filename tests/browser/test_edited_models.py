@@ -134,9 +134,14 @@ def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: 
     assert wait_until_still(page, view) == rear_view, "no hand turns a camera of the model"
     lab_element.get_by_label("Camera", exact=True).select_option(label="free")
     wait_for_change(page, view, rear_view)
+    lab_element.get_by_label("Body, joint or geom").select_option(label="\u2003\u2003joint slide")
+    coordinate = lab_element.locator("dt:text-is('qpos') + dd")
+    expect(coordinate).to_have_text(re.compile(r"^\s?3$"))
+    press(lab_element, "near")
+    expect(coordinate).to_have_text(re.compile(r"^\s?0$"))
     text.fill("<mujoco/>")
     press(lab_element, "Compile and run")
-    expect(push).to_have_count(0)
+    expect(push.or_(coordinate)).to_have_count(0)
     expect(lab_element.get_by_label("Body, joint or geom")).to_be_visible()
     lab_element.get_by_text("Model", exact=True).click()
 
