@@ -6,7 +6,7 @@
  *   buffer(name)        → ArrayBuffer    one of those, or 'beats': a number that a trial increments whenever it makes progress
  *   boot('')            → ''             compiles and starts the engine; ends before the next call
  *   booted('')          → version        or throws why it did not start
- *   trial(requestJson)  → replyJson
+ *   trial(requestJson)  → replyJson      lab/trial/trial.js; `mjb` of the request, a model in base64, goes before the buffer
  *   judge(requestJson)  → replyJson      an attempt at an exercise (exercise/judge.js): `{refused, verdicts, moved}` of `{config, code, plays}`
  *   lookUp(pathsJson)   → JSON           which of `data.qpos` and the like exist, with the model in 'mjb'
  *   trying('')          → JSON           for a trial that was stopped from outside: `stuck`, the entry whose code may never return, or

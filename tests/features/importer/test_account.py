@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.features.importer.convert import ConvertedCourse, convert
-from coursebuild.features.importer.source_files import SourceFiles
+from coursebuild.features.importer.convert import ConvertedCourse
+from support.converted_folder import account_of, convert_files
 
 Construct = tuple[str, str, str]
 """What the account calls it; the column it is counted in; and how it is written."""
@@ -303,14 +303,6 @@ FORMATS = {
 }
 
 
-def import_files(folder: Path, files: dict[str, str]) -> ConvertedCourse:
-    for name, text in files.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    return convert(SourceFiles(folder))
-
-
 def counts(course: ConvertedCourse) -> dict[str, dict[str, int]]:
     """The table of IMPORT.md."""
     rows = re.findall(r"^\| (.+?) \| (\d*) \| (\d*) \| (\d*) \|$", account_of(course), re.M)
@@ -319,10 +311,6 @@ def counts(course: ConvertedCourse) -> dict[str, dict[str, int]]:
         kind: {c: int(n or 0) for c, n in zip(columns, numbers, strict=True)}
         for kind, *numbers in rows
     }
-
-
-def account_of(course: ConvertedCourse) -> str:
-    return course.files["IMPORT.md"].decode()
 
 
 def texts_of(course: ConvertedCourse) -> str:
@@ -345,7 +333,7 @@ def test_every_construct_is_taken_changed_or_left(tmp_path: Path, format: str) -
             f"{folder}/p.png".lstrip("/"): PICTURE,
             **MORE[format],
         }
-        course = import_files(tmp_path / str(number), files)
+        course = convert_files(tmp_path / str(number), files)
         table = counts(course)
         if not table.get(kind, {}).get(column):
             failures.append(f"{text!r} is not {column} as {kind}, but {table}")
@@ -387,7 +375,7 @@ def test_every_part_of_a_notebook_is_taken_changed_or_left(tmp_path: Path) -> No
         "nbformat": 4,
     }
     files = {"one.ipynb": json.dumps(notebook), "data/wn4.csv": "1\n", "wn11.csv": "1\n"}
-    course = import_files(tmp_path, files)
+    course = convert_files(tmp_path, files)
     table = counts(course)
     expected = {
         "cell": (0, 5, 1),
@@ -436,7 +424,7 @@ def test_every_field_of_a_course_json_is_taken_changed_or_left(tmp_path: Path) -
         "one.md": f"# One\n\n[wj15](#/lesson/free-fall) [wj16](/lesson/9.9)\n\n{lab}\n{quiz}",
         "about.md": "# About\n\nwj17\n",
     }
-    course = import_files(tmp_path, files)
+    course = convert_files(tmp_path, files)
     left = account_of(course).partition("## Left")[2]
     words = set(re.findall(r"wj\d+", texts_of(course) + left))
     assert words == {f"wj{number}" for number in range(1, 18)}
@@ -444,25 +432,3 @@ def test_every_field_of_a_course_json_is_taken_changed_or_left(tmp_path: Path) -
     lesson_text = course.files["content/lessons/1.1-free-fall.md"].decode()
     assert lesson_text.count('"azimuth": -170') == lesson_text.count('"elevation": -20') == 2
     assert "[wj15](lesson:1.1)" in lesson_text
-
-
-def test_a_word_that_is_nowhere_in_the_new_course_is_named_with_its_place(tmp_path: Path) -> None:
-    cell = {
-        "cell_type": "code",
-        "source": "1",
-        "outputs": [{"output_type": "display_data", "data": {"text/html": "<b id='x'>zebra</b>"}}],
-    }
-    files = {
-        "_category_.yml": "label: Nobody reads this\n",
-        "one.md": "# One\n\n```{figure} p.png\n:figclass: margin-caption\nA ball.\n```\n",
-        "p.png": PICTURE,
-        "two.ipynb": json.dumps({"cells": [cell], "metadata": {}, "nbformat": 4}),
-    }
-    lost = account_of(import_files(tmp_path, files)).partition("## Words that are nowhere")[2]
-    assert "- one.md, line 4: figclass margin caption\n" in lost
-    assert "- two.ipynb, cell 1: zebra\n" in lost
-
-
-def test_nothing_is_said_of_words_where_the_new_course_has_all(tmp_path: Path) -> None:
-    course = import_files(tmp_path, {"one.md": "# One\n\nA *ball* falls, [see](https://e.org).\n"})
-    assert "## Words" not in account_of(course)

@@ -10,8 +10,7 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from coursebuild.features.importer.convert import ConvertedCourse, convert
-from coursebuild.features.importer.source_files import SourceFiles
+from support.converted_folder import account_of, convert_files
 
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 BASE = '<mujoco><asset><mesh name="m" file="m.obj"/></asset></mujoco>'
@@ -20,18 +19,6 @@ ROBOT = """<mujoco>
   <include file="parts/base.xml"/>
   <worldbody><body><freejoint/><geom type="mesh" mesh="m"/></body></worldbody>
 </mujoco>"""
-
-
-def convert_files(folder: Path, files: dict[str, str]) -> ConvertedCourse:
-    for name, text in files.items():
-        path = folder / "old" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    return convert(SourceFiles(folder / "old"))
-
-
-def account_of(course: ConvertedCourse) -> str:
-    return course.files["IMPORT.md"].decode()
 
 
 @pytest.mark.parametrize("folder", ["robots/arm", "content/models"])

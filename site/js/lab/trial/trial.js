@@ -17,7 +17,6 @@
  *   code     the lab's functions as one expression
  *   seconds  how long the main run is (`verify.seconds`), or `null`: until `stopAt`, or 5 s; then at most 20 000 steps
  *   parity   whether to record what native MuJoCo needs (`true`)
- *   mjb      the model in base64, instead of the reserved buffer
  *
  * The reply, whose types are in `reply.py` of the feature:
  *
