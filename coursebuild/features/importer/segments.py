@@ -33,10 +33,11 @@ _FRONT_MATTER = re.compile(
 )
 _TITLE = re.compile(
     r"^#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$"
-    r"|(?:\A|(?<=\n\n)|(?<==\n))(?P<line>[^\s#>].*(?>(?:\n(?!=+[ \t]*$)[^\s#>].*)*))\n=+[ \t]*$",
+    r"|(?:\A|(?<=\n\n)|(?<==\n))(?:(?P<line>[^\s#>].*)\n=+|"
+    r"(?P<lines>[^\s#>$][^$\n]*(?>(?:\n(?!=+[ \t]*$)[^\s#>$][^$\n]*)+))\n==+)[ \t]*$",
     re.MULTILINE,
 )
-"""A heading of level 1, of both forms."""
+"""A heading of level 1, of both forms. A formula over lines may hold one `=` on a line."""
 _HEADING = re.compile(rf"{_TITLE.pattern}|^(?P<lower>\#{{2,5}})(?=[ \t])", re.MULTILINE)
 
 
@@ -106,7 +107,7 @@ def read_segments(text: str, name: str) -> ReadText:
         titles.append(_text_of(heading))
         if len(titles) == 1 and own_title in ("", titles[0]):
             return ""
-        return f"## {_text_of(heading)}" if heading["line"] else f"#{heading[0]}"
+        return f"## {_text_of(heading)}" if heading["text"] is None else f"#{heading[0]}"
 
     shifted = [
         replace(segment, text=_HEADING.sub(shift_heading, segment.text))
@@ -165,7 +166,7 @@ def lower_titles(text: str) -> str:
 
 
 def _text_of(title: re.Match[str]) -> str:
-    return " ".join((title["line"] or title["text"] or "").split())
+    return " ".join((title["line"] or title["lines"] or title["text"] or "").split())
 
 
 def read_front_matter(text: str) -> tuple[Mapping[str, Any], int]:
