@@ -116,7 +116,7 @@ class Checker:
             path.relative_to(root).as_posix(): path.read_text("utf-8")
             for path in sorted(root.glob("models/*.toml"))
         }
-        texts = proved_texts(course)
+        texts = proved_texts(course, course.documents)
         self.proofs = {p: [proof for proof, _, _ in texts[p]] for p in texts}
         self.runs = {run.path: run for run in self.verification.results.runs}
         self.keys = script_keys(course)
@@ -160,7 +160,7 @@ class Checker:
         course = self._course
         for document in course.documents:
             if (path := document.source.path) == change.path:
-                texts = proved_texts(course)[path]
+                texts = proved_texts(course, [document])[path]
                 for proof, _ in find_losses(document.source, texts, self.proofs.get(path, ())):
                     return Outcome(change, "unproved", proof.describe())
         for hint in judge(course, self.session.diagnostics()).hints:

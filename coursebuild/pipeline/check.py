@@ -6,11 +6,10 @@ In a report, silenced warnings are left out, the rest is sorted and counted.
 from __future__ import annotations
 
 import functools
-import posixpath
-import re
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
@@ -127,7 +126,9 @@ class CheckedCourse(Struct, frozen=True):
         verification, documents = self.verification, self.documents
         diagnostics = self.diagnostics
         if documents is not None:
-            used_paths = _used_files(self.course, documents, verification.results)
+            used_paths = _used_files(
+                self.options.root, self.course, documents, verification.results
+            )
             own_paths = {*documents, self.course.map.path}
             diagnostics = tuple(
                 d
@@ -225,8 +226,12 @@ def _list_unproven(checked_course: CheckedCourse) -> Iterator[Diagnostic]:
     return (d for d in diagnostics if d.span in entries or d.span.path in paths)
 
 
-def _used_files(course: Course, documents: Collection[str], results: Results) -> set[str]:
+def _used_files(
+    root: Path, course: Course, documents: Collection[str], results: Results
+) -> set[str]:
     """The files that some lessons and pages use: models, what scripts read, the list of sources."""
+    from coursebuild.core.run.mjcf import model_files
+
     paths = {file for run in results.runs if run.trace is not None for file in run.trace.files}
     for document in course.documents:
         if document.source.path in documents:
@@ -234,19 +239,9 @@ def _used_files(course: Course, documents: Collection[str], results: Results) ->
             if course.bibliography is not None and any(find_inlines(document, Citation)):
                 paths.add(course.bibliography.path)
     models = {model.source.path: model.source.text for model in course.models}
-    new_paths = paths & {*models}
-    while new_paths:
-        included = {
-            f"{posixpath.dirname(path)}/{name}"
-            for path in new_paths
-            for name in _INCLUDE.findall(models[path])
-        }
-        new_paths = {posixpath.normpath(path) for path in included} & {*models} - paths
-        paths |= new_paths
+    for path in paths & {*models}:
+        paths |= {*model_files(root, path, models[path])}
     return paths | {f"{path.removesuffix('.xml')}.toml" for path in paths & {*models}}
-
-
-_INCLUDE = re.compile(r"""<include\s[^<>]*?\bfile\s*=\s*["']([^"'<>]+)""")
 
 
 def judge(

@@ -88,12 +88,14 @@ def remarks_on_proofs(
     `documents` are the paths of those that were checked; `None`: all.
     """
     remarks = []
-    texts_by_path = proved_texts(course)
-    for owner, document in course.owned_documents:
-        path = document.source.path
-        if documents is not None and path not in documents:
-            continue
-        texts = texts_by_path[path]
+    owned_documents = [
+        (owner, document)
+        for owner, document in course.owned_documents
+        if documents is None or document.source.path in documents
+    ]
+    all_texts = proved_texts(course, (document for _, document in owned_documents))
+    for owner, document in owned_documents:
+        path, texts = document.source.path, all_texts[document.source.path]
         proofs = tuple(proof for proof, _, script in texts if script is None or script in scripts)
         key = fingerprint(path)
         before = store.peek(KIND, key, value_reader(tuple[Proof, ...])) or ()
@@ -117,9 +119,9 @@ ProvedText: TypeAlias = tuple[Proof, Span, str | None]
 """A proof, its place, and the script that has to run for it, if one has."""
 
 
-def proved_texts(course: Course) -> dict[str, list[ProvedText]]:
-    """What is proved where all scripts run, by document."""
-    texts = {d.source.path: [*_of_document(d)] for d in course.documents}
+def proved_texts(course: Course, documents: Iterable[Document]) -> dict[str, list[ProvedText]]:
+    """What is proved of documents where all scripts run, by their paths."""
+    texts = {d.source.path: [*_of_document(d)] for d in documents}
     for _, trial in feature_trials(course).values():
         span = trial.block.span
         if span.path in texts:  # not in a model's file
