@@ -76,7 +76,7 @@ def check(
             names_of_course = [*(e.path for e in extract(course).value), *feature_trials(course)]
             write_timings(timings, seconds, names_of_course)
         diagnostics: list[Diagnostic] = []
-        remarks: list[str] = []
+        remarks: tuple[str, ...] = ()
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
             from coursebuild.core.scripts.noise_warnings import noise_warnings
@@ -86,13 +86,11 @@ def check(
                 course, checked_course.options, runs, selected, halve=True
             )
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
-        inventory: list[Diagnostic] = []
-        if truth:
-            inventory = [*_list_unproven(checked_course)]
+        inventory = [*_list_unproven(checked_course)] if truth else []
         report = checked_course.report(diagnostics, inventory)
         if shard is None:
             checked_course.write_records()
-            remarks += remarks_on_proofs(
+            remarks = remarks_on_proofs(
                 course,
                 options.store,
                 {run.path for run in verification.results.runs if run.did_run},
@@ -100,7 +98,7 @@ def check(
                 is_green=report.summary.ok,
             )
         part = "" if shard is None else str(shard)
-        return replace(report, remarks=tuple(remarks), sensitivity=sensitivities, part=part)
+        return replace(report, remarks=remarks, sensitivity=sensitivities, part=part)
 
 
 class CheckedCourse(Struct, frozen=True):

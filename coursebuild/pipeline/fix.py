@@ -127,12 +127,8 @@ def propose(options: Options, names: tuple[str, ...] = (), ask: Ask | None = Non
         for diagnostic, diff in proposals
     ]
     summary = f"{plural(len(changes), 'proposal')}; in a terminal, each can be accepted"
-    return replace(
-        report, remarks=(*report.remarks, *changes, summary if changes else _NO_PROPOSAL)
-    )
-
-
-_NO_PROPOSAL = "there is nothing to propose"
+    summary = summary if changes else "there is nothing to propose"
+    return replace(report, remarks=(*report.remarks, *changes, summary))
 
 
 class _Fixer:
