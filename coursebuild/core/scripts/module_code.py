@@ -91,7 +91,7 @@ class ModuleCode:
         return text
 
     def _piece(self, statement: ast.stmt) -> str:
-        first = _first_line(statement)
+        first = first_line(statement)
         lines = [line.encode() for line in self.lines[: statement.end_lineno]]
         for line, column, old, new in sorted(self._renamings(statement), reverse=True):
             row = lines[line - 1]
@@ -198,7 +198,8 @@ def _scope_names(nodes: Iterable[ast.AST]) -> frozenset[str]:
     return frozenset(names)
 
 
-def _first_line(statement: ast.stmt) -> int:
+def first_line(statement: ast.stmt) -> int:
+    """The number of a statement's first line, which may be that of a decorator."""
     decorators = statement.decorator_list if isinstance(statement, DEFINITIONS) else []
     return min([statement.lineno, *(node.lineno for node in decorators)])
 
