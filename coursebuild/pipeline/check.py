@@ -19,7 +19,7 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import change_files
 from coursebuild.core.model import Citation, Course, document_scripts, find_inlines
 from coursebuild.core.model.lesson_record import record_path
-from coursebuild.core.model.results import Reports, Results, TrialLine
+from coursebuild.core.model.results import Reports, Results, ScriptRun, TrialLine
 from coursebuild.core.pages.library import named_models
 from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.run.dependencies import sought_files
@@ -122,17 +122,9 @@ class CheckedCourse(Struct, frozen=True):
     ) -> Report:
         """The report; `further` are diagnostics found since, for `inventory` see `judge`."""
         verification, documents = self.verification, self.documents
-        diagnostics = self.diagnostics
-        if documents is not None:
-            used_paths = _used_files(
-                self.options.root, self.course, documents, verification.results
-            )
-            own_paths = {*documents, self.course.map.path}
-            diagnostics = tuple(
-                d
-                for d in diagnostics
-                if d.span.path in own_paths or (d.is_error and d.span.path in used_paths)
-            )
+        runs = verification.results.runs
+        root = self.options.root
+        diagnostics = diagnostics_of(root, self.course, self.diagnostics, documents, runs)
         report = judge(
             self.course,
             (*diagnostics, *verification.run_diagnostics, *further),
@@ -224,13 +216,36 @@ def _list_unproven(checked_course: CheckedCourse) -> Iterator[Diagnostic]:
     return (d for d in diagnostics if d.span in entries or d.span.path in paths)
 
 
+def diagnostics_of(
+    root: Path,
+    course: Course,
+    diagnostics: Iterable[Diagnostic],
+    documents: Collection[str] | None,
+    runs: Iterable[ScriptRun],
+) -> tuple[Diagnostic, ...]:
+    """Those that concern these lessons and pages; all where `documents` is `None`.
+
+    They are those in their files and in the map, and the errors in files that they use. `runs` are
+    those of their scripts.
+    """
+    if documents is None:
+        return tuple(diagnostics)
+    own_paths = {*documents, course.map.path}
+    used_paths = _used_files(root, course, documents, runs)
+    return tuple(
+        d
+        for d in diagnostics
+        if d.span.path in own_paths or (d.is_error and d.span.path in used_paths)
+    )
+
+
 def _used_files(
-    root: Path, course: Course, documents: Collection[str], results: Results
+    root: Path, course: Course, documents: Collection[str], runs: Iterable[ScriptRun]
 ) -> set[str]:
     """The files that some lessons and pages use: models, what scripts read, the list of sources."""
     from coursebuild.core.run.mjcf import model_files
 
-    paths = {file for run in results.runs if run.trace is not None for file in run.trace.files}
+    paths = {file for run in runs if run.trace is not None for file in run.trace.files}
     for document in course.documents:
         if document.source.path in documents:
             paths |= {f"models/{name}.xml" for name in named_models(document)}

@@ -40,7 +40,7 @@ from coursebuild.core.scripts.findings import script_findings
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.pipeline.check import judge
+from coursebuild.pipeline.check import diagnostics_of, judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.recordings import (
@@ -120,6 +120,8 @@ class _Updater:
             new_course = parsed_course.value or self.course
             read_diagnostics = parsed_course.diagnostics
         diagnostics = [*read_diagnostics, *self.extracted_scripts.diagnostics]
+        root = self.options.root
+        diagnostics = [*diagnostics_of(root, new_course, diagnostics, self.documents, runs)]
         diagnostics += [*refusals, *failures, *figure_failures]
         diagnostics += check_recorded_runs(self.scripts, self.options)
         told_paths = {d.span.path for d in diagnostics if d.rule == "output-not-updatable"}

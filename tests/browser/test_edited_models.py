@@ -92,6 +92,8 @@ CART = """<mujoco>
   <sensor><jointpos name="place" joint="slide"/></sensor>
   <keyframe><key name="near" qpos="0"/><key name="far" qpos="3"/></keyframe>
 </mujoco>"""
+FLOOR = '<geom name="floor" type="plane" size="2 2 1" pos="0 0 -1"/>'
+OVERFLOWING = "rows => rows.filter(row => row.scrollWidth > row.clientWidth).map(row => row.innerText)"
 
 
 def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: Page) -> None:
@@ -139,6 +141,18 @@ def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: 
     expect(coordinate).to_have_text(re.compile(r"^\s?3$"))
     press(lab_element, "near")
     expect(coordinate).to_have_text(re.compile(r"^\s?0$"))
+    text.fill(CART.replace("<body>", f"{FLOOR}<body>"))
+    press(lab_element, "Compile and run")
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    part = lab_element.get_by_label("Body, joint or geom")
+    for _ in range(9):  # frames of the part before are still on their way
+        part.select_option(label="\u2003\u2003joint slide")
+        expect(coordinate).to_be_visible()
+        part.select_option(label="\u2003geom floor")
+        expect(lab_element.locator("dt:text-is('geom_size') + dd")).to_have_text("2 2 1")
+    expect(coordinate).to_have_count(0)
+    rows = lab_element.locator(".lab-model dl > div")
+    assert rows.evaluate_all(OVERFLOWING) == []
     text.fill("<mujoco/>")
     press(lab_element, "Compile and run")
     expect(push.or_(coordinate)).to_have_count(0)

@@ -63,6 +63,13 @@ def test_errors_in_what_a_lesson_does_not_use_are_none_of_its(make: Make) -> Non
     )
 
 
+def test_update_of_a_lesson_tells_no_mistakes_of_others(make: Make) -> None:
+    folder = make("## One\n\n" + block("one.py", "print(1)", "0"), "## Two\n\n[x](nowhere.md)\n")
+    assert folder.main("update", "1.1").status == 0
+    result = folder.main("update", "1.2")
+    assert (result.status, "error[link-file]" in result.out) == (1, True), result.out
+
+
 def test_a_script_that_fails_by_a_fragment_of_a_model_is_reported(make: Make) -> None:
     """A fragment that compiles only where it is included has no mistake of its own."""
     opens = OPENS.replace('"ball"', '"part"')

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import assert_never
 
 from msgspec import Struct
@@ -305,7 +305,22 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         "referrers": owner_links(place, library.referrers.get(lesson.id, ())),
         "previous": previous and lesson_link(library, place, previous),
         "following": following and lesson_link(library, place, following),
+        "path_steps": tuple(_path_steps(library, place, lesson, following)),
     }
+
+
+def _path_steps(
+    library: Library, place: urls.Place, lesson: Lesson, following: Lesson | None
+) -> Iterator[tuple[str, LessonLink]]:
+    """The title of each path through a lesson, and its next one, where that is not the map's."""
+    for path in library.course.paths:
+        after = (
+            path.lessons[path.lessons.index(lesson.id) + 1 :] if lesson.id in path.lessons else ()
+        )
+        readable = (x for x in map(library.lessons.__getitem__, after) if x.document is not None)
+        step = next(readable, None)
+        if step is not None and step is not following:
+            yield path.title, lesson_link(library, place, step)
 
 
 def edit_address(library: Library, path: str) -> str | None:

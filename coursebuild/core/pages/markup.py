@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from itertools import zip_longest
 from typing import Literal, TypeAlias, assert_never
 from urllib.parse import quote
 
@@ -16,7 +15,13 @@ from markupsafe import Markup
 
 from coursebuild.core import model
 from coursebuild.core.pages.renderer import Strings
-from coursebuild.core.pages.typography import isolate_ltr, join_units, split_quantities, unit_length
+from coursebuild.core.pages.typography import (
+    curl_apostrophes,
+    isolate_ltr,
+    join_units,
+    split_quantities,
+    unit_length,
+)
 
 SpecialBlock: TypeAlias = (
     model.Callout
@@ -36,6 +41,8 @@ def escape(text: str) -> str:
 
 
 _SIMPLE = re.compile('[^0-9&<>"]*+')
+_APART = (type(None), model.SoftBreak, model.HardBreak)
+"""What stands beside a text of which no word goes on."""
 
 
 def raw_html(node: model.HtmlBlock | model.RawInline, url: Callable[[str], str]) -> str:
@@ -153,9 +160,14 @@ class HtmlWriter:
             return "".join(map(self._inline, inlines))
         row, parts = tuple(inlines), list[str]()
         unit_end = 0
-        for inline, after in zip_longest(row, row[1:]):
+        for before, inline, after in zip((None, *row), row, (*row[1:], None), strict=False):
             if isinstance(inline, model.Text):
-                parts.append(self._text(inline.text[unit_end:]))
+                text = inline.text[unit_end:]
+                if "'" in text and self.direction == "ltr":
+                    text = curl_apostrophes(
+                        text, not isinstance(before, _APART), not isinstance(after, _APART)
+                    )
+                parts.append(self._text(text))
                 unit_end = 0
                 continue
             html = self._inline(inline)

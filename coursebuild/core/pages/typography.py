@@ -18,6 +18,10 @@ In numbers and their units
 
 Units are those of the SI, those used with it, and a few of computing. If a word or a label (`Figure
 2 A`) is taken for a unit, the no-break space does no harm.
+
+A straight apostrophe inside a word is drawn as a curly one, which is right in every language that
+is written from the left. All other straight quotes stay as they are: `'` at an end of a word may
+open or close a quotation or stand for minutes, and which marks do so is the author's choice.
 """
 
 from __future__ import annotations
@@ -54,6 +58,9 @@ _GLUE_START, _GLUE_END = '<span class="held">', "</span>"
 _FORMULAS = re.compile(r"(<math>.*?</math>(?:<math>.*?</math>)*)", re.DOTALL)
 _OPENING = "([“‘\"'\u2066"
 _CLOSING = re.compile(r"""\u2069?(?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*""")
+
+_LETTER = r"[^\W\d_]"
+_APOSTROPHE = re.compile(rf"(?<={_LETTER})'(?={_LETTER}|\ue000)|(?<=\ue000)'(?={_LETTER})")
 
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
 _BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
@@ -190,7 +197,7 @@ def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
     """Text as HTML, in text of this direction."""
     text = join_units(text)
     if direction == "ltr":
-        return Markup.escape(text)
+        return Markup.escape(curl_apostrophes(text))
     pieces = ((Markup.escape(piece), is_quantity) for piece, is_quantity in split_quantities(text))
     return Markup("").join(
         isolate_ltr(piece) if is_quantity else piece for piece, is_quantity in pieces
@@ -200,6 +207,16 @@ def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:
 def isolate_ltr(html: Markup) -> Markup:
     """Isolate HTML as running from the left in text of any direction."""
     return Markup('<bdi dir="ltr">') + html + Markup("</bdi>")
+
+
+def curl_apostrophes(text: str, joined_before: bool = False, joined_after: bool = False) -> str:
+    """Text from the left with a curly apostrophe wherever a straight one stands inside a word.
+
+    Such a word may go on in what the text is joined to without a space, as in `l'*eau*`.
+    """
+    before, after = "\ue000" * joined_before, "\ue000" * joined_after
+    curled = _APOSTROPHE.sub("’", f"{before}{text}{after}")
+    return curled[len(before) : len(curled) - len(after)]
 
 
 def join_units(text: str) -> str:

@@ -132,12 +132,13 @@ def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tup
 def _caption_of(cell: Segment, code: str, context: LessonContext) -> str:
     options, title = options_of(cell), _DRAWN_TITLE.search(code)
     caption = options.get("fig-cap") or options.get("caption") or (title[2] if title else "")
-    return rewrite_prose(caption.strip("\"' ") or context.title, context).rstrip()
+    caption = " ".join(caption.strip("\"' ").split())
+    return rewrite_prose(caption or context.title, context).rstrip()
 
 
 def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = True) -> str:
     options = options_of(cell)
-    alt = options.get("fig-alt", options.get("alt", "")).strip("\"' ") or caption
+    alt = " ".join(options.get("fig-alt", options.get("alt", "")).strip("\"' ").split()) or caption
     alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)
     label = options.get("label", "") if has_label else ""
     mark = f" {{#fig:{to_anchor(label.removeprefix('fig-'))}}}" if label.startswith("fig-") else ""

@@ -76,7 +76,7 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     options, kind = _options_of(cell), f"cell of `{language}`"
     code = code_for_readers(replace(cell, text=_MAGIC.sub("", cell.text, count=1)))
     captions = (options[name] for name in ("fig-cap", "lst-cap") if options.get(name))
-    caption = rewrite_prose(next(captions, ""), context)
+    caption = rewrite_prose(" ".join(next(captions, "").split()), context)
     label = options.get("label", "")
     mark = f'<a id="{to_anchor(label)}"></a>' if label else ""
     head = [part for part in (mark, f"**{caption}**" if caption else "") if part]

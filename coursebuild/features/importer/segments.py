@@ -33,7 +33,7 @@ _FRONT_MATTER = re.compile(
 )
 _TITLE = re.compile(
     r"^#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$"
-    r"|(?:\A|(?<=\n\n))(?P<line>[^\s#>].*)\n=+[ \t]*$",
+    r"|(?:\A|(?<=\n\n)|(?<==\n))(?P<line>[^\s#>].*(?>(?:\n(?!=+[ \t]*$)[^\s#>].*)*))\n=+[ \t]*$",
     re.MULTILINE,
 )
 """A heading of level 1, of both forms."""
@@ -103,10 +103,10 @@ def read_segments(text: str, name: str) -> ReadText:
     def shift_heading(heading: re.Match[str]) -> str:
         if heading["lower"]:  # what stands below a second title stays below it
             return heading["lower"] + "#" * (len(titles) > 1)
-        titles.append(heading["text"] or heading["line"] or "")
+        titles.append(_text_of(heading))
         if len(titles) == 1 and own_title in ("", titles[0]):
             return ""
-        return f"## {heading['line']}" if heading["line"] else f"#{heading[0]}"
+        return f"## {_text_of(heading)}" if heading["line"] else f"#{heading[0]}"
 
     shifted = [
         replace(segment, text=_HEADING.sub(shift_heading, segment.text))
@@ -147,10 +147,11 @@ _HINT = re.compile(
 )
 """A callout of GitBook."""
 _HIGHLIGHT = re.compile(
-    r"^\{[%{][<%-]?[ ]*highlight[ ]+(\w+)[^\n]*\n(.*?)\n\{[%{][<%-]?[ ]*(?:end|/)highlight[^\n]*$",
+    r"^\{[%{][<%-]?[ ]*(?:(highlight)[ ]+|(\w+)[ ]+lang=\"?)(\w+)[^\n]*\n(.*?)\n"
+    r"\{[%{][<%-]?[ ]*(?:end|/)(?:\1|\2)\b[^\n]*$",
     re.MULTILINE | re.DOTALL,
 )
-"""A block of code of Jekyll or Hugo."""
+"""A block of code of Jekyll or Hugo, whose own shortcodes say so by `lang`."""
 
 
 def _join_gates(gates: re.Match[str]) -> str:
@@ -160,7 +161,11 @@ def _join_gates(gates: re.Match[str]) -> str:
 
 def lower_titles(text: str) -> str:
     """Return prose within another block with its headings of level 1 on level 2."""
-    return _TITLE.sub(lambda heading: f"## {heading['line'] or heading['text']}", text)
+    return _TITLE.sub(lambda heading: f"## {_text_of(heading)}", text)
+
+
+def _text_of(title: re.Match[str]) -> str:
+    return " ".join((title["line"] or title["text"] or "").split())
 
 
 def read_front_matter(text: str) -> tuple[Mapping[str, Any], int]:
@@ -180,7 +185,7 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
     block.
     """
     text = _HINT.sub(r"::::::\1\n\2\n::::::", _GATES.sub(_join_gates, text))
-    text = _HIGHLIGHT.sub(r"```\1\n\2\n```", text)
+    text = _HIGHLIGHT.sub(r"```\3\n\4\n```", text)
     lines = text.split("\n")
     at = 0
     for (start, end), mark, head, content in (*_find_blocks(text), ([len(lines)] * 2, "", "", "")):

@@ -16,6 +16,7 @@ from coursebuild.core.model import Document, NumberBinding, Target, Text
 from coursebuild.core.pages.markup import SpecialBlock
 from coursebuild.core.pages.renderer import Strings, direction, parse_strings
 from coursebuild.core.pages.typography import (
+    curl_apostrophes,
     glue_formulas,
     isolate_formulas,
     isolate_ltr,
@@ -114,7 +115,7 @@ _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"}
 @given(st.text(alphabet="aµ 0123.,·kgm²<>&\"'×−%°\n\u00a0", max_size=24) | st.text())
 def test_text_has_its_quantities_kept_and_is_escaped(text: str) -> None:
     inlines = (Text(Span(Source("x.md", ""), 0, 0), text),)
-    expected = join_units(text).translate(_ESCAPES)
+    expected = curl_apostrophes(join_units(text)).translate(_ESCAPES)
     assert Writer(direction="ltr").inlines(inlines) == expected
     pieces = (
         (Markup(piece.translate(_ESCAPES)), is_quantity)
@@ -270,7 +271,26 @@ def test_finding_quantities_loses_no_character(text: str) -> None:
 
     for side in ("ltr", "rtl"):
         html = str(text_html(text, side))
-        assert unescape(re.sub("</?bdi[^>]*>", "", html)) == join_units(text)
+        expected = join_units(text) if side == "rtl" else curl_apostrophes(join_units(text))
+        assert unescape(re.sub("</?bdi[^>]*>", "", html)) == expected
+
+
+def test_apostrophes_of_prose_are_curly_and_other_quotes_stay() -> None:
+    def draw(markdown: str, direction: Literal["", "ltr", "rtl"] = "ltr") -> str:
+        return Writer(direction=direction).render_blocks(parse(markdown).blocks).strip()
+
+    for markdown, expected in {
+        "the viewer's, don't, O'Brien, м'яч": "the viewer’s, don’t, O’Brien, м’яч",
+        "l'*eau* de l'`arm`, l'$x$": "l’<em>eau</em> de l’<code>arm</code>, l’<math>x</math>",
+        "*arm*'s and\nthe `arm`'s": "<em>arm</em>’s and\nthe <code>arm</code>’s",
+        "the 'arm', 'a *b*' and *'c'*": "the 'arm', 'a <em>b</em>' and <em>'c'</em>",
+        "5'10, 5', the arms' end": "5'10, 5', the arms' end",
+        "word'\n'word": "word'\n'word",
+        "`don't` $f'g$": "<code>don't</code> <math>f&#39;g</math>",
+        "[don't](x \"don't\")": '<a href="/UrlTarget?a&amp;b" title="don\'t">don’t</a>',
+    }.items():
+        assert draw(markdown) == f"<p>{expected}</p>"
+    assert draw("ג'ירפה", "rtl") == "<p>ג'ירפה</p>"
 
 
 def test_pages_say_their_direction_and_hold_numbers_and_units_together(make: Make) -> None:

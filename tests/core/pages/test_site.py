@@ -294,6 +294,24 @@ def test_the_home_page_shows_paths_and_then_what_is_in_none(make: Make) -> None:
     assert start is not None and start[1].startswith("lessons/0.1-")
 
 
+def test_a_lesson_leads_on_along_its_path_where_the_map_goes_elsewhere(make: Make) -> None:
+    paths = "".join(
+        f'[[path]]\ntitle = "{title}"\nlessons = {ids}\n'
+        for title, ids in (("As the map", ["0.1", "1.1"]), ("Back & forth", ["1.1", "0.1"]))
+    )
+    site = pages(make("Text.", course=MAP + paths).site())
+    lessons = {name[8:11]: name for name in site if name.startswith("lessons/")}
+    steps = {
+        id: re.findall(r'class="pager-next".*?href="([^"]+)".*?way">(.*?)</span>', site[name])
+        for id, name in lessons.items()
+    }
+    assert steps == {
+        "0.1": [(lessons["1.1"][8:], "Next")],
+        "1.1": [(lessons["0.1"][8:], "Next in “Back &amp; forth”")],
+        "1.2": [],  # planned, and in no path
+    }
+
+
 BASES = ("https://h/", "https://h/deep/er/", "file:///home/u/site/")
 
 

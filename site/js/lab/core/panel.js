@@ -13,6 +13,7 @@ const BODY_ROWS = ['xpos', 'xquat', 'xipos', 'subtree_com', 'cvel', 'xfrc_applie
 const GEOM_ROWS = ['geom_xpos', 'geom_xmat']
 const JOINT_ROWS = ['xanchor', 'xaxis']
 const DOF_ROWS = ['qvel', 'qacc', 'qfrc_applied', 'qfrc_passive', 'qfrc_actuator', 'qfrc_constraint', 'qfrc_bias']
+const PREFIXES = ['body_', 'jnt_', 'dof_', 'geom_'] // of the arrays of a model whose numbers are shown
 const COORDINATES = [7, 4, 1, 1] // of a joint, by its mjtJoint
 const FREEDOMS = [6, 3, 1, 1]
 const WRITES = /\bctrl\s*\[\s*(\d+)\s*\]\s*[-+*/]?=(?!=)/g
@@ -22,6 +23,7 @@ export class Panel {
   constructor(lab) {
     this.lab = lab
     this.part = null // of the model, whose numbers are read: {kind, index}
+    this.names = Object.fromEntries(PREFIXES.map((prefix) => [prefix, namesOf(lab.model, prefix)]))
     this.driven = new Uint8Array(lab.model.nu)
     this.before = new Float64Array(lab.model.nu)
     const { controller, controls } = lab.code
@@ -88,14 +90,14 @@ export class Panel {
     const { kind, index } = this.part
     const cut = (from, name, start, count) => [name, Float64Array.from(from[name].subarray(start, start + count))]
     const each = (from, names, count) => names.map((name) => cut(from, name, (index * from[name].length) / count, from[name].length / count))
-    if (kind === 'body') return [...each(model, namesOf(model, 'body_'), model.nbody), ...each(data, BODY_ROWS, model.nbody)]
-    if (kind === 'geom') return [...each(model, namesOf(model, 'geom_'), model.ngeom), ...each(data, GEOM_ROWS, model.ngeom)]
+    if (kind === 'body') return [...each(model, this.names.body_, model.nbody), ...each(data, BODY_ROWS, model.nbody)]
+    if (kind === 'geom') return [...each(model, this.names.geom_, model.ngeom), ...each(data, GEOM_ROWS, model.ngeom)]
     const [coordinate, dof] = [model.jnt_qposadr[index], model.jnt_dofadr[index]]
     const [coordinates, dofs] = [COORDINATES, FREEDOMS].map((counts) => counts[model.jnt_type[index]])
     const ofDofs = (from, names) => names.map((name) => cut(from, name, (dof * from[name].length) / model.nv, (dofs * from[name].length) / model.nv))
     return [
-      ...each(model, namesOf(model, 'jnt_'), model.njnt),
-      ...ofDofs(model, namesOf(model, 'dof_')),
+      ...each(model, this.names.jnt_, model.njnt),
+      ...ofDofs(model, this.names.dof_),
       ...each(data, JOINT_ROWS, model.njnt),
       cut(data, 'qpos', coordinate, coordinates),
       ...ofDofs(data, DOF_ROWS),

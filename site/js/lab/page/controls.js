@@ -117,7 +117,7 @@ export function buildReadouts(readouts, format) {
       row.value.textContent = text
       if (text.length > row.room) {
         row.room = text.length
-        row.value.style.minWidth = `${text.length}ch`
+        row.value.style.minWidth = `min(100%, ${text.length}ch)`
       }
     })
   }

@@ -58,13 +58,11 @@ export class ModelPanel {
     )
     const tree = parts.map(({ kind, index, depth, name }) => [`${INDENT.repeat(depth)}${kind} ${name}`, { kind, index }])
     const chooser = buildControls([{ type: 'select', label: words('lab.live.part'), unit: '', options: [['–', null], ...tree] }], {
-      set: (_, part) => {
-        this.rows.replaceChildren()
-        actions.examine(/** @type {{kind: string, index: number} | null} */ (part))
-      },
+      set: (_, part) => actions.examine(/** @type {{kind: string, index: number} | null} */ (part)),
       press: () => {},
     })
     this.rows = h('div')
+    this.rowLabels = ''
     this.driven = h('p', { class: 'lab-driven', hidden: true }, words('lab.live.driven'))
     this.body.replaceChildren(
       ...this.section('actuators', actuators, this.sliders.element, this.driven),
@@ -122,9 +120,14 @@ export class ModelPanel {
     }
   }
 
-  /** The numbers of the chosen part. @param {[string, Float64Array][] | null} rows */
+  /** The numbers of the chosen part, or for some frames yet of the one before. @param {[string, Float64Array][] | null} rows */
   showRows(rows) {
-    if (rows === null) return this.rows.replaceChildren()
+    const labels = (rows ?? []).map(([label]) => label).join()
+    if (labels !== this.rowLabels) {
+      this.rowLabels = labels
+      this.rows.replaceChildren()
+    }
+    if (rows === null) return
     if (!this.rows.hasChildNodes()) {
       this.table = buildReadouts(
         rows.map(([label]) => ({ label, digits: null })),
