@@ -56,7 +56,7 @@ from coursebuild.core.run.script_server import ScriptServer  # noqa: E402
 from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
 from coursebuild.pipeline.check import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
-from coursebuild.pipeline.proofs import find_losses, find_proofs  # noqa: E402
+from coursebuild.pipeline.proofs import find_losses, proved_texts  # noqa: E402
 from coursebuild.pipeline.verify import Verification, verify  # noqa: E402
 from coursebuild.preview.run_history import script_keys  # noqa: E402
 from coursebuild.preview.session import Session  # noqa: E402
@@ -116,7 +116,8 @@ class Checker:
             path.relative_to(root).as_posix(): path.read_text("utf-8")
             for path in sorted(root.glob("models/*.toml"))
         }
-        self.proofs = find_proofs(course)
+        texts = proved_texts(course, course.documents)
+        self.proofs = {p: [proof for proof, _, _ in texts[p]] for p in texts}
         self.runs = {run.path: run for run in self.verification.results.runs}
         self.keys = script_keys(course)
         self.pages: dict[str, bytes] = {}
@@ -157,8 +158,11 @@ class Checker:
     def _tell(self, change: Change) -> Outcome | None:
         """What is said of a change that is no mistake, if anything is."""
         course = self._course
-        for loss in find_losses(course, change.path, self.proofs.get(change.path, ())):
-            return Outcome(change, "unproved", loss.proof.describe())
+        for document in course.documents:
+            if (path := document.source.path) == change.path:
+                texts = proved_texts(course, [document])[path]
+                for proof, _ in find_losses(document.source, texts, self.proofs.get(path, ())):
+                    return Outcome(change, "unproved", proof.describe())
         for hint in judge(course, self.session.diagnostics()).hints:
             if _identity(hint) not in self.hints:
                 return Outcome(change, "hinted", _describe(hint))

@@ -6,11 +6,10 @@ In a report, silenced warnings are left out, the rest is sorted and counted.
 from __future__ import annotations
 
 import functools
-import posixpath
-import re
 import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from msgspec import Struct
@@ -77,7 +76,7 @@ def check(
             names_of_course = [*(e.path for e in extract(course).value), *feature_trials(course)]
             write_timings(timings, seconds, names_of_course)
         diagnostics: list[Diagnostic] = []
-        remarks: list[str] = []
+        remarks: tuple[str, ...] = ()
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
             from coursebuild.core.scripts.noise_warnings import noise_warnings
@@ -87,13 +86,11 @@ def check(
                 course, checked_course.options, runs, selected, halve=True
             )
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
-        inventory: list[Diagnostic] = []
-        if truth:
-            inventory = [*_list_unproven(checked_course)]
+        inventory = [*_list_unproven(checked_course)] if truth else []
         report = checked_course.report(diagnostics, inventory)
         if shard is None:
             checked_course.write_records()
-            remarks += remarks_on_proofs(
+            remarks = remarks_on_proofs(
                 course,
                 options.store,
                 {run.path for run in verification.results.runs if run.did_run},
@@ -101,7 +98,7 @@ def check(
                 is_green=report.summary.ok,
             )
         part = "" if shard is None else str(shard)
-        return replace(report, remarks=tuple(remarks), sensitivity=sensitivities, part=part)
+        return replace(report, remarks=remarks, sensitivity=sensitivities, part=part)
 
 
 class CheckedCourse(Struct, frozen=True):
@@ -126,7 +123,8 @@ class CheckedCourse(Struct, frozen=True):
         """The report; `further` are diagnostics found since, for `inventory` see `judge`."""
         verification, documents = self.verification, self.documents
         runs = verification.results.runs
-        diagnostics = diagnostics_of(self.course, self.diagnostics, documents, runs)
+        root = self.options.root
+        diagnostics = diagnostics_of(root, self.course, self.diagnostics, documents, runs)
         report = judge(
             self.course,
             (*diagnostics, *verification.run_diagnostics, *further),
@@ -219,6 +217,7 @@ def _list_unproven(checked_course: CheckedCourse) -> Iterator[Diagnostic]:
 
 
 def diagnostics_of(
+    root: Path,
     course: Course,
     diagnostics: Iterable[Diagnostic],
     documents: Collection[str] | None,
@@ -232,7 +231,7 @@ def diagnostics_of(
     if documents is None:
         return tuple(diagnostics)
     own_paths = {*documents, course.map.path}
-    used_paths = _used_files(course, documents, runs)
+    used_paths = _used_files(root, course, documents, runs)
     return tuple(
         d
         for d in diagnostics
@@ -240,8 +239,12 @@ def diagnostics_of(
     )
 
 
-def _used_files(course: Course, documents: Collection[str], runs: Iterable[ScriptRun]) -> set[str]:
+def _used_files(
+    root: Path, course: Course, documents: Collection[str], runs: Iterable[ScriptRun]
+) -> set[str]:
     """The files that some lessons and pages use: models, what scripts read, the list of sources."""
+    from coursebuild.core.run.mjcf import model_files
+
     paths = {file for run in runs if run.trace is not None for file in run.trace.files}
     for document in course.documents:
         if document.source.path in documents:
@@ -249,19 +252,9 @@ def _used_files(course: Course, documents: Collection[str], runs: Iterable[Scrip
             if course.bibliography is not None and any(find_inlines(document, Citation)):
                 paths.add(course.bibliography.path)
     models = {model.source.path: model.source.text for model in course.models}
-    new_paths = paths & {*models}
-    while new_paths:
-        included = {
-            f"{posixpath.dirname(path)}/{name}"
-            for path in new_paths
-            for name in _INCLUDE.findall(models[path])
-        }
-        new_paths = {posixpath.normpath(path) for path in included} & {*models} - paths
-        paths |= new_paths
+    for path in paths & {*models}:
+        paths |= {*model_files(root, path, models[path])}
     return paths | {f"{path.removesuffix('.xml')}.toml" for path in paths & {*models}}
-
-
-_INCLUDE = re.compile(r"""<include\s[^<>]*?\bfile\s*=\s*["']([^"'<>]+)""")
 
 
 def judge(

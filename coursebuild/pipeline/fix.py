@@ -22,7 +22,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import FileChange, change_files, check_writable
-from coursebuild.core.scripts.edit import edited_texts
+from coursebuild.core.scripts.edit import edited_texts, select_harmless
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge, read_and_verify
@@ -127,12 +127,8 @@ def propose(options: Options, names: tuple[str, ...] = (), ask: Ask | None = Non
         for diagnostic, diff in proposals
     ]
     summary = f"{plural(len(changes), 'proposal')}; in a terminal, each can be accepted"
-    return replace(
-        report, remarks=(*report.remarks, *changes, summary if changes else _NO_PROPOSAL)
-    )
-
-
-_NO_PROPOSAL = "there is nothing to propose"
+    summary = summary if changes else "there is nothing to propose"
+    return replace(report, remarks=(*report.remarks, *changes, summary))
 
 
 class _Fixer:
@@ -230,7 +226,7 @@ class _Fixer:
         """
         fixes = choose_fixes(self._candidates(diagnostics))
         self.tried |= {_key(diagnostic) for diagnostic in fixes}
-        harmless = self._select_harmless(list(fixes), [], before) if fixes else []
+        harmless = select_harmless(fixes, lambda some: self._is_harmless(some, before))
         self._make(harmless)
         return bool(harmless)
 
@@ -268,18 +264,6 @@ class _Fixer:
     def _texts_with(self, fixes: Iterable[Diagnostic]) -> dict[str, str]:
         edits = (edit for diagnostic in fixes for edit in diagnostic.edits)
         return self.texts | {s.path: text for s, text in edited_texts(edits).items()}
-
-    def _select_harmless(
-        self, fixes: list[Diagnostic], selection: list[Diagnostic], before: Collection[Diagnostic]
-    ) -> list[Diagnostic]:
-        """The selection with as many further fixes as do no harm together."""
-        if not fixes or self._is_harmless(selection + fixes, before):
-            return selection + fixes
-        if len(fixes) == 1:
-            return selection
-        half = len(fixes) // 2
-        selection = self._select_harmless(fixes[:half], selection, before)
-        return self._select_harmless(fixes[half:], selection, before)
 
     def _is_harmless(self, fixes: Sequence[Diagnostic], before: Collection[Diagnostic]) -> bool:
         """Whether the mistakes are gone with these fixes, and there are no more errors."""

@@ -23,7 +23,7 @@ from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import change_files, check_writable, write_atomic
 from coursebuild.core.model import Course, Document
 from coursebuild.core.model.lesson_record import known_addresses
-from coursebuild.core.model.results import Outcome, ScriptRun, TrialLine, Verdict
+from coursebuild.core.model.results import Outcome, ScriptRun, TrialLine
 from coursebuild.core.registry import feature_trials
 from coursebuild.core.scripts.bindings import update_outputs
 from coursebuild.core.scripts.bound_places import (
@@ -120,7 +120,8 @@ class _Updater:
             new_course = parsed_course.value or self.course
             read_diagnostics = parsed_course.diagnostics
         diagnostics = [*read_diagnostics, *self.extracted_scripts.diagnostics]
-        diagnostics = [*diagnostics_of(new_course, diagnostics, self.documents, runs)]
+        root = self.options.root
+        diagnostics = [*diagnostics_of(root, new_course, diagnostics, self.documents, runs)]
         diagnostics += [*refusals, *failures, *figure_failures]
         diagnostics += check_recorded_runs(self.scripts, self.options)
         told_paths = {d.span.path for d in diagnostics if d.rule == "output-not-updatable"}
@@ -227,31 +228,25 @@ class _Updater:
 
     def _diagnose_updated(self, new_course: Course, runs: Sequence[ScriptRun]) -> list[Diagnostic]:
         paths = {extraction.path for extraction in self.scripts}
-
-        def verdicts(course: Course) -> list[Verdict]:
-            return [
-                v for v in compare_all(course, runs, self.addresses) if v.recording.script in paths
-            ]
-
         # What was written above a script has moved it.
         extractions = [e for e in extract_course(new_course).value if e.path in paths]
         if new_course is not self.course:
             self._carry_addresses(new_course, runs)
         chosen_paths = {document.source.path for document in self._chosen_documents(new_course)}
         chosen_documents = [p for p in new_course.shown_texts if p[1].source.path in chosen_paths]
-        diagnostics = [
+        verdicts = compare_all(new_course, runs, self.addresses)
+        return [
             *script_findings(
                 new_course,
                 chosen_documents,
                 extractions,
                 runs,
-                verdicts(new_course),
+                [v for v in verdicts if v.recording.script in paths],
                 self.addresses,
                 find_module=functools.partial(find_module, self.options.root),
             ),
             *figure_findings(new_course, runs, functools.partial(read_recorded, self.options.root)),
         ]
-        return diagnostics
 
     def _carry_addresses(self, new_course: Course, runs: Sequence[ScriptRun]) -> None:
         """Keep the addresses of numbers that were written anew."""

@@ -4,14 +4,14 @@ A slip may leave a text that is right, but says less: without its caption an out
 text, without its brace a bound number is code. Nobody can see that in the text. But what was proved
 at the last check without errors, still stands in the text, and is proved no longer, is a fact.
 
-Entry points: `find_proofs`, `find_losses`; `remarks_on_proofs`, which `check` ends with.
+Entry points: `proved_texts`, `find_losses`; `remarks_on_proofs`, which `check` ends with.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Literal, TypeAlias
 
 from msgspec import Struct
@@ -75,54 +75,6 @@ class Proof(Struct, frozen=True):
                 return f"the {self.kind} of `{self.script}`"
 
 
-class Loss(Struct, frozen=True):
-    """Something that was proved, and is proved no longer."""
-
-    proof: Proof
-    span: Span
-    """Where it stands."""
-
-
-class _ProvedText(Struct, frozen=True):
-    """A proof with its place."""
-
-    proof: Proof
-    span: Span
-
-
-def find_proofs(
-    course: Course, scripts: Collection[str] | None = None
-) -> dict[str, tuple[Proof, ...]]:
-    """What a check without errors has proved, by document.
-
-    `scripts` are those that were run; of others nothing is proved. `None`: all.
-    """
-    return {
-        path: tuple(proved.proof for proved in texts)
-        for path, texts in _proved_texts(course, scripts).items()
-    }
-
-
-def find_losses(course: Course, path: str, before: Sequence[Proof]) -> Iterator[Loss]:
-    """What was proved of a document before, still stands in it, and is proved no longer."""
-    texts = _proved_texts(course, None).get(path)
-    document = next((d for d in course.documents if d.source.path == path), None)
-    if texts is None or document is None:
-        return
-    now = Counter(_identity(proved.proof) for proved in texts)
-    spans = [proved.span for proved in texts]
-    for proof in before:
-        if now[_identity(proof)]:
-            now[_identity(proof)] -= 1
-            continue
-        for text, count in ((proof.text, proof.count), (proof.label, proof.labels)):
-            places = [*_places(document.source, text)] if text else []
-            free = [p for p in places if not any(span.contains(p) for span in spans)]
-            if free and len(places) >= count:
-                yield Loss(proof, min(free, key=lambda place: abs(place.line - proof.line)))
-                break
-
-
 def remarks_on_proofs(
     course: Course,
     store: Store,
@@ -136,75 +88,94 @@ def remarks_on_proofs(
     `documents` are the paths of those that were checked; `None`: all.
     """
     remarks = []
-    proofs = find_proofs(course, scripts)
-    for owner, document in course.owned_documents:
-        path = document.source.path
-        if documents is not None and path not in documents:
-            continue
+    owned_documents = [
+        (owner, document)
+        for owner, document in course.owned_documents
+        if documents is None or document.source.path in documents
+    ]
+    all_texts = proved_texts(course, (document for _, document in owned_documents))
+    for owner, document in owned_documents:
+        path, texts = document.source.path, all_texts[document.source.path]
+        proofs = tuple(proof for proof, _, script in texts if script is None or script in scripts)
         key = fingerprint(path)
         before = store.peek(KIND, key, value_reader(tuple[Proof, ...])) or ()
         losses = [
-            f"{loss.proof.describe()} in line {loss.span.line}"
-            for loss in find_losses(course, path, before)
+            f"{proof.describe()} in line {line}"
+            for proof, line in find_losses(document.source, texts, before)
         ]
         if losses:
             verb = "was proved before and is not now"
             if losses[1:]:
                 verb = "were proved before and are not now"
-            counts = Counter(proof.kind for proof in proofs[path]).items()
+            counts = Counter(proof.kind for proof in proofs).items()
             rest = ", ".join(plural(count, kind) for kind, count in counts) or "nothing"
             remarks.append(f"{owner.id}: {' and '.join(losses)} {verb} (proved: {rest})")
-        if is_green and proofs[path] != before:
-            store.put_value(KIND, key, proofs[path])
+        if is_green and proofs != before:
+            store.put_value(KIND, key, proofs)
     return tuple(remarks)
+
+
+ProvedText: TypeAlias = tuple[Proof, Span, str | None]
+"""A proof, its place, and the script that has to run for it, if one has."""
+
+
+def proved_texts(course: Course, documents: Iterable[Document]) -> dict[str, list[ProvedText]]:
+    """What is proved of documents where all scripts run, by their paths."""
+    texts = {d.source.path: [*_of_document(d)] for d in documents}
+    for _, trial in feature_trials(course).values():
+        span = trial.block.span
+        if span.path in texts:  # not in a model's file
+            texts[span.path].append((_proof("lab", _longest_line(span.text), span), span, None))
+    return texts
+
+
+def find_losses(
+    source: Source, texts: Sequence[ProvedText], before: Iterable[Proof]
+) -> Iterator[tuple[Proof, int]]:
+    """What was proved before, still stands in the text, and is proved no longer; with its line."""
+    now = Counter(_identity(proof) for proof, _, _ in texts)
+    for proof in before:
+        if now[_identity(proof)]:
+            now[_identity(proof)] -= 1
+            continue
+        for text, count in ((proof.text, proof.count), (proof.label, proof.labels)):
+            places = [*_places(source, text)] if text else []
+            free = [p for p in places if not any(span.contains(p) for _, span, _ in texts)]
+            if free and len(places) >= count:
+                yield proof, min((p.line for p in free), key=lambda line: abs(line - proof.line))
+                break
 
 
 def _identity(proof: Proof) -> tuple[Kind, str, str]:
     return proof.kind, proof.text, proof.script
 
 
-def _proved_texts(
-    course: Course, scripts: Collection[str] | None
-) -> dict[str, tuple[_ProvedText, ...]]:
-    texts = {d.source.path: [*_of_document(d, scripts)] for d in course.documents}
-    for _, trial in feature_trials(course).values():
-        span = trial.block.span
-        if span.path in texts:  # not in a model's file
-            texts[span.path].append(_proved("lab", _longest_line(span.text), span))
-    return {path: tuple(texts_of_path) for path, texts_of_path in texts.items()}
-
-
-def _of_document(document: Document, scripts: Collection[str] | None) -> Iterator[_ProvedText]:
-    def is_run(script: str | None) -> bool:
-        return script is not None and (scripts is None or script in scripts)
-
-    recordings = [r for r in find_blocks(document, Recording) if r.readable and is_run(r.script)]
+def _of_document(document: Document) -> Iterator[ProvedText]:
+    recordings = [r for r in find_blocks(document, Recording) if r.readable and r.script]
     for recording in recordings:
         kind: Kind = "table" if isinstance(recording.body, Table) else "output"
-        text = _longest_line(recording.body_span.text)
+        text, script = _longest_line(recording.body_span.text), recording.script or ""
         if text:
-            yield _proved(kind, text, recording.span, recording.script or "")
+            yield _proof(kind, text, recording.span, script), recording.span, script
     for binding in document_bindings(document):
         above = [r.script for r in recordings if r.body_span.end <= binding.span.start]
-        if is_run(binding.script or (above[-1] if above else None)):
-            yield _proved("value", binding.text, binding.span)
+        if binding_script := binding.script or (above[-1] if above else None):
+            yield _proof("value", binding.text, binding.span), binding.span, binding_script
     for figure in recorded_figures(document):
-        if is_run(figure.script):
-            yield _proved("figure", figure.name, figure.span, figure.script)
+        yield _proof("figure", figure.name, figure.span, figure.script), figure.span, figure.script
     for link in find_inlines(document, Link):
         text = link.target_span.text
         is_opaque = isinstance(link.target, UrlTarget) and _OPAQUE.match(text)
         if not link.mention and text and not is_opaque:
-            yield _proved("link", text, link.span)
+            yield _proof("link", text, link.span), link.span, None
 
 
-def _proved(kind: Kind, text: str, span: Span, script: str = "") -> _ProvedText:
+def _proof(kind: Kind, text: str, span: Span, script: str = "") -> Proof:
     label = span.text.partition("](")[0] + "]" if kind == "link" and span.text[:1] == "[" else ""
     places = [*_places(span.source, text)]
     place = next(filter(span.contains, places), span)
     labels = [*_places(span.source, label)] if label else []
-    proof = Proof(kind, text, script, len(places), place.line, label, len(labels))
-    return _ProvedText(proof, span)
+    return Proof(kind, text, script, len(places), place.line, label, len(labels))
 
 
 def _longest_line(text: str) -> str:

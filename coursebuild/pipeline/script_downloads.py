@@ -75,6 +75,7 @@ class _Course:
         self.files_of_module = functools.cache(
             functools.partial(module_files, folders=self._folders)
         )
+        self.imports_of_module = functools.cache(self._read_imports)
         self.read = functools.cache(functools.partial(read_bytes, options.root))
 
     def imports(self, extraction: Extraction) -> frozenset[str]:
@@ -100,6 +101,11 @@ class _Course:
             for file in self.files_of_module(top)
             if file.path.endswith(".py")
         }
+
+    def _read_imports(self, module: str) -> frozenset[str]:
+        """The top-level modules that the files of a module import, which many scripts may use."""
+        files = (file for file in self.files_of_module(module) if file.path.endswith(".py"))
+        return frozenset[str]().union(*(find_imports(file.data.decode()) for file in files))
 
     def files_of(self, extraction: Extraction) -> dict[str, bytes]:
         """The models and data that a script reads, by path; if it did not run, what it names."""
@@ -224,8 +230,7 @@ def _find_members(
                     continue
                 files = course_files.files_of_module(name)
                 members |= {f"{folder}/{file.path}": file.data for file in files}
-                texts = [file.data.decode() for file in files if file.path.endswith(".py")]
-                imports += map(find_imports, texts)
+                imports.append(course_files.imports_of_module(name))
                 foreign |= set() if files else {name}
     if "matplotlib" in foreign and course_files.style:
         members[_STYLE] = course_files.read(_STYLE)

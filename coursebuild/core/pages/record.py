@@ -199,12 +199,7 @@ def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
     """The characters outside ASCII of a page's text and of its formulas; see `PageFacts`."""
     parts = FORMULA.split(html)
     formulas = frozenset(" " if len(parts) > 1 else "")
-    return _characters("\n".join(parts[::2])), formulas.union(*map(_of_formula, parts[1::2]))
-
-
-@functools.lru_cache(maxsize=2048)
-def _of_formula(html: str) -> frozenset[str]:
-    return _characters(html)
+    return _characters("\n".join(parts[::2])), formulas.union(*map(_characters, parts[1::2]))
 
 
 def _characters(html: str) -> frozenset[str]:

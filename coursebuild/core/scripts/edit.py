@@ -23,6 +23,7 @@ import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import groupby, pairwise, zip_longest
+from typing import TypeVar
 
 from coursebuild.core import model
 from coursebuild.core.scripts.align import StepKind, align, same_lines
@@ -36,12 +37,14 @@ from coursebuild.core.scripts.lines import (
     replace_ranges,
     same_number,
 )
+from coursebuild.core.scripts.module_code import DEFINITIONS, first_line
 from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.scripts.tables import RowAddresses, TableMatcher, number_text
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import point_decimals, write_comma
 from coursebuild.core.text.source import Excerpt, Source, Span
 
+_T = TypeVar("_T")
 _FENCE = re.compile(r"`{3,}|~{3,}")
 
 
@@ -67,6 +70,22 @@ def edited_texts(edits: Iterable[Edit]) -> dict[Source, str]:
     for edit in edits:
         by_source.setdefault(edit.span.source, {})[edit] = None
     return {source: apply_edits(source.text, changes) for source, changes in by_source.items()}
+
+
+def select_harmless(
+    changes: Sequence[_T], is_harmless: Callable[[Sequence[_T]], bool], selection: Sequence[_T] = ()
+) -> list[_T]:
+    """As many of these changes as do no harm together, beside those that are chosen already.
+
+    Where they do harm, each half is tried by itself, down to single ones.
+    """
+    if not changes or is_harmless([*selection, *changes]):
+        return [*selection, *changes]
+    if len(changes) == 1:
+        return [*selection]
+    half = len(changes) // 2
+    selection = select_harmless(changes[:half], is_harmless, selection)
+    return select_harmless(changes[half:], is_harmless, selection)
 
 
 def update_body(
@@ -388,10 +407,9 @@ def _read_parts(text: str) -> dict[str, list[str]]:
 
     def add_parts(nodes: list[ast.stmt], prefix: str) -> None:
         for node in nodes:
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-                start = min([node.lineno, *(d.lineno for d in node.decorator_list)])
+            if isinstance(node, DEFINITIONS):
                 name = f"{prefix}{node.name}"
-                parts[name] = _lines("\n".join(rows[start - 1 : node.end_lineno]))
+                parts[name] = _lines("\n".join(rows[first_line(node) - 1 : node.end_lineno]))
                 add_parts(node.body, f"{name}.")
 
     with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):

@@ -7,8 +7,9 @@ for themselves.
 from __future__ import annotations
 
 import ast
+import functools
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
@@ -33,11 +34,7 @@ class ModuleCode:
     def __init__(self, name: str, source: CourseModule) -> None:
         self.name, self.source = name, source
         self.lines = source.text.split("\n")
-        self.statements = ast.parse(source.text).body
-        self.numbers: dict[str, list[int]] = {}
-        for number, statement in enumerate(self.statements):
-            for bound in bound_names(statement):
-                self.numbers.setdefault(bound, []).append(number)
+        self.statements, self.numbers = _read(source.text)
         self.needed: set[int] = set()
         self.uses: dict[str, None] = {}
         """The modules whose definitions those of this one need, by their names."""
@@ -94,7 +91,7 @@ class ModuleCode:
         return text
 
     def _piece(self, statement: ast.stmt) -> str:
-        first = _first_line(statement)
+        first = first_line(statement)
         lines = [line.encode() for line in self.lines[: statement.end_lineno]]
         for line, column, old, new in sorted(self._renamings(statement), reverse=True):
             row = lines[line - 1]
@@ -114,6 +111,16 @@ class ModuleCode:
             assert match is not None
             at = len(match[0].encode())
             yield statement.lineno, at, statement.name, self.new_names[statement.name]
+
+
+@functools.lru_cache(maxsize=256)
+def _read(text: str) -> tuple[Sequence[ast.stmt], Mapping[str, Sequence[int]]]:
+    """A module's statements, and the numbers of those that bind a name: many scripts share one."""
+    statements, numbers = ast.parse(text).body, dict[str, list[int]]()
+    for number, statement in enumerate(statements):
+        for bound in bound_names(statement):
+            numbers.setdefault(bound, []).append(number)
+    return statements, numbers
 
 
 def bound_names(statement: ast.stmt) -> tuple[str, ...]:
@@ -191,7 +198,8 @@ def _scope_names(nodes: Iterable[ast.AST]) -> frozenset[str]:
     return frozenset(names)
 
 
-def _first_line(statement: ast.stmt) -> int:
+def first_line(statement: ast.stmt) -> int:
+    """The number of a statement's first line, which may be that of a decorator."""
     decorators = statement.decorator_list if isinstance(statement, DEFINITIONS) else []
     return min([statement.lineno, *(node.lineno for node in decorators)])
 

@@ -136,9 +136,10 @@ class _File:
             ]
             if not course_imports:
                 is_import = isinstance(statement, ast.Import | ast.ImportFrom)
+                # A module may assign the same.
+                text = ast.unparse(statement) if isinstance(statement, ast.Assign) else "assigned"
                 for bound in bound_names(statement):
-                    text = ast.unparse(statement) if not is_import else None
-                    self._meanings[bound] = text or self._external(script, bound)
+                    self._meanings[bound] = self._external(script, bound) if is_import else text
                 continue
             is_whole = isinstance(statement, ast.Import | ast.ImportFrom)
             names = statement.names if isinstance(statement, ast.Import | ast.ImportFrom) else ()
@@ -146,7 +147,7 @@ class _File:
                 raise NotOneFileError(f"what line {statement.lineno} imports cannot stand there")
             ours += course_imports
             course_lines |= {*range(statement.lineno, (statement.end_lineno or 0) + 1)}
-        for node in ast.walk(ast.Module(script.statements, [])):
+        for node in ast.walk(ast.Module([*script.statements], [])):
             if isinstance(node, ast.Global):
                 self._meanings |= dict.fromkeys(node.names, "assigned")
         for bound, module_name, name in ours:  # the script's own names come first
@@ -178,6 +179,7 @@ class _File:
     def _module(self, name: str, source: CourseModule) -> ModuleCode:
         if name not in self._modules:
             self._modules[name] = ModuleCode(name, source)
+            self._modules[name].check()
         return self._modules[name]
 
     def _take(self, bound: str, module: str, name: str) -> None:
@@ -209,9 +211,8 @@ class _File:
                     pass
         if count or self._meanings.setdefault(bound, whole) != whole:
             raise NotOneFileError(f"`{bound}` is used as more than a module")
-        source = self._find_module(whole)
-        if source is not None:
-            self._module(whole, source).check()
+        if (source := self._find_module(whole)) is not None:
+            self._module(whole, source)
         place = self._module(f"{bound} =", CourseModule("", ""))
         user.uses[place.name] = None
         namespace = self._namespaces.setdefault(bound, {})
@@ -229,7 +230,6 @@ class _File:
             self._has_models = True
             return name
         module = self._module(module_name, source)
-        module.check()
         if module is not user:
             user.uses[module_name] = None
         statement = module.statement_of(name)
@@ -271,10 +271,11 @@ class _File:
             rows = module.imported(node) if isinstance(node, ast.Import | ast.ImportFrom) else ()
             if any(self._find_module(row[1]) for row in rows):
                 raise NotOneFileError(f"{module.source.path} imports inside of a definition")
+        own_names = bound_names(statement)
         for node in global_names(statement):
             if node.id in _OF_THE_FILE and node.id not in module.numbers:
                 raise NotOneFileError(f"{module.source.path} uses `{node.id}`")
-            if node.id not in module.numbers or node.id in bound_names(statement):
+            if node.id not in module.numbers or node.id in own_names:
                 continue
             origin = module.statement_of(node.id)
             if isinstance(origin, ast.Import | ast.ImportFrom):

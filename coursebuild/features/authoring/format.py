@@ -28,7 +28,7 @@ from coursebuild.api import (
 )
 from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.registry import fence_names
-from coursebuild.core.scripts.edit import apply_edits, whole_lines
+from coursebuild.core.scripts.edit import apply_edits, select_harmless, whole_lines
 from coursebuild.core.syntax.block_parser import block_tokens
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.syntax.fence import line_prefix, read_fence
@@ -62,23 +62,11 @@ def format_document(
 
     proposals = _Layout(source, width).edits(before.value)
     edits = sorted((e for e in proposals if e.text != e.span.text), key=lambda e: e.span.start)
-    return Parsed(apply_edits(source.text, _select_harmless(edits, [], is_harmless)))
+    return Parsed(apply_edits(source.text, select_harmless(edits, is_harmless)))
 
 
 def _errors(document: Parsed[model.Document]) -> tuple[Diagnostic, ...]:
     return tuple(d for d in document.diagnostics if d.is_error)
-
-
-def _select_harmless(
-    edits: list[Edit], selection: list[Edit], is_harmless: Callable[[Sequence[Edit]], bool]
-) -> list[Edit]:
-    if not edits or is_harmless(selection + edits):
-        return selection + edits
-    if len(edits) == 1:
-        return selection
-    half = len(edits) // 2
-    selection = _select_harmless(edits[:half], selection, is_harmless)
-    return _select_harmless(edits[half:], selection, is_harmless)
 
 
 def _meaning(document: model.Document) -> str:

@@ -135,19 +135,15 @@ def engine_names(store: Store, interpreter: Interpreter | None) -> EngineTable:
     folders = sys.path if interpreter is None else interpreter.packages
     packages = [Path(folder) for folder in folders if folder.endswith("-packages")]
     states = [str(folder.stat().st_mtime_ns) for folder in packages if folder.is_dir()]
-    key = key_of(engine, version, python, *states, _code())
+    files = (introspect.__file__, mjcf.__file__)
+    code = [Path(file).read_text("utf-8") for file in files]
+    key = key_of(engine, version, python, *states, *code)
     data = _in_memory.get(key) or store.get(_KIND, key, bytes)
     if data is None:
         data = msgspec.json.encode(list_names(python))
         store.put(_KIND, key, data)
     _in_memory[key] = data
     return EngineTable(data)
-
-
-@functools.cache
-def _code() -> str:
-    files = (introspect.__file__, mjcf.__file__)
-    return "".join(Path(file).read_text("utf-8") for file in files)
 
 
 _in_memory: dict[str, bytes] = {}

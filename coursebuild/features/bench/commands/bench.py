@@ -79,7 +79,12 @@ def run(arguments: argparse.Namespace) -> int:
     require("mjbench", "measure", "`coursebuild bench`")
     names, quick, record = tuple(arguments.scenes), arguments.quick, arguments.record
     if arguments.engines is not None:
-        _refuse_options_of_bench(arguments)
+        if arguments.check:
+            raise UsageError(
+                "--check takes no --engines: 32 bits do not repeat from one device to the next"
+            )
+        if arguments.executor is not None:
+            raise UsageError("--engines measures engines on this machine, not on others")
     report, field = ("bench", "scenes") if arguments.engines is None else ("engines", "engines")
 
     def measure(options: Options) -> Measurement[Any]:
@@ -277,14 +282,6 @@ class EngineChoice(Struct, frozen=True):
 
     engines: tuple[tuple[str, tuple[tuple[str, str], ...]], ...]
     remarks: tuple[str, ...]
-
-
-def _refuse_options_of_bench(arguments: argparse.Namespace) -> None:
-    if arguments.check:
-        message = "--check takes no --engines: 32 bits do not repeat from one device to the next"
-        raise UsageError(message)
-    if arguments.executor is not None:
-        raise UsageError("--engines measures engines on this machine, not on others")
 
 
 def choose_engines(mjbench: Mjbench, text: str) -> EngineChoice:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,11 +74,8 @@ def _compressed(pixels: NDArray[np.uint8], opaque: bool) -> bytes:
 def _file(pixels: NDArray[np.uint8], opaque: bool, chunks: Sequence[tuple[bytes, bytes]]) -> bytes:
     height, width = pixels.shape[:2]
     header = struct.pack(">IIBBBBB", width, height, 8, 2 if opaque else 6, 0, 0, 0)
-    parts = ((b"IHDR", header), *chunks, (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunks(parts))
-
-
-def _chunks(parts: Sequence[tuple[bytes, bytes]]) -> Iterator[bytes]:
-    for name, data in parts:
-        chunk = name + data
-        yield struct.pack(">I", len(data)) + chunk + struct.pack(">I", zlib.crc32(chunk))
+    parts = [b"\x89PNG\r\n\x1a\n"]
+    for name, data in ((b"IHDR", header), *chunks, (b"IEND", b"")):
+        check = zlib.crc32(name + data)
+        parts += struct.pack(">I", len(data)), name, data, struct.pack(">I", check)
+    return b"".join(parts)
