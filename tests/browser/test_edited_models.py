@@ -93,7 +93,9 @@ CART = """<mujoco>
   <keyframe><key name="near" qpos="0"/><key name="far" qpos="3"/></keyframe>
 </mujoco>"""
 FLOOR = '<geom name="floor" type="plane" size="2 2 1" pos="0 0 -1"/>'
-OVERFLOWING = "rows => rows.filter(row => row.scrollWidth > row.clientWidth).map(row => row.innerText)"
+OVERFLOWING = (
+    "rows => rows.filter(row => row.scrollWidth > row.clientWidth).map(row => row.innerText)"
+)
 
 
 def test_panel_of_a_model_has_its_actuators_sensors_cameras_and_keyframes(page: Page) -> None:
