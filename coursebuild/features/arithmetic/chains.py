@@ -134,8 +134,8 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
     `0 = 1` ends a proof by contradiction, and of whole numbers `/` may be a division without rest.
     """
     sides = left.get_expression(), right.get_expression()
-    if sides[0].ends_in_unit() and sides[0].parts[0].text == "1" and not sides[1].has("unit"):
-        return "it says how many one of them is"  # `1\text{ dozen} = 12`
+    if _says_how_many(*sides):
+        return "it says how many one of them is"
     if _may_hold(sides, relation):
         return "its unit may be that of another part"
     units = (part.text for side in sides for part in side.walk() if part.kind == "unit")
@@ -153,6 +153,18 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
     if quotient is not None and int(quotient[1]) // int(quotient[2]) == int(second):
         return "`/` may be the division of whole numbers"
     return ""
+
+
+def _says_how_many(left: Expression, right: Expression) -> bool:
+    r"""Whether `1\text{ dozen} = 12`, `2\text{ dozen} = 24` or `24 = 2\text{ dozen}`.
+
+    Behind what is computed, as in `3\cdot4 = 12\text{ steps}`, a word says what is counted.
+    """
+    if left.ends_in_unit() and not right.has("unit"):
+        return left.parts[0].text == "1" or not find_units(left.parts[1].text)
+    if right.ends_in_unit() and not left.has("unit"):
+        return left.kind == "number" and not find_units(right.parts[1].text)
+    return False
 
 
 def _is_of_numbers(side: FormulaSide, symbols: Mapping[str, SymbolQuantity]) -> bool:

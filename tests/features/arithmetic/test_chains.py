@@ -341,7 +341,13 @@ def test_what_no_decimal_can_hold_is_rounded_after_an_equals_sign() -> None:
 
 
 def test_how_many_one_is_of_a_word_is_said_and_not_computed() -> None:
-    for tex in (r"1\text{ dozen} = 12", r"1\ \mathrm{mol} = 6.022\times10^{23}"):
+    for tex in (
+        r"1\text{ dozen} = 12",
+        r"24 = 2\text{ dozen}",
+        r"3 \cdot 2\text{ pairs} = 12",
+        r"4\ \mathrm{min^{1/2}} = 31",
+        r"1\ \mathrm{mol} = 6.022\times10^{23}",
+    ):
         assert {c.kind for c in check_arithmetic(tex)} == {"unread"}
     for tex in (r"2\cdot6 = 13\text{ eggs}", r"1\ \mathrm m = 99\ \mathrm{cm}"):
         assert {c.kind for c in check_arithmetic(tex)} == {"wrong"}
