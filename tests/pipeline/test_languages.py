@@ -69,3 +69,46 @@ def test_a_lesson_has_a_language_of_its_own(make: Make) -> None:
     renamed = folder.text("content/lessons/1.2-two.md")
     assert "Voir la leçon 1.5, ou" in renamed
     assert "Comme dans la leçon 1.5." in renamed
+
+
+QUIZ = """
+```python file=examples/answers.py
+print("period 83.4 min")
+print("share 6.6e-05, pair 1,5")
+```
+
+```output
+period 83.4 min
+share 6.6e-05, pair 1,5
+```
+
+```quiz
+{"id": "period", "questions": [
+  {"kind": "numeric", "q": "T?", "answer": "`83,4`{out}", "tol": 0.1, "unit": "min"},
+  {"kind": "numeric", "q": "f?", "answer": "`6,6·10⁻⁵`{out}"},
+  {"kind": "numeric", "q": "m?", "answer": 2.5, "unit": "kg m^2"}
+]}
+```
+"""
+
+
+def test_numbers_of_a_quiz_are_those_of_its_language(make: Make) -> None:
+    folder = make(GOOD + QUIZ)
+    refused = folder.main("check")
+    assert refused.status == 1
+    assert "`answer` must be a number, not ``83,4`{out}`" in refused.out, "83 and 4 in English"
+
+    text = folder.text("content/course.toml")
+    folder.write("content/course.toml", text.replace("[course]", '[course]\nlanguage = "de"', 1))
+    assert folder.main("build").status == 0
+    html = folder.text("public/lessons/1.1-one.html")
+    assert '<strong>83,4 min</strong> <span class="tolerance">auf 0,1 min genau</span>' in html
+    assert "<strong>2,5 kg m<sup>2</sup></strong>" in html
+    assert "auf 0,05 kg m<sup>2</sup> genau" in html
+    for answer in ("83.4", "6.6e-05", "2.5"):
+        assert f'data-answer="{answer}"' in html, "what the page's script compares with"
+    assert "83,4 min (auf 0,1 min genau)." in folder.text("public/lessons/1.1-one.md")
+
+    lesson = folder.text("content/lessons/1.1-one.md").replace("83,4`", "83,5`")
+    folder.write("content/lessons/1.1-one.md", lesson)
+    assert "error[binding-mismatch]" in folder.main("check").out

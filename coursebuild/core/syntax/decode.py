@@ -38,7 +38,7 @@ from coursebuild.core.syntax.nodes import (
 from coursebuild.core.text.characters import REORDERING
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, propose
 from coursebuild.core.text.near import nearest
-from coursebuild.core.text.numbers import only_number
+from coursebuild.core.text.numbers import point_decimals, scan_prose
 from coursebuild.core.text.source import Span
 
 S = TypeVar("S", bound=Struct)
@@ -71,9 +71,14 @@ class Decoding(Struct, Generic[S], frozen=True):
                 yield node, struct
 
 
-def decode(node: Node, type: type[S], name: str, format: Format) -> Decoding[S]:
-    """Read a node as a struct; messages call the whole `name`, as in `the quiz`."""
-    decoder = _Decoder(format)
+def decode(
+    node: Node, type: type[S], name: str, format: Format, *, comma: bool = False
+) -> Decoding[S]:
+    """Read a node as a struct; messages call the whole `name`, as in `the quiz`.
+
+    Bound numbers are in a language that may have a comma before decimals.
+    """
+    decoder = _Decoder(format, comma)
     value = decoder.decode_value(node, _type_info(type), name)
     whole = value if isinstance(value, type) else None
     return Decoding(whole, tuple(decoder.diagnostics), decoder.structs, tuple(decoder.texts))
@@ -85,8 +90,9 @@ _type_info = functools.cache(inspect.type_info)
 class _Decoder:
     """One walk; methods return the value of a node, or report and return `_INVALID`."""
 
-    def __init__(self, format: Format) -> None:
+    def __init__(self, format: Format, comma: bool) -> None:
         self.format = format
+        self.comma = comma
         self.diagnostics: list[Diagnostic] = []
         self.structs: dict[ObjectNode, Struct] = {}
         self.texts: list[tuple[StringNode, str]] = []
@@ -175,8 +181,10 @@ class _Decoder:
     def decode_bound_number(self, node: StringNode, name: str) -> object:
         """The number of a text such as `` `1.42`{out} ``."""
         match = _BOUND_NUMBER.fullmatch(node.value.strip())
-        number = None if match is None else only_number(match["text"])
-        if number is None or not number.is_finite:
+        text = "" if match is None else match["text"].strip()
+        text = point_decimals(text) if self.comma else text
+        number = next(iter(scan_prose(text)), None)
+        if number is None or number.text != text or not number.is_finite:
             message = f"{format_name(name)} must be a number, not {format_value(node)}"
             help = "a text binds a number to what a script printed: `1.42`{out=examples/x.py}"
             return self.report("field-type", node.mark, message, help)

@@ -262,6 +262,11 @@ def line_prefix(place: Span) -> str:
 class TextParser(Protocol):
     """Parses Markdown inside another language; the spans of nodes point into the lesson."""
 
+    @property
+    def has_decimal_comma(self) -> bool:
+        """Whether numbers of the text may have a comma before their decimals."""
+        ...
+
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[Block, ...]]:
         """The blocks of a text; math between the tags of HTML is math. Never raises."""
         ...

@@ -375,6 +375,11 @@ class NestedTextParser:
     def __init__(self, state: ParsingState) -> None:
         self._state = state
 
+    @property
+    def has_decimal_comma(self) -> bool:
+        """Whether the language of the text has a comma before decimals."""
+        return self._state.has_decimal_comma
+
     def blocks(self, excerpt: Excerpt) -> Parsed[tuple[model.Block, ...]]:
         """The blocks of a text; HTML becomes an `HtmlFlow`."""
         base = normalize(excerpt)

@@ -94,7 +94,7 @@ def parse_lab(
     if node is None:
         return Parsed(None, sort_diagnostics(json.diagnostics))
     fields_type: type[SimLab] | type[CommonLab] = SimLab if kind == SIMLAB else CommonLab
-    decoding = decode(node, fields_type, "the lab", JSON)
+    decoding = decode(node, fields_type, "the lab", JSON, comma=texts.has_decimal_comma)
     prose = Prose.read(decoding.texts, texts)
     diagnostics = [*json.diagnostics, *decoding.diagnostics, *prose.diagnostics]
     lab: Lab | None = None

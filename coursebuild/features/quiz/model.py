@@ -58,8 +58,9 @@ class NumericQuestion(Question, frozen=True):
 
     answer: float
     answer_text: str
-    """As the author wrote it."""
+    """As readers see it, without the unit; so is `tolerance_text`."""
     tolerance: float
+    tolerance_text: str
     unit: str
 
 

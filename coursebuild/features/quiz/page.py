@@ -85,7 +85,7 @@ def _grading_attributes(
             if question.run is not None:
                 yield "run", question.run.text
         case quizzes.NumericQuestion():
-            yield "answer", question.answer_text
+            yield "answer", repr(question.answer).removesuffix(".0")
             yield "tolerance", repr(question.tolerance)
             yield "unit", question.unit
         case quizzes.OpenQuestion():
@@ -213,9 +213,9 @@ def _answer(writer: MarkdownWriter, question: quizzes.AnyQuestion) -> list[str]:
             sim = writer.blocks((question.sim,)) if question.sim is not None else ""
             return [f"{right}.", explain, "\n".join(feedback), sim]
         case quizzes.NumericQuestion():
-            unit = f" {escape_marks(question.unit)}" if question.unit else ""
-            tolerance = writer.words("quiz.tolerance", tolerance=f"{question.tolerance:.3g}")
-            return [f"{escape_marks(question.answer_text)}{unit} ({tolerance}).", explain]
+            unit = f" {question.unit}" if question.unit else ""
+            tolerance = writer.words("quiz.tolerance", tolerance=question.tolerance_text + unit)
+            return [escape_marks(f"{question.answer_text}{unit} ({tolerance})."), explain]
         case quizzes.OpenQuestion():
             return [writer.blocks(question.reference), explain]
         case quizzes.OutputQuestion():

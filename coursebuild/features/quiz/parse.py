@@ -33,6 +33,7 @@ from coursebuild.core.syntax.fence import with_units
 from coursebuild.core.syntax.json_text import to_one_line
 from coursebuild.core.syntax.nodes import JSON, Node, ObjectNode, StringNode
 from coursebuild.core.text.diagnostics import sort_diagnostics
+from coursebuild.core.text.numbers import write_comma
 from coursebuild.core.text.source import key_of, unique_name
 from coursebuild.core.text.units import check_unit
 from coursebuild.features.lab.parse import sim_lab
@@ -58,7 +59,8 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[model.Qui
     node = json.value
     if node is None:
         return Parsed(None, sort_diagnostics(json.diagnostics))
-    decoding = decode(node, schema.QuizFile, "the quiz", JSON)
+    comma = texts.has_decimal_comma
+    decoding = decode(node, schema.QuizFile, "the quiz", JSON, comma=comma)
     prose = Prose.read(decoding.texts, texts)
     diagnostics = [*json.diagnostics, *decoding.diagnostics, *prose.diagnostics]
     if not isinstance(node, ObjectNode):
@@ -76,7 +78,7 @@ def parse_quiz(span: Span, body: Excerpt, texts: TextParser) -> Parsed[model.Qui
     for question_node in nodes:
         # If its JSON is wrong, nobody knows what its texts were meant to be.
         is_garbled = any(question_node.span.contains(d.span) for d in json.diagnostics)
-        question = _question(question_node, keys.get(question_node, ""), decoding, prose)
+        question = _question(question_node, keys.get(question_node, ""), decoding, prose, comma)
         if question is None or is_garbled:
             continue
         if isinstance(question, model.ChoiceQuestion) and question.sim is not None:
@@ -166,7 +168,7 @@ def _check_distinct(node: ObjectNode, name: str, message: str) -> Iterator[Diagn
 
 
 def _question(
-    node: ObjectNode, key: str, decoding: Decoding[schema.QuizFile], prose: Prose
+    node: ObjectNode, key: str, decoding: Decoding[schema.QuizFile], prose: Prose, comma: bool
 ) -> model.AnyQuestion | None:
     fields = decoding.structs.get(node)
     if not isinstance(fields, schema.AnyFields):
@@ -193,12 +195,18 @@ def _question(
             )
         case schema.Numeric():
             answer: Node | None = node.get("answer")
-            answer_text = answer.raw if answer is not None else ""
+            write = write_comma if comma else str
+            answer_text = write(answer.raw) if answer is not None else ""
             if isinstance(answer, StringNode):
                 answer_text = answer.value.split("`")[1]
             tolerance = TOLERANCE * abs(fields.answer) if fields.tol is None else fields.tol
             return model.NumericQuestion(
-                *common, fields.answer, answer_text, tolerance, fields.unit
+                *common,
+                fields.answer,
+                answer_text,
+                tolerance,
+                write(f"{tolerance:.3g}"),
+                fields.unit,
             )
         case schema.Open():
             return model.OpenQuestion(*common, prose.blocks(node.get("reference")))

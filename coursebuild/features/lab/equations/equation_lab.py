@@ -72,7 +72,8 @@ def parse_equations(
     if text.value is None:
         return Parsed(None, sort_diagnostics(text.diagnostics))
     fields_type: type[schema.EquationLab] = schema.PlotLab if kind == PLOT else schema.OdeLab
-    decoding = decode(text.value, fields_type, "the lab", JSON if is_json else TOML)
+    form, comma = JSON if is_json else TOML, texts.has_decimal_comma
+    decoding = decode(text.value, fields_type, "the lab", form, comma=comma)
     prose = Prose.read(decoding.texts, texts)
     diagnostics = [*text.diagnostics, *decoding.diagnostics, *prose.diagnostics]
     node, lab = text.value, None
