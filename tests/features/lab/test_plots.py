@@ -213,3 +213,14 @@ def test_texts_are_escaped() -> None:
     assert texts(root, "lab-name") == [clean]
     assert clean in root.attrib["aria-label"]
     assert not list(root.iter("script"))
+
+
+def test_a_plot_is_named_by_words_of_its_lab_alone() -> None:
+    """They are in the language of the page."""
+    for fields, name in (
+        ({"ylabel": "Winkel (rad)", "xlabel": "Zeit (s)"}, "Winkel (rad), Zeit (s), oben, unten"),
+        ({"ylabel": "Winkel (rad)", "xlabel": ""}, "Winkel (rad), oben, unten"),
+        ({"ylabel": "", "xlabel": ""}, "oben, unten"),
+    ):
+        root = draw_plot([[0.0, 1.0], [1.0, 2.0]], spec=plot("oben", "unten", **fields))
+        assert root.attrib["aria-label"] == name

@@ -217,10 +217,10 @@ def plot_svg(
         f'<circle class="lab-measured" cx="{frame.x(x):.1f}" cy="{frame.y(y):.1f}" r="3"/>'
         for x, y in marks
     ]
-    title = f"{plot.ylabel} against {plot.xlabel}" if plot.ylabel else "plot"
+    title = ", ".join(filter(None, (plot.ylabel, plot.xlabel, *labels)))  # in any language
     return (
         f'<svg class="lab-plot" viewBox="0 0 {frame.width:g} {_HEIGHT:g}" role="img" '
-        f'aria-label="{_text(": ".join((title, ", ".join(labels))))}">' + "".join(parts) + "</svg>"
+        f'aria-label="{_text(title)}">' + "".join(parts) + "</svg>"
     )
 
 
