@@ -74,13 +74,15 @@ def test_a_lesson_has_a_language_of_its_own(make: Make) -> None:
 QUIZ = """
 ```python file=examples/answers.py
 print("period 83.4 min")
-print("share 6.6e-05, pair 1,5")
+print("share 6.6e-05, mass 1,234,567 kg")
 ```
 
 ```output
 period 83.4 min
-share 6.6e-05, pair 1,5
+share 6.6e-05, mass 1,234,567 kg
 ```
+
+The mass is `1.234.567 kg`{out}.
 
 ```quiz
 {"id": "period", "questions": [

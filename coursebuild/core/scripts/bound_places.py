@@ -213,7 +213,8 @@ class BoundNumber(Struct, frozen=True, dict=True):
         binding, texts = self.binding, [text for group in self.groups for text in group]
         with_comma = BoundText.of(binding.text, binding.comma)
         as_printed = BoundText.of(binding.text)
-        is_list = with_comma.comma and as_printed.is_in(texts) and not with_comma.is_in(texts)
+        may_be_list = with_comma.comma and bool(as_printed.numbers)  # none in `1.234.567`
+        is_list = may_be_list and as_printed.is_in(texts) and not with_comma.is_in(texts)
         return as_printed if is_list else with_comma
 
     @property
