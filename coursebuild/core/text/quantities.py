@@ -66,7 +66,7 @@ _TEX_SIGNS = (
     (re.compile(r"\\[,;:! ]|[~$]"), " "),
     (re.compile(r"\(\s+"), "("),
 )
-_BRACKET = re.compile(r"(?P<before>.?)[(\[](?P<unit>(?:[^()\[\]]|\([^()]*\))*)[)\]]\s*\Z")
+_BRACKET = re.compile(r"(?P<before>(?<!/)|[^/])[(\[](?P<unit>(?:[^()\[\]]|\([^()]*\))*)[)\]]\s*\Z")
 _BRACKET_WITH_WORDS = re.compile(
     r"\A[^()\[\]\s]*?(?P<before>.?)[(\[](?P<unit>(?!min,)[^()\[\],]+)"
     r"(?:, [^\W\d_][^()\[\]]{2,}[)\]]|[)\]] of [^()\[\]]*)\Z"
@@ -75,13 +75,15 @@ _BRACKET_WITH_WORDS = re.compile(
 _BEHIND_COMMA = re.compile(r"[^\W\d_]{2}|.*[/^²³°A-Z].*|[a-z]+s")
 """What is a unit behind a comma, as in `duration, ms`; another word may be one as well."""
 _SOLIDUS = re.compile(r"\s*/\s*(?P<unit>[^/=:]+)\Z")
+_DENOMINATOR = re.compile(r"(?<=\w/)\([^()]*\)")
+"""As in `c in J/(g K)`, a part of a unit and not the unit in brackets."""
 _IN_WORDS = re.compile(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
 _SYMBOL = re.compile(r"\w{1,2}|\\[a-z]+")
 _TO_NUMBER = re.compile(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
 """From the end of a label to a number, perhaps past other numbers."""
 _CELLS = (
     re.compile(r"\u2026|[^\s|;,\u2026](?:(?!\s\s|\s*[\t|;,]|\u2026).)*"),
-    re.compile(r"\u2026|[^\s|;,\u2026]+(?: ?[(\[][^()\[\]]*[)\]])?"),
+    re.compile(r"\u2026|[^\s|;,\u2026]+(?: ?[(\[](?:[^()\[\]]|\([^()\[\]]*\))*[)\]])?"),
 )
 """Cells of a row, with wide gaps or signs between them, and with single spaces.
 
@@ -228,6 +230,7 @@ def numbers_of_quantities(text: str, numbers: Iterable[Number]) -> tuple[Number,
 def unit_of_header(text: str) -> UnitText:
     """The unit in a label or the header of a column: `τ (min)`, `v [m/s]`, `t / s`, `time in s`."""
     text = plain_unit(text[-2 * _REACH :])
+    text = _DENOMINATOR.sub(lambda match: match[0].replace(" ", "·"), text)
     bracket = _BRACKET_WITH_WORDS.search(text) or _BRACKET.search(text)
     if bracket is not None:
         unit = read_unit(bracket["unit"].rstrip("."))
