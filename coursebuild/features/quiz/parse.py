@@ -33,7 +33,6 @@ from coursebuild.core.syntax.fence import with_units
 from coursebuild.core.syntax.json_text import to_one_line
 from coursebuild.core.syntax.nodes import JSON, Node, ObjectNode, StringNode
 from coursebuild.core.text.diagnostics import sort_diagnostics
-from coursebuild.core.text.numbers import write_comma
 from coursebuild.core.text.source import key_of, unique_name
 from coursebuild.core.text.units import check_unit
 from coursebuild.features.lab.parse import sim_lab
@@ -195,8 +194,8 @@ def _question(
             )
         case schema.Numeric():
             answer: Node | None = node.get("answer")
-            write = write_comma if comma else str
-            answer_text = write(answer.raw) if answer is not None else ""
+            point = "," if comma else "."
+            answer_text = answer.raw.replace(".", point) if answer is not None else ""
             if isinstance(answer, StringNode):
                 answer_text = answer.value.split("`")[1]
             tolerance = TOLERANCE * abs(fields.answer) if fields.tol is None else fields.tol
@@ -205,7 +204,7 @@ def _question(
                 fields.answer,
                 answer_text,
                 tolerance,
-                write(f"{tolerance:.3g}"),
+                f"{tolerance:.3g}".replace(".", point),
                 fields.unit,
             )
         case schema.Open():
