@@ -331,8 +331,9 @@ def script_lines(
     """Make the lines of a report about scripts.
 
     Some figures are not as they are recorded. Scripts that are `left_out` could not be extracted,
-    or have no interpreter.
+    or have no interpreter. A file without a runner that a script has read is data, and no script.
     """
+    read_paths = {file for run in runs if run.trace is not None for file in run.trace.files}
     unproven = count_unproven(course, runs, verdicts)
     drifted_paths = {v.recording.script for v in verdicts if v.status == "drift"}
     recorded_paths = {v.recording.script for v in verdicts if v.status == "verified"}
@@ -340,6 +341,9 @@ def script_lines(
     recorded_paths |= {figure.script for figure in figures if figure.span not in drifted_figures}
     lines = []
     for extraction, script_run in zip(extractions, runs, strict=True):
+        is_data = not (extraction.is_run or extraction.script.norun or extraction.script.is_python)
+        if is_data and extraction.path in read_paths:
+            continue
         drift = script_run.outcome is Outcome.OK and script_run.path in drifted_paths
         status = "drift" if drift else script_run.outcome.value
         if script_run.outcome is Outcome.OK and is_lost(extraction, script_run):
@@ -368,7 +372,10 @@ def script_lines(
 def _unrun_reason(extraction: Extraction, status: str) -> str:
     if status == Outcome.UNRECORDED.value:
         return "nothing recorded"
-    return "record=once" if extraction.script.once else "norun"
+    if extraction.script.once:
+        return "record=once"
+    has_none = not (extraction.is_run or extraction.script.norun)
+    return f"no runner for `{extraction.script.language}`" if has_none else "norun"
 
 
 def measure_sensitivity(

@@ -39,7 +39,7 @@ class ScriptLine(Struct, frozen=True):
     unrepeated: bool = False
     """Whether what is recorded of it was recorded from its only run."""
     reasons: tuple[str, ...] = ()
-    """What kept it from running: missing modules, `norun`."""
+    """What kept it from running: missing modules, `norun`, no runner."""
 
     @property
     def did_run(self) -> bool:

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from support.scratch_course import Folder, Make
+from support.scratch_course import Folder, Make, block
 
 pytestmark = pytest.mark.site
 
@@ -65,12 +65,22 @@ def test_without_a_runner_it_is_shown_and_said_to_be_not_run(course: Folder) -> 
     course.write(course.lesson(), f"## Mean\n\n{text}")
     result = course.run("build")
     assert result.status == 0, result.out
-    assert "norun    examples/mean.R" in result.out
+    assert "norun    examples/mean.R  (no runner for `r`; " in result.out
     page = course.text("public/lessons/1.1-one.html")
     assert "this script is not run when the site is built" in page
     result = course.run("check", "--strict")
     assert result.status == 1
     assert "`[runners]` of the map has nothing for `r`" in result.out
+
+
+def test_a_file_that_a_script_reads_is_no_script_that_was_not_run(course: Folder) -> None:
+    data = "```csv file=examples/fall.csv\n1,4.905\n```\n\n"
+    reads = block("read.py", 'print(open("examples/fall.csv").read().strip())', "1,4.905")
+    course.write(course.lesson(), f"## Fall\n\n{data}{reads}")
+    result = course.run("check", "--strict")
+    assert (result.status, "fall.csv" in result.out) == (0, False), result.out
+    course.write(course.lesson(), f"## Fall\n\n{data}{block('read.py', 'print(1)', '1')}")
+    assert "norun    examples/fall.csv  (no runner for `csv`)" in course.run("check").out
 
 
 def test_a_runner_that_is_not_installed_skips_its_scripts(course: Folder) -> None:

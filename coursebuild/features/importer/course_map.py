@@ -14,6 +14,7 @@ from collections.abc import Iterator, Mapping
 from textwrap import shorten
 from typing import Any
 
+from markdown_it import MarkdownIt
 from msgspec.structs import replace
 
 from coursebuild.api import UsageError, model
@@ -279,8 +280,7 @@ def _read_file(
         words = f"“{title}” is “{read.title}”"
         files.account.change("title in the map", "the title of the text itself", words)
         title = read.title
-    title = _ROLE.sub(r"\1", title or read.title) or title_of_file(text.file)
-    title = " ".join(title.split())
+    title = _plain_text(_ROLE.sub(r"\1", title or read.title)) or title_of_file(text.file)
     slug = slug_of(slug or title_of_file(text.file))
     if not re.search("[a-z]", slug):
         slug = slug_of(title)
@@ -301,6 +301,17 @@ _TAG_BESIDE_BLOCK = re.compile(
 )
 _ROLE = re.compile(r"\{[a-z][\w:-]*\}`([^`]*?)(?:\s*<[^`<>]*>)?`")
 """A role of MyST, of which the map, where titles are plain, keeps the words."""
+
+
+def _plain_text(title: str) -> str:
+    """The words of a title without Markdown, for the map."""
+    (inline,) = MarkdownIt("commonmark").parseInline(title)
+    words = (
+        " " if part.type.endswith("break") or part.content.startswith("<br") else part.content
+        for part in inline.children or ()
+        if part.type != "html_inline" or part.content.startswith("<br")
+    )
+    return " ".join("".join(words).split())
 
 
 def map_lines(

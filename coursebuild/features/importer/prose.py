@@ -351,9 +351,10 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "math":
             if context.is_gitbook and whole[:2] != "$$":
                 return rf"\${_rewrite_line(whole[1:-1], context)}\$"
-            return (
-                whole if _WORD.search(whole) else _TIGHT.sub(lambda m: f"${m[1].strip()}$", whole)
-            )
+            formula = whole.replace("&lt;", "<").replace("&gt;", ">")  # as some notebooks hold it
+            if _WORD.search(formula):
+                return whole
+            return _TIGHT.sub(lambda m: f"${m[1].strip()}$", formula)
         case "code":
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)

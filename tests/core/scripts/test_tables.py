@@ -234,6 +234,8 @@ def test_svg_differs_by_parts_words_and_places() -> None:
     base = recorded('<path d="M0 0L10 1"/>')
     for inside, wording in CASES["svg"]:
         assert describe_difference("x.svg", base, recorded(inside)) == wording, inside
+    broken = describe_difference("x.svg", base[:30], base)
+    assert broken.startswith("the recorded file is not an SVG file: ")
 
 
 def test_png_differs_by_pixels() -> None:

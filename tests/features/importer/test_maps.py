@@ -40,10 +40,10 @@ def import_map(folder: Path, files: dict[str, str]) -> tuple[Outline, list[str],
 def test_titles_are_the_words_of_the_roles_in_them(tmp_path: Path) -> None:
     files = {
         "a.md": "# {index}`NumPy <single: NumPy>`\n\nText.\n",
-        "b.md": "# Use of {py:func}`run` and `{x}`\n\nText.\n",
+        "b.md": "# Use of {py:func}`run` and *the* `{x}`\n\nText.\n",
     }
     ((_, titles),), *_ = import_map(tmp_path, files)
-    assert titles == ["NumPy", "Use of run and `{x}`"]
+    assert titles == ["NumPy", "Use of run and the {x}"]
 
 
 def test_a_book_of_gitbook_says_where_its_summary_is(tmp_path: Path) -> None:
