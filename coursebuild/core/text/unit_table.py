@@ -123,8 +123,9 @@ degR 5/9 K rankine Rankine
 ″ π/648000 rad arcsec arcsecond arcseconds
 mas? π/648000000 rad
 gon π/200 rad gradian gradians
-rev 1,2π cycle revolution revolutions Umdrehung Umdrehungen tr tour tours
+rev 1,2π cycle revolution revolutions Umdrehung Umdrehungen
 U!? 1,2π cycle
+tr!? 1,2π cycle
 turn? 1,2π cycle turns
 rpm 1/60,π/30 cycle/s RPM
 rps 1,2π cycle/s RPS
