@@ -42,8 +42,8 @@ class ColumnTitle(Struct, frozen=True):
         """The words and the unit of a cell of a header."""
         title = cell_text(cell, ())
         unit = unit_of_header(title.text)
-        texts = (text.replace(" ", "·") for text in (title.text, unit.text))  # `J/(kg K)`
-        at = str.rfind(*texts) if unit else -1
+        text = title.text.replace(" ", "·")  # `J/(kg K)`
+        at = text.rfind(unit.text.replace(" ", "·")) if unit else -1
         if at < 0:
             return cls(cell.span, title.text, _words(title.text), unit, cell.span)
         inlines = model.walk_inlines(cell.children)
