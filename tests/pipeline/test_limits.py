@@ -176,16 +176,16 @@ SLOPE = 60_000
 packed tree."""
 
 
-def write_course(folder: Folder, count: int, size: int = TEXT) -> None:
-    """Write a course of some lessons, each with as much prose.
+def write_course(folder: Folder, count: int, thing: str, size: int = TEXT) -> None:
+    """Write a course of some lessons, each with as much prose of a thing.
 
     A level has ten lessons, since each of its pages lists them all.
     """
     ids = [f"{1 + n // 10}.{1 + n % 10}" for n in range(count)]
     entries = ['[course]\ntitle = "Long"\n']
     for n, (id_, following) in enumerate(zip(ids, ids[1:] + ids[:1], strict=True)):
-        prose = "What is said of *this* thing is said of `that` one. " * 6 + "\n\n"
-        code = "\n".join(f"print({i})" for i in range(120))
+        prose = f"What is said of *this* {thing} is said of `that` one. " * 6 + "\n\n"
+        code = "\n".join(f"print({i})  # {thing}" for i in range(120))
         text = block(f"s{n}.py", code, info="norun") + prose * (size // len(prose))
         links = f"See [there](#part), and [the next](lesson:{following}).\n"
         folder.write(f"content/lessons/{id_}-l.md", f"## Part {{#part}}\n\n{text}{links}")
@@ -222,10 +222,11 @@ def peak(folder: Folder) -> int:
 @pytest.mark.parametrize("again", [False, True], ids=["cold", "one edit"])
 def test_memory_does_not_grow_with_the_lessons(tmp_path: Path, stores: Path, again: bool) -> None:
     peaks: dict[int, list[int]] = {FEW_LESSONS: [], MANY_LESSONS: []}
-    # Several times: whatever else the process does can only add to it.
+    # Several times: whatever else the process does can only add to it. Each has texts of its own:
+    # what the process knows of equal ones was not counted.
     for number, count in enumerate((FEW_LESSONS, FEW_LESSONS, MANY_LESSONS, MANY_LESSONS)):
         folder = Folder(tmp_path / str(number))
-        write_course(folder, count)
+        write_course(folder, count, f"thing {number}")
         folder.borrow(stores)
         if again:
             build(folder.options(), Path("public"))
