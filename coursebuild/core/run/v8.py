@@ -23,7 +23,7 @@ from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from coursebuild.core.files.errors import AddressLimitError, EffectError
+from coursebuild.core.files.errors import AddressLimitError, EffectError, lacking
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.model.results import Formula, MathError
 
@@ -79,6 +79,7 @@ def start() -> None:
     Raises:
         AddressLimitError: the limit on addresses would make it end this process.
         EffectError: it is not installed.
+        MemoryError, OSError: the machine has run out of something.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < _ADDRESSES:
@@ -91,6 +92,8 @@ def start() -> None:
 
         init_mini_racer(flags=_FLAGS, ignore_duplicate_init=True)
     except Exception as error:  # whatever an installation that is broken raises
+        if isinstance(error, MemoryError | OSError | RuntimeError) and lacking(error):
+            raise
         message = f"mini-racer's V8 cannot be used: {error}"
         raise EffectError(message, help="run `pip install coursebuild` again") from None
 
