@@ -126,15 +126,16 @@ def test_a_long_list_is_not_taken_for_a_deep_one(item: str) -> None:
 
 
 def run_limited(folder: Folder, limit: str, *arguments: str) -> tuple[int, str]:
-    """The status of a command under a limit, and what it says on standard error."""
+    """The status of a command under a limit, and what it says."""
     result = subprocess.run(
         ["bash", "-c", f'ulimit {limit} && exec "$@"', "bash", *command(*arguments)],
         cwd=folder.root,
         env=folder.environment(),
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
     )
-    return result.returncode, result.stderr
+    return result.returncode, result.stdout
 
 
 @pytest.mark.site
@@ -161,11 +162,24 @@ def test_too_few_addresses_for_v8_are_told_where_it_is_needed(make: Make) -> Non
     assert folder.run("build").status == 0
     assert "data-lab" in page.read_text()
     folder.write(folder.lesson(1), GOOD + "$a_{18}$\n")
-    status, output = run_limited(folder, "-v 8388608", "check")
+    status, output = run_limited(folder, "-v 524288", "check")
     assert status == 2
-    assert "coursebuild: V8 needs more than the 8 GiB of address space" in output
+    assert "coursebuild: V8 needs more than the 0.5 GiB of address space" in output
     assert "`ulimit -v unlimited`" in output
     assert "Traceback" not in output
+
+
+@pytest.mark.site
+def test_doctor_says_what_it_could_not_try_and_tries_the_rest(make: Make) -> None:
+    folder = make(GOOD)
+    # There is no place for such a stack, hence none for a thread.
+    status, output = run_limited(folder, "-s 70000000000", "doctor")
+    lines = output.splitlines()
+    lack = lines.index("broken   labs: can't start new thread")
+    assert lines[lack + 1] == "         help: `ulimit -u` says how many processes there may be"
+    assert " fonts and " in lines[lack + 2]
+    assert lines[-1].startswith("broken: ")
+    assert status == 1
 
 
 FEW_LESSONS, MANY_LESSONS = 20, 50
