@@ -159,6 +159,9 @@ def test_of_a_repository_that_git_cannot_make_nothing_is_left(tmp_path: Path) ->
     assert [*tmp_path.rglob(".git"), *tmp_path.rglob("description")] == [
         tmp_path / "template/description"
     ]
+    result = folder.run("init", "other", env={"XDG_STATE_HOME": "/dev/null"})
+    assert result.out.startswith("wrote 17 files to other\n")
+    assert "was made: .coursebuild needs a key of its user's own, and there is now" in result.err
 
 
 @pytest.mark.site
