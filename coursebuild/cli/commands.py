@@ -103,6 +103,9 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
             if limit < _FILES_NEEDED:
                 text = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
                 return fail(FAILURE, text, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
+            if not resource.getrlimit(resource.RLIMIT_FSIZE)[0]:
+                text = "nothing may be written into any file"
+                return fail(FAILURE, text, "`ulimit -f unlimited` removes the limit")
             remove_abandoned_folders()
             return _choose_command(directory, words)
         except UsageError as error:
@@ -197,6 +200,9 @@ def parser_of(command: Command) -> argparse.ArgumentParser:
 
 
 class _Parser(argparse.ArgumentParser):
+    def print_help(self, file: object = None) -> NoReturn:
+        self.exit(write(self.format_help(), CLEAN))
+
     def error(self, message: str) -> NoReturn:
         option = re.match("unrecognized arguments: (--[^ =]+)", message)
         if option is None:

@@ -96,9 +96,11 @@ def run(arguments: argparse.Namespace) -> int:
             word, colour = ("broken", RED) if subject in required else ("-", YELLOW)
             if probe.ok:
                 word, colour = "ok", GREEN
-            write(f"{style.paint(f'{word:<8}', colour)} {printable(probe.text)}\n", CLEAN)
+            line = f"{style.paint(f'{word:<8}', colour)} {printable(probe.text)}\n"
             if probe.cure and not probe.ok:
-                write(f"         help: {printable(probe.cure)}\n", CLEAN)
+                line += f"         help: {printable(probe.cure)}\n"
+            if write(line, CLEAN):
+                return FAILURE
             faults += subject in required and not probe.ok
     verdict = f"broken: {plural(faults, 'thing')} that every course needs" if faults else ""
     verdict = verdict or "all that every course needs works"
