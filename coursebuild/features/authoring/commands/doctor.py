@@ -50,6 +50,7 @@ renderer = mujoco.Renderer(model, 32, 32)
 renderer.update_scene(data)
 renderer.render()
 """
+_PERMIT = "get permission to write there, or use another folder"
 _BACKENDS = ("egl", "osmesa")
 
 
@@ -150,14 +151,16 @@ def _fonts(_: Path) -> Iterator[Probe]:
 
 def _folder(folder: Path) -> Iterator[Probe]:
     ok = os.access(folder, os.W_OK)
-    cure = "get permission to write there, or use another folder"
-    yield Probe(f"{folder} can be written" if ok else f"{folder} cannot be written", ok, cure)
+    yield Probe(f"{folder} can be written" if ok else f"{folder} cannot be written", ok, _PERMIT)
 
 
 def _store(folder: Path) -> Iterator[Probe]:
     place, reason = find_store(str(folder))
     if not reason:
-        yield Probe(f"results are kept in {place}", True)
+        there = next(path for path in (Path(place), *Path(place).parents) if path.exists())
+        ok = os.access(there, os.W_OK)
+        kept = f"kept in {place}"
+        yield Probe(f"results are {kept}" if ok else f"results cannot be {kept}", ok, _PERMIT)
     elif not store_key(str(folder)):
         cure = "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY"
         yield Probe("nothing is kept: there is no place for your key", False, cure)
