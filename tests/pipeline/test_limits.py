@@ -175,6 +175,18 @@ def test_too_few_addresses_for_v8_are_told_where_it_is_needed(make: Make) -> Non
 
 
 @pytest.mark.site
+@pytest.mark.engine
+def test_a_lab_is_tried_without_a_place_for_its_model(make: Make) -> None:
+    lab = '{"title": "A", "model": "ball", "readouts": [{"label": "t", "expr": "data.time"}]}'
+    folder = make(f"{GOOD}```lab\n{lab}\n```\n")
+    ball = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+    folder.write("models/ball.xml", ball)
+    status, output = run_limited(folder, "-f 1", "check")
+    assert status == 0, output
+    assert "1 lab tried: everything holds" in output
+
+
+@pytest.mark.site
 def test_doctor_says_what_it_could_not_try_and_tries_the_rest(make: Make) -> None:
     folder = make(GOOD)
     # There is no place for such a stack, hence none for a thread.
