@@ -16,12 +16,17 @@ def fail(status: int, message: str, help: str = "") -> int:
 
 def say(status: int, text: str) -> int:
     """Write a text to standard error; return the status."""
+    show(_harmless(text))
+    return status
+
+
+def show(text: str) -> None:
+    """Write a text, which has been made harmless, to standard error."""
     if sys.stderr is not None:  # else `print` would write to standard output
         try:
-            print(_harmless(text), file=sys.stderr, flush=True)
+            print(text, file=sys.stderr, flush=True)
         except OSError:  # nobody reads it; the status says it too
-            return status
-    return status
+            discard(sys.stderr.fileno())
 
 
 def _harmless(text: str) -> str:
@@ -42,11 +47,11 @@ def write(text: str, status: int, *, commands: bool = False) -> int:
         sys.stdout.write(text if commands else _without_commands(text))
         sys.stdout.flush()
     except BrokenPipeError:  # the reader has seen enough; the status stays
-        _discard_stdout()
+        discard(sys.stdout.fileno())
     except OSError as error:
         from coursebuild.core.files.errors import reason
 
-        _discard_stdout()
+        discard(sys.stdout.fileno())
         return fail(FAILURE, f"standard output cannot be written: {reason(error)}")
     return status
 
@@ -59,10 +64,10 @@ def _without_commands(text: str) -> str:
     return without_commands(text)
 
 
-def _discard_stdout() -> None:
+def discard(descriptor: int) -> None:
     """Keep Python from trying to write the rest once more at its end, and from complaining."""
     null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, sys.stdout.fileno())
+    os.dup2(null, descriptor)
     os.close(null)
 
 

@@ -103,8 +103,11 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
             if limit < _FILES_NEEDED:
                 text = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
                 return fail(FAILURE, text, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
+            if not resource.getrlimit(resource.RLIMIT_FSIZE)[0]:
+                text = "nothing may be written into any file"
+                return fail(FAILURE, text, "`ulimit -f unlimited` removes the limit")
             remove_abandoned_folders()
-            return _choose_command(directory, words, alone=alone)
+            return _choose_command(directory, words)
         except UsageError as error:
             return fail(USAGE, str(error))
         except EffectError as error:
@@ -127,7 +130,7 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
         return say(128 + number, _SIGNALS[number])
 
 
-def _choose_command(directory: str | None, words: list[str], *, alone: bool) -> int:
+def _choose_command(directory: str | None, words: list[str]) -> int:
     match words:
         case []:
             return say(USAGE, _overview().rstrip())
@@ -162,9 +165,7 @@ def _choose_command(directory: str | None, words: list[str], *, alone: bool) -> 
         )
         raise UsageError(f"there is no command `{name}`", help=help)
     with contextlib.ExitStack() as resources:  # what has been started by the arguments ends here
-        namespace = argparse.Namespace(
-            root=directory, words=tuple(words), resources=resources, alone=alone
-        )
+        namespace = argparse.Namespace(root=directory, words=tuple(words), resources=resources)
         arguments = parser_of(command).parse_args(rest, namespace)
         return int(importlib.import_module(command.module).run(arguments))
 
@@ -199,6 +200,9 @@ def parser_of(command: Command) -> argparse.ArgumentParser:
 
 
 class _Parser(argparse.ArgumentParser):
+    def print_help(self, file: object = None) -> NoReturn:
+        self.exit(write(self.format_help(), CLEAN))
+
     def error(self, message: str) -> NoReturn:
         option = re.match("unrecognized arguments: (--[^ =]+)", message)
         if option is None:

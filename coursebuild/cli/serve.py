@@ -113,9 +113,9 @@ def run(arguments: argparse.Namespace) -> int:
         if notice is not None and is_first:
             place = {"host": host, "port": server.access.port, "link": first}
             _write(notice, json.dumps({**place, "process": os.getpid()}))
-        print(f"serving {first} (stop with Ctrl-C)", file=sys.stderr, flush=True)
+        say(CLEAN, f"serving {first} (stop with Ctrl-C)")
         for link in other_links:
-            print(f"     or {link}", file=sys.stderr, flush=True)
+            say(CLEAN, f"     or {link}")
         if options.progress.live and not server.is_local:
             segno.make(server.links[-1]).terminal(sys.stderr, compact=True)
         if arguments.open:  # in a thread, as some browsers only return when their window is open

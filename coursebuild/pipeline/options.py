@@ -32,6 +32,7 @@ from coursebuild.core.run.script_environment import course_environment
 from coursebuild.core.text.characters import printable, printable_lines
 from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.core.text.near import nearest
+from coursebuild.output import discard
 from coursebuild.report.text import clip
 
 if TYPE_CHECKING:
@@ -165,8 +166,11 @@ class Progress:
         try:
             self.stream.write(text)
             self.stream.flush()
-        except (OSError, ValueError):  # nobody reads any more; the work goes on
+        except ValueError:  # it was closed
             self._has_readers = False
+        except OSError:  # nobody reads any more; the work goes on
+            self._has_readers = False
+            discard(self.stream.fileno())
 
 
 class Options(Struct, frozen=True):

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -28,6 +27,7 @@ from coursebuild.core.run.script_server import RunAll, RunStoppedError, ScriptSe
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.noise_warnings import noise_warnings
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.output import FAILURE, fail, show
 from coursebuild.pipeline.options import Progress
 from coursebuild.pipeline.scripts import measure_sensitivity, run
 from coursebuild.pipeline.verify import verify
@@ -92,7 +92,7 @@ class BackgroundRebuild:
             except EffectError as error:
                 text = f"coursebuild: {error.message}" + (f"\n{error.help}" if error.help else "")
                 if text != self._session.trouble:
-                    print(text, file=sys.stderr, flush=True)
+                    fail(FAILURE, error.message, error.help)
                 self._finish(text)
 
     def _wait(self) -> None:
@@ -167,7 +167,7 @@ class BackgroundRebuild:
         new = subtract_diagnostics(now, before or ())
         resolved = subtract_diagnostics(before or (), now)
         for paragraph in diagnostic_paragraphs(new, self._style):
-            print(paragraph, file=sys.stderr, flush=True)
+            show(paragraph)
         for diagnostic in resolved:
             self._progress.say(f"gone: {location(diagnostic.span)}: {diagnostic.message}")
         counts = [f"{len(new)} new"] if new else []

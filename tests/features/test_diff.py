@@ -154,3 +154,19 @@ def test_a_base_that_cannot_be_had(course: Folder, tmp_path: Path) -> None:
     result = course.main("diff", "main")
     assert (result.status, "the course map" in result.err) == (2, True)
     assert course.main("diff", first).status == 0
+
+
+def test_a_partial_clone_lacks_the_base(course: Folder, tmp_path: Path) -> None:
+    """Nothing is fetched, since the repository says from where and how."""
+    git(course.root, "config", "uploadpack.allowFilter", "true")
+    course.write("content/new.md", "text\n")
+    commit(course.root)
+    (course.root / "content/new.md").unlink()
+    commit(course.root)
+    for part in ("blob:none", "tree:0"):
+        place = str(tmp_path / part.replace(":", "-"))
+        git(tmp_path, "clone", "--quiet", f"--filter={part}", f"file://{course.root.parent}", place)
+        result = course.main("-C", f"{place}/{course.root.name}", "diff", "HEAD^")
+        assert (result.status, result.out) == (1, "")
+        lack = "cannot be copied: this repository does not hold all of it\n  help: in a partial"
+        assert lack in result.err, result.err

@@ -126,19 +126,20 @@ def test_a_long_list_is_not_taken_for_a_deep_one(item: str) -> None:
 
 
 def run_limited(folder: Folder, limit: str, *arguments: str) -> tuple[int, str]:
-    """The status of a command under a limit, and what it says on standard error."""
+    """The status of a command under a limit, and what it says."""
     result = subprocess.run(
         ["bash", "-c", f'ulimit {limit} && exec "$@"', "bash", *command(*arguments)],
         cwd=folder.root,
         env=folder.environment(),
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
     )
-    return result.returncode, result.stderr
+    return result.returncode, result.stdout
 
 
 @pytest.mark.site
-def test_too_few_files_are_told_and_as_many_as_said_are_enough(make: Make) -> None:
+def test_limits_of_files_are_told_and_as_many_as_said_are_enough(make: Make) -> None:
     folder = make(GOOD + "$a_{17}$\n\n" + block("two.py", "print(2)", "2"))
     assert run_limited(folder, "-n 12", "check") == (
         1,
@@ -147,6 +148,11 @@ def test_too_few_files_are_told_and_as_many_as_said_are_enough(make: Make) -> No
     )
     status, output = run_limited(folder, "-n 64", "build", "--jobs", "2")
     assert status == 0, output
+    assert run_limited(folder, "-f 0", "check") == (
+        1,
+        "coursebuild: nothing may be written into any file\n"
+        "  help: `ulimit -f unlimited` removes the limit\n",
+    )
 
 
 @pytest.mark.site
@@ -161,11 +167,36 @@ def test_too_few_addresses_for_v8_are_told_where_it_is_needed(make: Make) -> Non
     assert folder.run("build").status == 0
     assert "data-lab" in page.read_text()
     folder.write(folder.lesson(1), GOOD + "$a_{18}$\n")
-    status, output = run_limited(folder, "-v 8388608", "check")
+    status, output = run_limited(folder, "-v 524288", "check")
     assert status == 2
-    assert "coursebuild: V8 needs more than the 8 GiB of address space" in output
+    assert "coursebuild: V8 needs more than the 0.5 GiB of address space" in output
     assert "`ulimit -v unlimited`" in output
     assert "Traceback" not in output
+
+
+@pytest.mark.site
+@pytest.mark.engine
+def test_a_lab_is_tried_without_a_place_for_its_model(make: Make) -> None:
+    lab = '{"title": "A", "model": "ball", "readouts": [{"label": "t", "expr": "data.time"}]}'
+    folder = make(f"{GOOD}```lab\n{lab}\n```\n")
+    ball = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+    folder.write("models/ball.xml", ball)
+    status, output = run_limited(folder, "-f 1", "check")
+    assert status == 0, output
+    assert "1 lab tried: everything holds" in output
+
+
+@pytest.mark.site
+def test_doctor_says_what_it_could_not_try_and_tries_the_rest(make: Make) -> None:
+    folder = make(GOOD)
+    # There is no place for such a stack, hence none for a thread.
+    status, output = run_limited(folder, "-s 70000000000", "doctor")
+    lines = output.splitlines()
+    lack = lines.index("broken   labs: can't start new thread")
+    assert lines[lack + 1] == "         help: `ulimit -u` says how many processes there may be"
+    assert " fonts and " in lines[lack + 2]
+    assert lines[-1].startswith("broken: ")
+    assert status == 1
 
 
 FEW_LESSONS, MANY_LESSONS = 20, 50

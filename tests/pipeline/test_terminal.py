@@ -273,14 +273,24 @@ def test_reader_that_has_seen_enough_makes_no_noise_and_the_verdict_stands(make:
 
 def test_full_disk_is_told(make: Make) -> None:
     folder = make(GOOD)
-    with Path("/dev/full").open("wb") as full:
-        process = folder.start("check", stdout=full.fileno(), stderr=subprocess.PIPE)
-    with kill_at_end(process):
-        errors = process.communicate(timeout=120)[1].decode()
-        assert process.returncode == 1
-    assert errors.endswith(
-        "coursebuild: standard output cannot be written: no space left on device\n"
-    )
+    for arguments in (["check"], ["check", "--help"], ["doctor"]):
+        with Path("/dev/full").open("wb") as full:
+            process = folder.start(*arguments, stdout=full.fileno(), stderr=subprocess.PIPE)
+        with kill_at_end(process):
+            errors = process.communicate(timeout=120)[1].decode()
+            assert process.returncode == 1, arguments
+        message = "coursebuild: standard output cannot be written: no space left on device\n"
+        assert errors.endswith(message), arguments
+
+
+def test_errors_for_which_there_is_no_place_change_no_status(make: Make) -> None:
+    folder = make(GOOD)
+    for arguments, status in ((["check"], 0), (["chec"], 2), (["undo"], 1)):
+        with Path("/dev/full").open("wb") as full:
+            process = folder.start(*arguments, stdout=subprocess.PIPE, stderr=full.fileno())
+        with kill_at_end(process):
+            process.communicate(timeout=120)
+            assert process.returncode == status, arguments
 
 
 def test_build_with_closed_streams_works(make: Make) -> None:

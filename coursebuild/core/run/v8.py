@@ -84,7 +84,8 @@ def start() -> None:
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < _ADDRESSES:
         raise AddressLimitError(
-            f"V8 needs more than the {limit >> 30} GiB of address space that this process may use",
+            f"V8 needs more than the {round(limit / (1 << 30), 2):g} GiB of address space that "
+            "this process may use",
             help="`ulimit -v unlimited` removes the limit; V8 reserves addresses, not memory",
         )
     try:

@@ -379,8 +379,8 @@ class _Git:
             raise EffectError("git cannot be run: there is no such program")
         self._command = [program, "--no-pager", "-c", "core.fsmonitor=false", "-C", str(root)]
 
-    def ask(self, *arguments: str, stdin: bytes = b"") -> bytes:
-        """What git prints; nothing if it fails."""
+    def ask(self, *arguments: str, stdin: bytes = b"") -> bytes | None:
+        """What git prints; `None` if it fails."""
         # A repository that holds only a part of its objects would fetch the others.
         alone = {"GIT_NO_LAZY_FETCH": "1", "GIT_ALLOW_PROTOCOL": "none", "GIT_OPTIONAL_LOCKS": "0"}
         environment = gate.environment(**alone)
@@ -388,12 +388,18 @@ class _Git:
             answer = gate.finish([*self._command, *arguments], environment, stdin=stdin)
         except OSError as error:
             raise EffectError(f"git cannot be run: {reason(error)}") from None
-        return answer.output if answer.status == 0 else b""
+        return answer.output if answer.status == 0 else None
 
     def copy_tree(self, revision: str, folder: Path) -> None:
         """Write the files of a revision, of the course's folder alone, into a folder."""
-        files = []
-        for entry in self.ask("ls-tree", "-r", "-z", revision).split(b"\0")[:-1]:
+        partial = EffectError(
+            f"{revision[:7]} cannot be copied: this repository does not hold all of it",
+            help="in a partial clone, `git fetch --refetch --no-filter` brings the rest",
+        )
+        tree, files = self.ask("ls-tree", "-r", "-z", revision), []
+        if tree is None:
+            raise partial
+        for entry in tree.split(b"\0")[:-1]:
             head, _, name = entry.partition(b"\t")
             mode, kind, digest = head.split()
             path = os.fsdecode(name)
@@ -401,10 +407,12 @@ class _Git:
                 files.append((mode == b"120000", path, digest))
         files.sort()  # links come last, so that no file is written through one
         names = b"".join(b"%s\n" % digest for *_, digest in files)
-        contents = io.BytesIO(self.ask("cat-file", "--batch", stdin=names))
+        contents = io.BytesIO(self.ask("cat-file", "--batch", stdin=names) or b"")
         try:
             for is_link, path, _ in files:
-                *_, size = contents.readline().split()
+                *known, size = contents.readline().split() or [b""]
+                if len(known) != 2:
+                    raise partial
                 data = contents.read(int(size) + 1)[:-1]
                 target = folder / path
                 target.parent.mkdir(parents=True, exist_ok=True)

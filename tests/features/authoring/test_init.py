@@ -15,7 +15,8 @@ import pytest
 
 from coursebuild import __version__
 from coursebuild.core.run.packages import site_folders
-from support.scratch_course import ROOT, Folder
+from support.sandboxes import require_sandbox
+from support.scratch_course import ROOT, Folder, command
 
 REPORT = """\
 wrote 17 files to {0}, in a new Git repository
@@ -159,6 +160,9 @@ def test_of_a_repository_that_git_cannot_make_nothing_is_left(tmp_path: Path) ->
     assert [*tmp_path.rglob(".git"), *tmp_path.rglob("description")] == [
         tmp_path / "template/description"
     ]
+    result = folder.run("init", "other", env={"XDG_STATE_HOME": "/dev/null"})
+    assert result.out.startswith("wrote 17 files to other\n")
+    assert "was made: .coursebuild needs a key of its user's own, and there is now" in result.err
 
 
 @pytest.mark.site
@@ -198,6 +202,25 @@ def test_doctor_reports_what_works_and_a_cure_for_the_rest(tmp_path: Path) -> No
     assert re.search(cure, result.out)
     assert f"ok       {folder.root} can be written\n" in result.out
     assert not [path for path in folder.root.iterdir() if path != folder.tmp]
+
+
+@pytest.mark.site
+@pytest.mark.engine
+def test_doctor_says_that_a_folder_is_read_only(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    (tmp_path / "course").mkdir()
+    root = str(tmp_path / "course")
+    program = require_sandbox(tmp_path).program
+    result = subprocess.run(
+        [program, "--dev-bind", "/", "/", "--ro-bind", root, root, *command("-C", root, "doctor")],
+        env=folder.environment(),
+        capture_output=True,
+        text=True,
+    )
+    help = "         help: get permission to write there, or use another folder\n"
+    assert f"\nbroken   {root} cannot be written\n{help}" in result.stdout
+    assert f"\n-        results cannot be kept in {root}/.coursebuild\n{help}" in result.stdout
+    assert result.returncode == 1
 
 
 @pytest.mark.site

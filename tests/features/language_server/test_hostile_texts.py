@@ -176,6 +176,11 @@ def test_what_is_proposed_is_one_line_of_text(editor: Editor) -> None:
     editor.write(LESSON, TEXT)
 
 
+def test_extension_does_not_start_in_a_folder_that_is_not_trusted() -> None:
+    extension = json.loads((ROOT / "editors/vscode/package.json").read_text())
+    assert extension["capabilities"]["untrustedWorkspaces"] == {"supported": False}
+
+
 def test_extension_trusts_no_description() -> None:
     """Without these, VS Code shows no HTML in Markdown and runs no command from it."""
     for file in (ROOT / "editors/vscode/src").iterdir():

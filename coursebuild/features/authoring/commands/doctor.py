@@ -18,6 +18,7 @@ from msgspec import Struct
 from coursebuild.api import CLEAN, FAILURE, EffectError, UsageError, gate, write
 from coursebuild.core.engine.store import SIZE
 from coursebuild.core.files.course_root import find_course_root
+from coursebuild.core.files.errors import lacking
 from coursebuild.core.files.locks import try_lock
 from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.files.trust import FOLDER, find_store, store_key
@@ -49,6 +50,7 @@ renderer = mujoco.Renderer(model, 32, 32)
 renderer.update_scene(data)
 renderer.render()
 """
+_PERMIT = "get permission to write there, or use another folder"
 _BACKENDS = ("egl", "osmesa")
 
 
@@ -58,8 +60,6 @@ class Probe(Struct, frozen=True):
     text: str
     ok: bool
     cure: str = ""
-    is_required: bool = True
-    """Whether every course needs it."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -79,15 +79,30 @@ def run(arguments: argparse.Namespace) -> int:
             place = prepare_environment(folder, LAB_ENGINE, Progress().say, locked=True).python
         return write(f"MuJoCo {LAB_ENGINE}, for labs, is installed for {printable(place)}\n", CLEAN)
     style, faults = style_of(sys.stdout), 0
-    required = (_engines, _lab_engine, _fonts, _folder)
-    for make_probes in (*required, _store, _locks, _disk, _rendering, _sandbox):
-        for probe in make_probes(folder):
-            word, colour = ("broken", RED) if probe.is_required else ("-", YELLOW)
+    required = {
+        "MuJoCo": _engines,
+        "labs": _lab_engine,
+        "fonts and templates": _fonts,
+        "the folder": _folder,
+    }
+    others = {
+        "kept results": _store,
+        "locks": _locks,
+        "the disk": _disk,
+        "offscreen rendering": _rendering,
+        "`--sandbox`": _sandbox,
+    }
+    for subject, make_probes in {**required, **others}.items():
+        for probe in _finish(subject, make_probes(folder)):
+            word, colour = ("broken", RED) if subject in required else ("-", YELLOW)
             if probe.ok:
                 word, colour = "ok", GREEN
             line = f"{style.paint(f'{word:<8}', colour)} {printable(probe.text)}\n"
-            write(line if probe.ok else f"{line}         help: {printable(probe.cure)}\n", CLEAN)
-            faults += probe.is_required and not probe.ok
+            if probe.cure and not probe.ok:
+                line += f"         help: {printable(probe.cure)}\n"
+            if write(line, CLEAN):
+                return FAILURE
+            faults += subject in required and not probe.ok
     verdict = f"broken: {plural(faults, 'thing')} that every course needs" if faults else ""
     verdict = verdict or "all that every course needs works"
     return write(
@@ -95,34 +110,32 @@ def run(arguments: argparse.Namespace) -> int:
     )
 
 
+def _finish(subject: str, probes: Iterator[Probe]) -> Iterator[Probe]:
+    """Make all probes: what cannot be tried does not work."""
+    try:
+        yield from probes
+    except (EffectError, MemoryError, OSError, RuntimeError) as error:
+        lack = error if isinstance(error, EffectError) else lacking(error)
+        if lack is None:
+            raise
+        yield Probe(f"{subject}: {lack.message}", False, lack.help)
+
+
 def _engines(_: Path) -> Iterator[Probe]:
     yield Probe(f"Python {python_version()} at {sys.executable}", True)
-    try:
-        error_line = _try_code(_STEP)
-        text = f"MuJoCo {engine_version()}" + (f": {error_line}" if error_line else "")
-        yield Probe(
-            text, not error_line, "install coursebuild again, into an environment of its own"
-        )
-    except EffectError as error:
-        yield Probe(error.message, False, error.help)
+    error_line = _try_code(_STEP)
+    text = f"MuJoCo {engine_version()}" + (f": {error_line}" if error_line else "")
+    yield Probe(text, not error_line, "install coursebuild again, into an environment of its own")
 
 
 def _lab_engine(folder: Path) -> Iterator[Probe]:
     """Probe the engine of labs, and native MuJoCo of the same version, which compiles for it."""
-    try:
-        with LabEngine() as engine:
-            engine.check_code(())
-            yield Probe(f"MuJoCo {engine.version} of the browser, in V8, for labs", True)
-    except EffectError as error:
-        yield Probe(error.message, False, error.help or "install coursebuild again")
-        return
+    with LabEngine() as engine:
+        engine.check_code(())
+        yield Probe(f"MuJoCo {engine.version} of the browser, in V8, for labs", True)
     if engine_version() == LAB_ENGINE:
         return
-    try:
-        environment = find_environment(folder, LAB_ENGINE, locked=True)
-    except EffectError as error:
-        yield Probe(error.message, False, error.help)
-        return
+    environment = find_environment(folder, LAB_ENGINE, locked=True)
     place = ": it will be installed when a lab is first tried, or by `doctor --install-engine`"
     if not environment.fault():
         place = f" in {environment.prefix}"
@@ -130,32 +143,30 @@ def _lab_engine(folder: Path) -> Iterator[Probe]:
 
 
 def _fonts(_: Path) -> Iterator[Probe]:
-    try:
-        fonts = [name for name in Bundle() if name.endswith(".ttf")]
-        templates = template_texts()
-    except EffectError as error:
-        yield Probe(error.message, False, error.help)
-        return
+    fonts = [name for name in Bundle() if name.endswith(".ttf")]
+    templates = template_texts()
     text = f"{len(fonts)} fonts and {len(templates)} page templates"
     yield Probe(text, bool(fonts and templates), "install coursebuild again")
 
 
 def _folder(folder: Path) -> Iterator[Probe]:
     ok = os.access(folder, os.W_OK)
-    cure = "get permission to write there, or use another folder"
-    yield Probe(f"{folder} can be written" if ok else f"{folder} cannot be written", ok, cure)
+    yield Probe(f"{folder} can be written" if ok else f"{folder} cannot be written", ok, _PERMIT)
 
 
 def _store(folder: Path) -> Iterator[Probe]:
     place, reason = find_store(str(folder))
     if not reason:
-        yield Probe(f"results are kept in {place}", True)
+        there = next(path for path in (Path(place), *Path(place).parents) if path.exists())
+        ok = os.access(there, os.W_OK)
+        kept = f"kept in {place}"
+        yield Probe(f"results are {kept}" if ok else f"results cannot be {kept}", ok, _PERMIT)
     elif not store_key(str(folder)):
         cure = "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY"
-        yield Probe("nothing is kept: there is no place for your key", False, cure, False)
+        yield Probe("nothing is kept: there is no place for your key", False, cure)
     else:
         text = f"{FOLDER} {reason}; results are kept in {place}"
-        yield Probe(text, False, f"remove {folder / FOLDER}", is_required=False)
+        yield Probe(text, False, f"remove {folder / FOLDER}")
 
 
 def _locks(folder: Path) -> Iterator[Probe]:
@@ -166,15 +177,13 @@ def _locks(folder: Path) -> Iterator[Probe]:
         return
     text = "locks, with which two commands on one course wait for each other"
     cure = "use a local disk, or run one command at a time"
-    yield Probe(text if ok else f"no {text}", ok, cure, is_required=False)
+    yield Probe(text if ok else f"no {text}", ok, cure)
 
 
 def _disk(folder: Path) -> Iterator[Probe]:
     free = shutil.disk_usage(folder).free
     cure = "free some space, or limit .coursebuild: `--cache-size 200M`"
-    yield Probe(
-        f"{free / (1 << 30):.1f} GiB free on the disk", free > SIZE, cure, is_required=False
-    )
+    yield Probe(f"{free / (1 << 30):.1f} GiB free on the disk", free > SIZE, cure)
 
 
 def _rendering(_: Path) -> Iterator[Probe]:
@@ -194,7 +203,7 @@ def _rendering(_: Path) -> Iterator[Probe]:
             "`apt install libosmesa6`, and set MUJOCO_GL=osmesa"
         )
     )
-    yield Probe(f"no offscreen rendering: {error_line}", False, cure, is_required=False)
+    yield Probe(f"no offscreen rendering: {error_line}", False, cure)
 
 
 def _sandbox(folder: Path) -> Iterator[Probe]:
@@ -202,7 +211,7 @@ def _sandbox(folder: Path) -> Iterator[Probe]:
     _, parts = examine_sandbox(folder)
     for part in parts:
         text = f"`--sandbox` {part.problem}" if part.problem else f"{part.name}, for `--sandbox`"
-        yield Probe(text, not part.problem, part.help, is_required=False)
+        yield Probe(text, not part.problem, part.help)
 
 
 def _try_code(code: str, **environment: str) -> str:

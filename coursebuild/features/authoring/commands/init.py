@@ -17,7 +17,7 @@ from coursebuild.api import CLEAN, EffectError, gate, write
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.resources import locked_requirements
-from coursebuild.core.files.trust import find_store
+from coursebuild.core.files.trust import FOLDER, find_store
 from coursebuild.core.files.write import FileChange, change_files, undo_changes
 from coursebuild.core.run.script_environment import package_version
 from coursebuild.core.syntax.course_schema import json_schema
@@ -126,11 +126,13 @@ def _new_repository(root: Path) -> Iterator[bool]:
     if git is None or any(os.path.lexists(folder / ".git") for folder in (root, *root.parents)):
         yield False
         return
-    place, slot = root / ".git", Path(find_store(str(root))[0], "repository")
+    store, strangeness = find_store(str(root))
+    place, slot = root / ".git", Path(store, "repository")
     try:
         with project_lock(root):
             shutil.rmtree(slot, ignore_errors=True)  # of a command that was killed
-            problem = _make_repository(git, slot, place)
+            is_there = slot.parent.is_dir()  # the lock has made it, where it can be made
+            problem = _make_repository(git, slot, place) if is_there else f"{FOLDER} {strangeness}"
         try:
             yield not problem
         except BaseException:

@@ -15,13 +15,10 @@ import signal
 import sys
 import types
 import zlib
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-
-_MODEL = "model.mjb"
 
 
 def main() -> None:
@@ -98,8 +95,8 @@ def _parity(request: Any) -> dict[str, Any]:
     step, up to the horizon, show by how much.
     """
     run = request["run"]
-    Path(_MODEL).write_bytes(base64.b64decode(request["mjb"]))
-    model = mujoco.MjModel.from_binary_path(_MODEL)
+    file = {"model.mjb": base64.b64decode(request["mjb"])}
+    model = mujoco.MjModel.from_binary_path("model.mjb", file)
     no_reset = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     flags = model.opt.disableflags
     model.opt.disableflags = flags & ~no_reset if run["autoreset"] else flags | no_reset
