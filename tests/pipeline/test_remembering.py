@@ -90,6 +90,28 @@ print("step 1.000 s")"""
     assert "It is `2.000`{out} ms." in folder.text(folder.lesson())
 
 
+def test_a_row_is_found_where_the_number_in_its_heading_is_another(make: Make) -> None:
+    script = """step = 2
+print(f"depths at a timestep of {step} ms:")
+for tau in (10, 4, 3):
+    print(f"  tau {tau} ms  {tau * step} um")"""
+    script = f"```python file=examples/a.py\n{script}\n```\n\n```output\n```"
+    folder = make(f"{script}\n\nIt is `8`{{out}} um.\n")
+    assert folder.main("update").status == 0
+    folder.replace(folder.lesson(), "step = 2", "step = 5")
+    assert folder.main("update").status == 0
+    found, lines = "It is `20`{out} um.", folder.text(folder.lesson()).split("\n")
+    assert found in lines
+    explain = folder.main("explain", f"{folder.lesson()}:{lines.index(found) + 1}")
+    line = "`tau # ms # um`, where it begins with 4 below `depths at a timestep of # ms:`"
+    assert f"number 2 of {line}" in explain.out
+
+    folder.replace(folder.lesson(), "(10, 4, 3)", "(10, 5, 3)")
+    result = folder.main("update")
+    assert result.status == 1
+    assert f"the line that showed `20` is no longer printed: {line}" in result.out
+
+
 def test_explain_says_where_the_numbers_of_a_line_come_from(make: Make) -> None:
     folder = make_cups(make)
     lines = folder.text(folder.lesson()).split("\n")
@@ -100,9 +122,9 @@ def test_explain_says_where_the_numbers_of_a_line_come_from(make: Make) -> None:
         == f"""\
 {folder.lesson()}:{line} shows 1 value
   `steel  84.9  0.0121  83.5` is printed by examples/cups.py
-    number 1 of `steel T0 = # \u00b0C k = # # /min tau = # min`
-    number 2 of `steel T0 = # \u00b0C k = # # /min tau = # min`
-    number 3 of `steel T0 = # \u00b0C k = # # /min tau = # min`
+    number 1 of `steel T0 = # \u00b0C k = # 1/min tau = # min`
+    number 2 of `steel T0 = # \u00b0C k = # 1/min tau = # min`
+    number 3 of `steel T0 = # \u00b0C k = # 1/min tau = # min`
 """
     )
     result = folder.main("explain", f"{folder.lesson()}:{line + 2}")
