@@ -132,6 +132,31 @@ def test_explain_says_where_the_numbers_of_a_line_come_from(make: Make) -> None:
     assert folder.main("explain", f"{folder.lesson()}:999").status == 2
 
 
+def test_explain_says_where_words_and_settings_are_printed(make: Make) -> None:
+    script = 'for step in (2, 10):\n    print(f"at {step} ms it rests {step**2:.2f} um deep")'
+    script = f"```python file=examples/b.py\n{script}\n```\n\n```output\n```"
+    folder = make(f"{script}\n\nAt `2 ms`{{out}} it `rests`{{out}}.\n")
+    assert folder.main("update").status == 0
+    lines = folder.text(folder.lesson()).split("\n")
+    at = next(n for n, text in enumerate(lines, start=1) if text.startswith("At "))
+    result = folder.main("explain", f"{folder.lesson()}:{at}")
+    first, second = "at 2 ms it rests 4.00 um deep", "at 10 ms it rests 100.00 um deep"
+    assert (
+        result.out
+        == f"""\
+{folder.lesson()}:{at} shows 2 values
+  `2 ms` is printed by examples/b.py
+    number 1 of `{first}`, which has its words in common with other lines
+    recorded at {folder.lesson()}:7:4
+  `rests` is printed by examples/b.py
+    words of `{first}`
+    words of `{second}`
+    recorded at {folder.lesson()}:7:12
+    recorded at {folder.lesson()}:8:13
+"""
+    )
+
+
 def test_a_lesson_takes_its_addresses_along_when_it_is_renamed(make: Make) -> None:
     folder = make_cups(make)
     before = folder.text(RECORD)
