@@ -43,11 +43,13 @@ from coursebuild.core.run.dependencies import Kind, describe, is_there, sought_f
 from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.run.run_record import RunRecord
 from coursebuild.core.scripts.bindings import check_bindings
+from coursebuild.core.scripts.bound_numbers import text_places
 from coursebuild.core.scripts.bound_places import BoundNumber, bound_values
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract, jobs
+from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.printed_text import describe_line
+from coursebuild.core.scripts.printed_text import PrintedPlace, describe_line
 from coursebuild.core.scripts.table_cells import table_rows
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.characters import printable
@@ -391,9 +393,20 @@ def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ..
     for binding, value in bound_values(document, outputs):
         at = addresses.get(value, ())
         bound = BoundNumber(binding, outputs, at)
-        places = [place for texts in bound.groups for place in bound.look_up(texts)]
-        spans = [place.span for place in places if place.span is not None]
         texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
+        if bound.text.numbers:
+            places = [place for group in bound.groups for place in bound.look_up(group)]
+            spans = [place.span for place in places if place.span is not None]
+            if not at and any(place.address is None for place in places):
+                texts = tuple(map(_one_of_several, places))
+        else:
+            lines = [line for text in bound.recorded for line in text.lines]
+            words = [*text_places(bound.text.before, lines)]
+            texts = tuple(
+                dict.fromkeys(f"words of `{plain_text(line.text)}`" for line, *_ in words)
+            )
+            texts = texts or ("words of a line that is not recorded",)
+            spans = [line.locate(*at) for line, *at in words if line.locate is not None]
         origin = ValueOrigin(binding.text, value.script, texts, tuple(map(location, spans)))
         origins.append((binding.span, origin))
     for verdict in outputs.of_document(document):
@@ -405,6 +418,11 @@ def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ..
             span = row[0].cell.span.to(row[-1].cell.span)
             origins.append((span, ValueOrigin(value.text, value.script, texts)))
     return tuple(origin for span, origin in origins if span.line <= line <= span.end_line)
+
+
+def _one_of_several(place: PrintedPlace) -> str:
+    line = plain_text(place.line.text)
+    return f"number {place.first + 1} of `{line}`, which has its words in common with other lines"
 
 
 def origins_text(place: str, origins: tuple[ValueOrigin, ...]) -> str:

@@ -114,3 +114,33 @@ def test_numbers_of_a_quiz_are_those_of_its_language(make: Make) -> None:
     lesson = folder.text("content/lessons/1.1-one.md").replace("83,4`", "83,5`")
     folder.write("content/lessons/1.1-one.md", lesson)
     assert "error[binding-mismatch]" in folder.main("check").out
+
+
+def test_what_the_map_says_of_a_lesson_is_in_its_language(make: Make) -> None:
+    folder = make(GOOD + QUIZ.partition("The mass")[0])
+    text = folder.text("content/course.toml")
+    before, mark, after = text.partition('slug = "one"\n')
+    summary = 'summary = "Etwa `83,4 min`{out=examples/answers.py}."\n'
+    folder.write("content/course.toml", f"{before}{mark}{summary}{after}")
+    assert "`83,4 min` has a comma where" in folder.main("check").out
+    folder.write("content/course.toml", f'{before}{mark}language = "de"\n{summary}{after}')
+    assert folder.main("check").status == 0
+
+
+def test_spaces_that_part_thousands_stay(make: Make) -> None:
+    script = 'scale = 1\nprint("steps", 12000 * scale)\nprint(f"mass {1234567.5 * scale:,} kg")'
+    text = "`12\u202f000`{out}, `1\u00a0234\u00a0568 kg`{out}"
+    german = f"{text}, `1\u202f234\u202f567,5 kg`{{out}}, `1 234 567,5`{{out}}"
+    script = f"```python file=examples/a.py\n{script}\n```\n\n```output\n```\n\n"
+    folder = make(f"{script}{text}\n", script.replace("a.py", "b.py") + f"{german}\n")
+    course = folder.text("content/course.toml")
+    before, mark, after = course.partition('slug = "two"\n')
+    folder.write("content/course.toml", f'{before}{mark}language = "de"\n{after}')
+    assert folder.main("update").status == 0
+    for path in ("1.1-one", "1.2-two"):
+        folder.replace(f"content/lessons/{path}.md", "scale = 1", "scale = 2")
+    assert folder.main("update").status == 0
+    doubled = "`24\u202f000`{out}, `2\u00a0469\u00a0135 kg`{out}"
+    assert doubled in folder.text("content/lessons/1.1-one.md")
+    german = f"{doubled}, `2\u202f469\u202f135,0 kg`{{out}}, `2 469 135,0`{{out}}"
+    assert german in folder.text("content/lessons/1.2-two.md")

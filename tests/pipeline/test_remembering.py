@@ -90,6 +90,28 @@ print("step 1.000 s")"""
     assert "It is `2.000`{out} ms." in folder.text(folder.lesson())
 
 
+def test_a_row_is_found_where_the_number_in_its_heading_is_another(make: Make) -> None:
+    script = """step = 2
+print(f"depths at a timestep of {step} ms:")
+for tau in (10, 4, 3):
+    print(f"  tau {tau} ms  {tau * step} um")"""
+    script = f"```python file=examples/a.py\n{script}\n```\n\n```output\n```"
+    folder = make(f"{script}\n\nIt is `8`{{out}} um.\n")
+    assert folder.main("update").status == 0
+    folder.replace(folder.lesson(), "step = 2", "step = 5")
+    assert folder.main("update").status == 0
+    found, lines = "It is `20`{out} um.", folder.text(folder.lesson()).split("\n")
+    assert found in lines
+    explain = folder.main("explain", f"{folder.lesson()}:{lines.index(found) + 1}")
+    line = "`tau # ms # um`, where it begins with 4 below `depths at a timestep of # ms:`"
+    assert f"number 2 of {line}" in explain.out
+
+    folder.replace(folder.lesson(), "(10, 4, 3)", "(10, 5, 3)")
+    result = folder.main("update")
+    assert result.status == 1
+    assert f"the line that showed `20` is no longer printed: {line}" in result.out
+
+
 def test_explain_says_where_the_numbers_of_a_line_come_from(make: Make) -> None:
     folder = make_cups(make)
     lines = folder.text(folder.lesson()).split("\n")
@@ -100,14 +122,39 @@ def test_explain_says_where_the_numbers_of_a_line_come_from(make: Make) -> None:
         == f"""\
 {folder.lesson()}:{line} shows 1 value
   `steel  84.9  0.0121  83.5` is printed by examples/cups.py
-    number 1 of `steel T0 = # \u00b0C k = # # /min tau = # min`
-    number 2 of `steel T0 = # \u00b0C k = # # /min tau = # min`
-    number 3 of `steel T0 = # \u00b0C k = # # /min tau = # min`
+    number 1 of `steel T0 = # \u00b0C k = # 1/min tau = # min`
+    number 2 of `steel T0 = # \u00b0C k = # 1/min tau = # min`
+    number 3 of `steel T0 = # \u00b0C k = # 1/min tau = # min`
 """
     )
     result = folder.main("explain", f"{folder.lesson()}:{line + 2}")
     assert "number 1 of `mean of tau # min`" in result.out
     assert folder.main("explain", f"{folder.lesson()}:999").status == 2
+
+
+def test_explain_says_where_words_and_settings_are_printed(make: Make) -> None:
+    script = 'for step in (2, 10):\n    print(f"at {step} ms it rests {step**2:.2f} um deep")'
+    script = f"```python file=examples/b.py\n{script}\n```\n\n```output\n```"
+    folder = make(f"{script}\n\nAt `2 ms`{{out}} it `rests`{{out}}.\n")
+    assert folder.main("update").status == 0
+    lines = folder.text(folder.lesson()).split("\n")
+    at = next(n for n, text in enumerate(lines, start=1) if text.startswith("At "))
+    result = folder.main("explain", f"{folder.lesson()}:{at}")
+    first, second = "at 2 ms it rests 4.00 um deep", "at 10 ms it rests 100.00 um deep"
+    assert (
+        result.out
+        == f"""\
+{folder.lesson()}:{at} shows 2 values
+  `2 ms` is printed by examples/b.py
+    number 1 of `{first}`, which has its words in common with other lines
+    recorded at {folder.lesson()}:7:4
+  `rests` is printed by examples/b.py
+    words of `{first}`
+    words of `{second}`
+    recorded at {folder.lesson()}:7:12
+    recorded at {folder.lesson()}:8:13
+"""
+    )
 
 
 def test_a_lesson_takes_its_addresses_along_when_it_is_renamed(make: Make) -> None:

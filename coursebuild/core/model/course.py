@@ -436,10 +436,15 @@ class Course(Struct, frozen=True):
         """Every text that shows what scripts print, with the id of its lesson or page."""
         texts = [(owner.id, document) for owner, document in self.owned_documents]
         if self.bound_numbers:
-            comma = "," in self.words_of(None).decimal
-            numbers = tuple(replace(number, comma=comma) for number in self.bound_numbers)
+            numbers = tuple(replace(n, comma=self._has_comma(n)) for n in self.bound_numbers)
             texts.append(("", Document(self.map, (Paragraph(self.map.span(), numbers),), ())))
         return tuple(texts)
+
+    def _has_comma(self, number: NumberBinding) -> bool:
+        """Whether a number of the map has the decimal comma: what is said of a lesson has its."""
+        at = number.span.start
+        owner = next((o for o in self.owners if o.span.start <= at < o.span.end), None)
+        return "," in self.words_of(owner).decimal
 
     @property
     def sources(self) -> tuple[Source, ...]:

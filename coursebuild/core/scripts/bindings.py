@@ -41,7 +41,7 @@ from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, des
 from coursebuild.core.scripts.tables import row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose, did_you_mean
 from coursebuild.core.text.near import nearest
-from coursebuild.core.text.numbers import Number, difference
+from coursebuild.core.text.numbers import Number, difference, join_thousands
 from coursebuild.core.text.quantities import with_unit
 
 _SILENT_OUTCOMES = (
@@ -289,6 +289,8 @@ def update_outputs(
             places = bound.look_up(texts)
             if bound.contradicts_words(places, texts) or bound.contradicts_itself(places, texts):
                 continue
+            if bound.text.wrong_unit(places[:1], bound.following) is not None:
+                continue  # `0.5 s`, where `12 ms` is printed
             rewritten = {bound.text.rewrite(place) for place in places}
             is_shown = all(map(bound.text.shows, places))
             if not is_shown and len(rewritten) == 1 and (new := rewritten.pop()):
@@ -305,6 +307,7 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     outputs = bound.groups[-1]
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
     with_point = BoundText.of(pointed)
+    joined = join_thousands(binding.text)
     bare, stray, label = bound_text.bare, bound_text.stray, ""
     message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"
     if not bound_text.numbers:
@@ -320,6 +323,9 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     elif pointed != binding.text and with_point.numbers and with_point.is_in(outputs):
         message = f"`{binding.text}` has a comma where outputs have a decimal point"
         help = Fix(f"write `{pointed}`", pointed)
+    elif joined != binding.text and BoundText.of(joined, binding.comma).is_in(outputs):
+        message = f"`{binding.text}` has a space that may part two numbers"
+        help = Fix("write a no-break space between its digits", joined)
     else:
         label, help = _nearest(bound_text, outputs), ""
     return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)
@@ -337,6 +343,8 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         notes = [place_note(binding, p, places_now) for p in places_now[:_MAX_NOTES]]
         help = _CHOOSE
         return diagnose("binding-mismatch", binding.text_span, message, help=help, notes=notes)
+    if places_now and (mismatch := _wrong_unit(bound, text, places_now[:1])):
+        return mismatch
     if places_now:
         place, better = places_now[0], text.rewrite(places_now[0])
         if better and not BoundText.of(better, text.comma).is_in([place.output]):
@@ -351,8 +359,19 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         )
     if binding.words:
         message = f"`{bound.path}` printed no number right after `{binding.words}`"
-        return diagnose("binding-mismatch", binding.text_span, message)
-    line_text = describe_line(bound.addresses[0])
+        of_script = replace(binding, script=bound.path)
+        elsewhere = BoundNumber(of_script, bound.outputs)
+        proposals = next(filter(None, map(elsewhere.look_up, elsewhere.groups)), [])
+        if proposals:
+            message = f"the output above has no number right after `{binding.words}`"
+            message += f", another of `{bound.path}` has"
+            binding = of_script
+        else:
+            wordless = replace(bound, binding=replace(binding, words=""))
+            proposals = next(filter(None, map(wordless.look_up, wordless.groups)), [])
+        notes = [place_note(binding, place, proposals) for place in proposals[:_MAX_NOTES]]
+        return diagnose("binding-mismatch", binding.text_span, message, notes=notes)
+    line_text = describe_line(bound.lost_address())
     message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
     proposals = replace(bound, addresses=()).places()
     notes = [place_note(binding, place, proposals) for place in proposals[:_MAX_NOTES]]

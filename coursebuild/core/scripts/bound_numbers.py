@@ -12,6 +12,8 @@ from coursebuild.core.scripts.lines import plain_text, replace_ranges
 from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText
 from coursebuild.core.text.numbers import (
     Number,
+    comma_groups,
+    group_space,
     point_decimals,
     round_like,
     scan_prose,
@@ -51,13 +53,15 @@ class BoundText(Struct, frozen=True):
 
     comma: bool = False
     """Whether its numbers were written with a comma before the decimals; here it is a point."""
+    space: str = ""
+    """What parted thousands, if a space did; here it is a comma."""
 
     @classmethod
     def of(cls, text: str, comma: bool = False) -> BoundText:
         """The numbers and the plain text of a binding, in a language that may have the comma."""
-        pointed = point_decimals(text) if comma else text
+        pointed = point_decimals(text) if comma else comma_groups(text)
         if pointed != text:
-            return replace(cls.of(pointed), comma=True)
+            return replace(cls.of(pointed), comma=comma, space=group_space(text))
         numbers = numbers_of_quantities(text, scan_prose(text))
         if not numbers:
             return cls(text, plain_text(text), (), "")
@@ -84,6 +88,8 @@ class BoundText(Struct, frozen=True):
             if rounded is None or (printed.value and not any(n.value for n in scan_prose(rounded))):
                 return ""
             rounded = write_comma(rounded) if self.comma else rounded
+            if self.space:
+                rounded = rounded.replace("." if self.comma else ",", self.space)
             places.append((number.start, number.end, rounded))
         return replace_ranges(self.text, places)
 

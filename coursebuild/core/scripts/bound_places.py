@@ -256,6 +256,12 @@ class BoundNumber(Struct, frozen=True, dict=True):
         chosen_places = [place for place in places if place in behind_words]
         return chosen_places or list(filter(self.text.shows, behind_words)) or behind_words
 
+    def lost_address(self) -> Address:
+        """The first of its addresses that is gone."""
+        count, outputs = len(self.text.numbers), self.groups[-1]
+        lost = (address for address in self.addresses if _find(address, outputs, count) is None)
+        return next(lost, self.addresses[0])
+
     def contradicts_words(
         self, places: Sequence[PrintedPlace], outputs: Sequence[PrintedText]
     ) -> bool:

@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 from msgspec import Struct
 
@@ -56,6 +57,11 @@ class ColumnTitle(Struct, frozen=True):
         """Whether a printed word is one of the title, or a mere sign."""
         return not _words(word) or _words(word) <= self.words
 
+    def is_printed_as(self, printed: str) -> bool:
+        """Whether a printed title has the same words, whatever its unit."""
+        words, unit = _words(printed), _words(unit_of_header(printed).text)
+        return bool(self.words) and self.words <= words and words - self.words <= unit
+
     def best_places(self, labels: Iterable[str]) -> list[int]:
         """The numbers of a line, by index, in whose labels most of the title's words are."""
         shared = [len(self.words & _words(label)) for label in labels]
@@ -74,6 +80,14 @@ class ColumnTitle(Struct, frozen=True):
         return True if is_same_unit(self.unit, unit) else None
 
 
+class PrintedNames(NamedTuple):
+    """What a printed number is called: its label, the title above it, its unit."""
+
+    label: str
+    above: str
+    unit: UnitText
+
+
 def swapped_columns(
     titles: Sequence[ColumnTitle], labels: Sequence[str], places: Mapping[int, int]
 ) -> dict[int, int]:
@@ -89,6 +103,34 @@ def swapped_columns(
         if len(best) == 1 and best[0] in columns:
             target[column] = columns[best[0]]
     return {a: b for a, b in target.items() if a != b and _returns(target, a)}
+
+
+def misnamed_columns(
+    titles: Sequence[ColumnTitle], numbers: Sequence[PrintedNames], places: Mapping[int, int]
+) -> list[int]:
+    """The columns whose title is printed with a number of the line that is not shown.
+
+    `places` as above. It is printed above that number, as another is above the one that is shown,
+    or in its label beside the unit, which the one that is shown has not: labels alone may also
+    stand behind numbers.
+    """
+    columns: list[int] = []
+    for column, place in places.items():
+        title, shown = titles[column], numbers[place]
+        named = [
+            at
+            for at, number in enumerate(numbers)
+            if (shown.above and title.is_printed_as(number.above))
+            or (title.words <= _words(number.label) and _has_unit_alone(title, number, shown))
+        ]
+        is_told = len(named) == 1 and named[0] not in places.values()
+        if is_told and title.words and not title.words & _words(shown.label):
+            columns.append(column)
+    return columns
+
+
+def _has_unit_alone(title: ColumnTitle, number: PrintedNames, shown: PrintedNames) -> bool:
+    return is_same_unit(title.unit, number.unit) and not is_same_unit(title.unit, shown.unit)
 
 
 def _returns(target: Mapping[int, int], start: int) -> bool:

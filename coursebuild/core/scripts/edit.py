@@ -327,6 +327,8 @@ def _update_table(
         return refusal(change.span, "the header is not what is printed", HEADER_HELP)
     if not edits:
         return None
+    if (title := matcher.doubtful_title(match)) is not None:
+        return refusal(title.span, "another number is printed with this title", HEADER_HELP)
     whole = edits[0].span.to(edits[-1].span)
     at = whole.start
     ranges = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)

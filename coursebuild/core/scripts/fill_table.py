@@ -58,6 +58,11 @@ def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
             help = "write the words and units that are printed with the numbers into the header"
         return diagnose("output-not-updatable", place, message, help=help)
     source, lines = table.span.source, kinds[best[0]]
+    for line in lines:
+        if sorted(line.places, key=lambda place: place.first) != [*line.places]:
+            message = f"the numbers of these columns are printed in another order, in `{line.line}`"
+            help, place = "put the columns in this order", table.span.first_line()
+            return diagnose("output-not-updatable", place, message, help=help)
     delimiter = re.compile(r"\n([ \t>]*)[^\r\n]*").search(source.text, table.header[-1].span.end)
     assert delimiter is not None
     write = write_comma if table.comma else str

@@ -3,8 +3,9 @@
 1. An address is the words of a printed line, the heading above it, and the number's place in the
    line. A heading is the last line above that has no number, or ends with a colon.
 2. Where several lines have the same words, the numbers of the heading and those that the line
-   begins with name it, as few as suffice. Such a name counts only as long as none was replaced by
-   another: `0.1` may be a setting, which stays, or a result that another line has by chance now.
+   begins with name it, as few as suffice: where all have the same heading, its numbers are `#`.
+   Such a name counts only as long as none was replaced by another: `0.1` may be a setting, which
+   stays, or a result that another line has by chance now.
 3. Lines that nothing tells apart have one address, where they have the same number at its place.
 4. The label of a number is what is printed right before it, or the title of its column. Numbers of
    two labels, or below two headings, are different quantities.
@@ -46,6 +47,8 @@ _Words: TypeAlias = tuple[tuple[str, bool], ...]
 _IN_BRACKETS = re.compile(r"[(\[]([^()\[\]]+)[)\]]")
 _UNIT_IN_BRACKETS = re.compile(r"\s*[(\[][^()\[\]]*[)\]][\s:=]*\Z")
 _REST_OF_ROW = re.compile(r"\A(?:[-+]?\d[\d.e+-]*(?=[\s)\],])|(?:and|to)\s|[\s)\],])*")
+_PER_UNIT = re.compile(r"(?<=# )# (?=/[^\W\d_])")
+"""The 1 of a unit among the words of a line, as in `# # /s`: it is none of its numbers."""
 _FORBIDDEN = re.compile(r'["{}]')
 """What the words of `{out="words"}` cannot hold."""
 
@@ -262,14 +265,17 @@ class PrintedText:
     def names(self, at: int, depth: int) -> tuple[str, tuple[str, ...]]:
         """The name of a line, of so many of its numbers, and those of all lines of its words."""
         siblings = self._by_words[self.heading(at), self._words[at]]
-        return self._name(at, depth), tuple(self._name(sibling, depth) for sibling in siblings)
+        in_heading = len({self._numbers(self._headings[sibling]) for sibling in siblings}) > 1
+        names = (self._name(sibling, depth, in_heading) for sibling in siblings)
+        return self._name(at, depth, in_heading), tuple(names)
 
     def find(self, address: Address, count: int) -> PrintedPlace | None:
         """What stands at an address, `count` numbers; `None` where that is not certain."""
         lines = self._by_words.get((address.heading, address.line), [])
         if address.name and lines:
             depth = len(address.name.split()) - len(self._numbers(self._headings[lines[0]]))
-            names = [self._name(at, depth) for at in lines]
+            in_heading = not address.name.startswith("#")
+            names = [self._name(at, depth, in_heading) for at in lines]
             is_intact = {*names} <= {*address.names} or {*names} >= {*address.names}
             pairs = zip(lines, names, strict=True)
             lines = [at for at, name in pairs if is_intact and name == address.name]
@@ -284,9 +290,13 @@ class PrintedText:
         numbers = self.lines[at].numbers if at >= 0 else ()
         return tuple(format(number.value.normalize(), "f") for number in numbers)
 
-    def _name(self, at: int, depth: int) -> str:
-        """The numbers of a line's heading and the first `depth` of its own; none for depth -1."""
+    def _name(self, at: int, depth: int, in_heading: bool) -> str:
+        """The numbers of a line's heading and the first `depth` of its own; none for depth -1.
+
+        `in_heading`: whether those of the heading count.
+        """
         heading, numbers = self._numbers(self._headings[at]), self._numbers(at)
+        heading = heading if in_heading else ("#",) * len(heading)
         return "" if depth < 0 else " ".join(heading + numbers[:depth])
 
     # --- words that an author types
@@ -310,16 +320,20 @@ class PrintedText:
                 yield PrintedPlace(self, at, line.numbers[first : first + count])
 
     def words_before(self, place: PrintedPlace, rivals: Iterable[PrintedPlace] = ()) -> str:
-        """The fewest words that tell printed numbers from others; empty if none do.
+        """The fewest words that tell printed numbers from the others of the output and `rivals`.
 
-        `rivals`: these others; by default all of the output.
+        Where none do, those that tell them from the rivals; empty where that is impossible, too.
         """
-        rival_places = [
-            p for p in rivals or self.places(1) if (p.at, p.first) != (place.at, place.first)
-        ]
-        contexts = [c for p in rival_places for c in p.output._contexts(p.at, p.first)]
+        rivals = [*rivals]
+        words = self._words_among([*self.places(1), *rivals], place)
+        return words or (self._words_among(rivals, place) if rivals else "")
+
+    def _words_among(self, places: Iterable[PrintedPlace], place: PrintedPlace) -> str:
+        own = self, place.at, place.first
+        rivals = [(p.output, p.at, p.first) for p in places]
+        contexts = [c for o, *at in rivals if (o, *at) != own for c in o._contexts(*at)]
         in_heading = len(_split(self.heading(place.at)))
-        choices: list[str] = []
+        choices: list[tuple[bool, bool, int, str]] = []
         for context in self._contexts(place.at, place.first):
             numbers = [at for at, (_, is_number) in enumerate(context) if is_number]
             plain_words = ["#" if is_number else word for word, is_number in context]
@@ -335,9 +349,11 @@ class PrintedText:
                     if _FORBIDDEN.search(" ".join(words[start:])):
                         break
                     if not any(_ends_with(rival, sought) for rival in contexts):
-                        choices.append(" ".join(words[start:]))
+                        is_result = words is row_words  # a number may be another tomorrow
+                        chosen = " ".join(words[start:])
+                        choices.append((is_result, "#" in chosen, len(words) - start, chosen))
                         break
-        return min(choices, key=lambda words: ("#" in words, words.count(" ")), default="")
+        return min(choices, key=lambda choice: choice[:3])[3] if choices else ""
 
     def _read_contexts(self, at: int, first: int) -> list[_Words]:
         """All words before a number, also the heading's, and again with the title of the column.
@@ -353,7 +369,7 @@ class PrintedText:
             end = line.numbers[0].end + len(unit_behind(line.text, line.numbers[0].end).text) + 1
             above = self.heading(self._headings[at]) if line.title(number) is None else ""
             texts += (f"{words} {line.text[:end]} {title}" for words in (heading, above))
-            texts.append(f"{above} {title}")
+            texts += (f"{above} {title}", f"{line.text[: line.numbers[0].start]} {title}")
         bare_texts = [_UNIT_IN_BRACKETS.sub("", text) for text in texts]
         return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
 
@@ -364,9 +380,14 @@ def masked(text: str) -> str:
 
 
 def describe_line(address: Address) -> str:
-    """The printed line of an address in words."""
-    name = f", where it begins with {address.name}" if address.name else ""
-    return f"`{address.line}`{name}" + (f" below `{address.heading}`" if address.heading else "")
+    """The printed line of an address in words, with the numbers that name it."""
+    numbers = iter(address.name.split())
+    outer, slash, own = address.heading.rpartition(" / ")
+    heading = outer + slash + re.sub("#", lambda match: next(numbers, match[0]), own)
+    first = " ".join(numbers)
+    begins = f", where it begins with {first}" if first else ""
+    line = _PER_UNIT.sub("1", address.line)
+    return f"`{line}`{begins}" + (f" below `{heading}`" if heading else "")
 
 
 def _split(text: str) -> _Words:

@@ -27,7 +27,12 @@ from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Address, ShownValue, shown_values
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
-from coursebuild.core.scripts.column_titles import ColumnTitle, swapped_columns
+from coursebuild.core.scripts.column_titles import (
+    ColumnTitle,
+    PrintedNames,
+    misnamed_columns,
+    swapped_columns,
+)
 from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
     MARK,
@@ -46,7 +51,7 @@ from coursebuild.core.scripts.table_cells import (
     table_rows,
 )
 from coursebuild.core.text.numbers import Number, only_number, relative_error, round_like
-from coursebuild.core.text.quantities import UnitText, are_different
+from coursebuild.core.text.quantities import NO_UNIT, UnitText, are_different
 from coursebuild.core.text.source import Span
 
 _ALIKE_WEIGHT = 6
@@ -250,6 +255,14 @@ class TableMatcher:
         labels, plain_labels = self._text_with_gaps.labels(line), self.text.labels(line)
         return labels if len(labels) == len(plain_labels) else plain_labels
 
+    def _names(self, line: int) -> list[PrintedNames]:
+        """What the numbers of a line are called; wide gaps tell the titles above them apart."""
+        numbers, text = self.text.lines[line].numbers, self._text_with_gaps
+        titles = [text.title(line, number) for number in text.lines[line].numbers]
+        titles = titles if len(titles) == len(numbers) else [""] * len(numbers)
+        units = [self.text.unit(line, number) for number in numbers]
+        return list(map(PrintedNames, self._labels(line), titles, units))
+
     def _count_lines(self, layout: LineLayout | None) -> int:
         """How many printed lines have a layout, whatever text their cells hold."""
         if layout is None:
@@ -389,6 +402,24 @@ class TableMatcher:
                 title = self.titles[column]
                 back = next((a for a, b in columns.items() if b == column), right)
                 yield Change(DriftKind.TEXT, title.span, title.text, self.titles[back].text)
+            names = self._names(row.line)
+            for column in misnamed_columns(self.titles, names, places):
+                title, printed = self.titles[column], names[places[column]]
+                label = printed.above or printed.label
+                yield Change(DriftKind.TEXT, title.span, title.text, label)
+
+    def doubtful_title(self, match: TableMatch) -> ColumnTitle | None:
+        """A title that is the label of another number than a new row has in its column."""
+        for row, addresses in zip(match.rows, self._addresses, strict=True):
+            labels, numbers = self._labels(row.line), self.text.lines[row.line].numbers
+            for cell, _, number in () if addresses else row.pairs:
+                title = self.titles[cell.column]
+                if (
+                    number in numbers
+                    and title.names(labels, numbers.index(number), NO_UNIT) is False
+                ):
+                    return title
+        return None
 
     def unprinted_units(self) -> Iterator[tuple[Span, str]]:
         """The titles whose units nothing prints, and these."""

@@ -50,14 +50,16 @@ _GROUPS = re.compile(
     r"(?<![0-9.,])[1-9][0-9]{0,2}(?:,[0-9]{3})+(?:\.[0-9]+)?(?!,?[0-9])(?!\.[0-9])"
 )
 """Digits as Python's format `,` writes them."""
+_SPACES = "\u00a0\u2009\u202f"
+_BEFORE_SPACE = r"(?<![0-9]\s)[1-9][0-9]{0,2}"
+_SPACED = rf"{_BEFORE_SPACE}(?:[{_SPACES}][0-9]{{3}})+(?![{_SPACES}]?[0-9])"
+_WITH_SPACES = re.compile(rf"(?<![\w.,]){_SPACED}(?!,[0-9])")
 _WITH_COMMA = re.compile(
-    r"(?<![\w.,])(?:[0-9]{1,3}(?:\.[0-9]{3})+|[0-9]+),[0-9]+(?![0-9]|[.,][0-9])"
-    r"|(?<![\w.,])[0-9]{1,3}(?:\.[0-9]{3}){2,}(?![0-9]|[.,][0-9])"
+    rf"(?<![\w.,])(?:{_BEFORE_SPACE}(?:[ {_SPACES}][0-9]{{3}})+,[0-9]+|{_SPACED}"
+    r"|(?:[0-9]{1,3}(?:\.[0-9]{3})+|[0-9]+),[0-9]+"
+    r"|[0-9]{1,3}(?:\.[0-9]{3}){2,})(?![0-9]|[.,][0-9])"
 )
-_WITH_SPACES = re.compile(
-    r"(?<![\w.,])(?<![0-9]\s)[1-9][0-9]{0,2}"
-    r"(?:(?: [0-9]{3})+(?=,[0-9])|(?:[\u00a0\u2009\u202f][0-9]{3})+)(?![0-9])"
-)
+_GROUP_SPACE = re.compile(rf"(?<=[0-9])[ {_SPACES}](?=[0-9]{{3}}(?![0-9]))")
 _SWAPPED = str.maketrans(",.", ".,")
 _DIGIT_COMMA = re.compile("[0-9],[0-9]")
 _NOTATION = re.compile(
@@ -149,8 +151,23 @@ def point_decimals(text: str) -> str:
     Points and spaces that part thousands become commas: `1.234,5` is `1,234.5`, as programs print
     it; an ordinary space only where it stands before decimals, as two numbers may have it between.
     """
-    text = _WITH_SPACES.sub(lambda match: re.sub(r"\s", ".", match[0]), text)
-    return _WITH_COMMA.sub(lambda match: match[0].translate(_SWAPPED), text)
+    return _WITH_COMMA.sub(lambda match: re.sub(r"\s", ",", match[0].translate(_SWAPPED)), text)
+
+
+def join_thousands(text: str) -> str:
+    """A text with no-break spaces for those that may part thousands."""
+    return _GROUP_SPACE.sub("\u202f", text)
+
+
+def group_space(text: str) -> str:
+    """The space that parts the thousands of a number; empty where none does."""
+    match = _GROUP_SPACE.search(text)
+    return "" if match is None else match[0]
+
+
+def comma_groups(text: str) -> str:
+    """A text of the same length, with commas for the thin or no-break spaces of thousands."""
+    return _WITH_SPACES.sub(lambda match: re.sub(r"\s", ",", match[0]), text)
 
 
 def write_comma(text: str) -> str:

@@ -325,6 +325,7 @@ class _Counter:
         text = point_decimals(number.text) if number.comma else number.text
         numbers = scan_prose(text)
         unit = number.unit or (text[numbers[-1].end :].strip() if numbers else "")
+        unit = unit or unit_behind(number.span.source.text, number.span.end).text
         mark = Span(number.span.source, number.text_span.end, number.span.end)
         claims = (_claim(part, number.text_span, unit) for part in numbers)
         self.give(number.source, mark, claims)
