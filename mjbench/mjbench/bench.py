@@ -147,6 +147,10 @@ def compile_subject(
     with report_errors(subject, "the model `{}` does not compile", ValueError):
         model = subject.compile()
     with report_errors(subject):
+        if not model.opt.timestep > 0:
+            raise SceneError(
+                f"its timestep is {model.opt.timestep:g} s, and time goes forward", subject.place
+            )
         if subject.fair and not subject.declarations_path:
             declarations = fair_declarations(model, subject.path, quick=quick)
         if loop is not None:

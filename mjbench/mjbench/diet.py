@@ -22,6 +22,7 @@ from mjbench.bench import CannotMeasureError, Subject, report_errors
 from mjbench.declarations import DeclarationError, Declarations, parse_declarations
 from mjbench.host import Host
 from mjbench.machine import this_machine
+from mjbench.pruning.candidates import KINDS
 from mjbench.pruning.comparison import pruning_scenes
 from mjbench.pruning.model_text import ModelText, ModelTextError, model_bytes, open_model
 from mjbench.pruning.readers import VIEWS, ModelReader, read_code
@@ -87,6 +88,9 @@ def look_at(
     with the reason; `only`: kinds of findings to look for, else all; `rerun`: whether the host runs
     programs with what is left.
     """
+    if unknown := sorted(set(only) - set(KINDS)):
+        message = f"no finding is of the kind `{unknown[0]}`"
+        raise CannotMeasureError(message, subject.place, f"known: {', '.join(KINDS)}")
     files: dict[str, bytes | None] = {}
     declarations = subject.read_declarations()
 

@@ -2,8 +2,8 @@
 
 It begins in a keyframe (`home`, or else the first), or where the model comes to rest under no
 command, or in its own state if it does not. Then smooth random commands follow, within their
-ranges, from several seeds: what hangs still or lies about would say nothing. A model without
-actuators that would not move gets random velocities.
+ranges, from several seeds: what hangs still or lies about would say nothing. A model whose
+actuators do nothing, and that would not move, gets random velocities.
 """
 
 from __future__ import annotations
@@ -19,14 +19,17 @@ from mjbench.problem import Array
 from mjbench.simulation import advance, without_sleep
 
 SEEDS, QUICK_SEEDS = (1, 2, 3), (1, 2)
-_SECONDS, _SETTLING = 2.0, 4.0
-"""How long a scenario is, and how long a model may take to come to rest, s."""
+_SETTLING = 4.0
+"""How long a model may take to come to rest, s."""
 _HOLD = 16
 """Timesteps for which a command holds; the longer timesteps that are tried divide it."""
 _SHARE, _FREE = 0.2, 0.3
 """How far commands go from where they begin: as a part of their range, or without a range."""
-_WAVES, _SLOWEST = 3, 1.0
-"""How many sine waves a command is made of, and the period of the first, s; each is shorter."""
+_WAVES, _SLOWEST, _FEWEST = 3, 1.0, 24
+"""How many sine waves a command is made of, and the period of the first, s; each is shorter. With
+fewer commands in it they would be no waves: where timesteps are long, it is longer."""
+_PERIODS = 2
+"""How long a scenario is, in periods of the first wave."""
 _STILL = 1e-3
 """The speed, in m/s or rad/s, below which a model has come to rest."""
 
@@ -38,14 +41,16 @@ def fair_declarations(model: Any, path: str, *, quick: bool) -> Declarations:
     keyframe, words, data = _begin(model)
     seeds = QUICK_SEEDS if quick else SEEDS
     qpos = () if keyframe is not None else tuple(data.qpos.tolist())
-    if not model.nu:
+    if not model.nu or model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION):
         return Declarations(path, (_passive(model, path, words, qpos, keyframe, data),))
     step = float(model.opt.timestep)
     hold = _HOLD * step
-    count = max(1, math.ceil(min(_SECONDS, MOST_STEPS * step) / hold - 1e-9))
+    slowest = max(_SLOWEST, _FEWEST * hold)
+    count = max(1, math.ceil(min(_PERIODS * slowest, MOST_STEPS * step) / hold - 1e-9))
     scenarios = []
     for seed in seeds:
-        rows = _commands(model, np.array(data.ctrl), seed, hold * np.arange(count, dtype=float))
+        phases = 2 * math.pi * hold / slowest * np.arange(count)
+        rows = _commands(model, np.array(data.ctrl), seed, phases)
         scenarios.append(
             DeclaredScenario(
                 name=f"seed-{seed}",
@@ -94,16 +99,19 @@ def _clip(model: Any, commands: Array) -> Array:
     return clipped
 
 
-def _commands(model: Any, middle: Array, seed: int, times: Array) -> Array:
-    """Commands (n, nu) at times (n,): sine waves about where they begin, within their ranges."""
+def _commands(model: Any, middle: Array, seed: int, angles: Array) -> Array:
+    """Commands (n, nu): sine waves about where they begin, within their ranges.
+
+    `angles`: those of the first wave, rad (n,).
+    """
     random = np.random.default_rng(seed)
     limited = model.actuator_ctrllimited != 0
     spans = np.ptp(model.actuator_ctrlrange, axis=1)
     sizes = np.where(limited, _SHARE * spans, _FREE)
-    rows = np.tile(middle, (len(times), 1))
+    rows = np.tile(middle, (len(angles), 1))
     for wave in range(1, _WAVES + 1):
         phases = random.uniform(0, 2 * math.pi, model.nu)
-        parts = np.sin(2 * math.pi * wave / _SLOWEST * times[:, None] + phases) - np.sin(phases)
+        parts = np.sin(wave * angles[:, None] + phases) - np.sin(phases)
         rows += sizes / _WAVES * random.uniform(0.5, 1.0, model.nu) * parts
     return np.array([_clip(model, row) for row in rows])
 

@@ -226,11 +226,12 @@ def _gain_text(starts: Sequence[Mapping[Column, float]], figure: str) -> str:
 def _price(row: WorkPrecisionRow) -> str:
     """What a setting costs beside the scene's own, as far as timing can tell."""
     cost = row.cost
-    if cost is None or cost.low <= 1 <= cost.high or abs(cost.value - 1) <= COST_SLACK:
+    share = "1" if cost is None else number_text(cost.value)
+    if cost is None or cost.low <= 1 <= cost.high or share == "1":
         return "takes about as long"
-    if cost.value < 1:
-        return f"takes {cost.value:.2g} of the time"
-    return f"takes {number_text(cost.value)} times as long"
+    if abs(cost.value - 1) <= COST_SLACK:
+        return "takes about as long"
+    return f"takes {share} of the time" if cost.value < 1 else f"takes {share} times as long"
 
 
 def _is_cheap(row: WorkPrecisionRow) -> bool:
@@ -377,7 +378,7 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     error = "its error is not known" if row.parted is None else ""  # chaos is told by the verdict
     if row.status != "ok":
         error = "it is lost"
-    elif (value := quantity.value_of(row)) is not None:
+    elif value := quantity.value_of(row):
         is_known = value > quantity.least * (1 + 1e-9)
         error = f"errs by {'' if is_known else 'less than '}{rounded_text(value, 2)}"
         error += f" in {quantity.label}"

@@ -68,7 +68,7 @@ def _names(loop: Loop) -> dict[str, Any]:
     names: dict[str, Any] = {"__name__": "__mjbench__", "__file__": loop.path}
     try:
         exec(loop.code, names)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise LoopError(f"{loop.path} fails: {type(error).__name__}: {error}") from error
     return names
 
@@ -99,12 +99,14 @@ class _LoopRun:
         mujoco.mj_copyState(model, data, copy, int(mujoco.mjtState.mjSTATE_INTEGRATION))
         mujoco.mj_forward(model, copy)
         try:
-            commands = np.array(self._control(model, copy), dtype=np.float64).ravel()
-        except Exception as error:
+            answer = self._control(model, copy)
+            commands = np.array([] if answer is None else answer, dtype=np.float64).ravel()
+        except (Exception, SystemExit) as error:
             reason = f"{type(error).__name__}: {error}"
             raise LoopError(f"{loop.path} fails at {data.time:g} s: {reason}") from error
         if len(commands) != model.nu:
-            message = f"the number of commands is {model.nu}, and {loop.path} gives {len(commands)}"
+            message = f"the number of commands is {model.nu}, and {loop.path} "
+            message += "returns none" if answer is None else f"gives {len(commands)}"
             raise LoopError(message)
         if loop.noise:
             limited = model.actuator_ctrllimited != 0

@@ -32,6 +32,15 @@ def test_commands_are_smooth_within_their_ranges_and_differ_by_seed() -> None:
     assert len(again) == 2 and again[0].controls == seeded_scenes[0].scenario.controls
 
 
+def test_commands_are_waves_however_long_the_timestep_is() -> None:
+    for timestep in (0.002, 0.02, 1.0):
+        text = ARM.replace("0.002", str(timestep)).format(MOTORS)
+        model = mujoco.MjModel.from_xml_string(text)
+        (first, *_) = fair_declarations(model, "arm.xml", quick=True).scenarios
+        turns = np.diff(np.sign(np.diff(np.array(first.controls)[:, 1])))
+        assert 4 <= np.count_nonzero(turns) <= 12, f"three waves and two periods at {timestep} s"
+
+
 def test_without_a_keyframe_it_begins_where_the_model_comes_to_rest() -> None:
     quick_arm = ARM.replace('damping="9"', 'damping="0.6"')
     model = mujoco.MjModel.from_xml_string(quick_arm.format(MOTORS))
@@ -43,8 +52,13 @@ def test_without_a_keyframe_it_begins_where_the_model_comes_to_rest() -> None:
 def test_what_would_not_move_gets_velocities_and_what_cannot_has_no_scenario() -> None:
     weightless = ARM.replace("<option", '<option gravity="0 0 0"').format("")
     still = mujoco.MjModel.from_xml_string(weightless)
-    (scenario,) = fair_declarations(still, "arm.xml", quick=True).scenarios
-    assert scenario.title is not None and "random velocities" in scenario.title
-    assert scenario.qvel and scenario.qvel[0] != 0
+    still_motors = weightless.replace("/>", '><flag actuation="disable"/></option>', 1)
+    disabled = mujoco.MjModel.from_xml_string(
+        still_motors.replace("</mujoco>", f"{MOTORS}</mujoco>")
+    )
+    for model in (still, disabled):
+        (scenario,) = fair_declarations(model, "arm.xml", quick=True).scenarios
+        assert scenario.title is not None and "random velocities" in scenario.title
+        assert scenario.qvel and scenario.qvel[0] != 0
     fixed = mujoco.MjModel.from_xml_string("<mujoco/>")
     assert fair_declarations(fixed, "a.xml", quick=True).scenarios == ()

@@ -168,6 +168,12 @@ def growth(period: float, late: int) -> float:
         (POLICY, ["--task", "t"], "no sensor, site or body `t`"),
         (POLICY, ["--task", "shake"], "the sensor `shake` reads what commands do"),
         ("def control(m, d): return [0, 0]", ["--period", "1"], "number of commands is 1, and"),
+        ("def control(m, d): d.ctrl[0] = 1", ["--period", "1"], "policy.py returns none"),
+        (
+            "def control(m, d): exit('no key')",
+            ["--period", "1"],
+            "fails at 0 s: SystemExit: no key",
+        ),
         ("def control(m, d): d.body('z')", ["--period", "1"], "fails at 0 s: KeyError"),
         (
             "def control(m, d): return float('nan') if d.time else 0",
