@@ -376,16 +376,20 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     if report.overlaps:
         speed += f"; it begins with one inside the other: {report.overlaps}"
     error = "its error is not known" if row.parted is None else ""  # chaos is told by the verdict
+    value = quantity.value_of(row)
     if row.status != "ok":
         error = "it is lost"
-    elif value := quantity.value_of(row):
+    elif value == 0:
+        error = "it makes no error"
+    elif value is not None:
         is_known = value > quantity.least * (1 + 1e-9)
         error = f"errs by {'' if is_known else 'less than '}{rounded_text(value, 2)}"
         error += f" in {quantity.label}"
         if quantity.name == "step_error" and row.seen is not None and row.seen > value:
             error += f", and by {rounded_text(row.seen, 2)} with the model of contacts"
     better, *_ = report.verdict.text.split("; the scene's own error")
-    lines = [speed, error + parts_text(report.parts), better, stability_text(report)]
+    error += parts_text(report.parts) if value else ""
+    lines = [speed, error, better, stability_text(report)]
     if report.horizon < report.duration * (1 - 1e-9):
         missing.append(f"nothing beyond {seconds_text(report.horizon, 3)} can be predicted")
     if report.parts is None and row.parted is None and row.status == "ok":
@@ -423,9 +427,10 @@ def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
     row = _mending_row(report, baseline, name)
     if row is None or row.seen is None or baseline.seen is None:
         return ""
-    least = "at least " if 0 < row.seen <= report.least_seen * (1 + 1e-9) else ""
-    factor = number_text(baseline.seen / row.seen) if row.seen else "far"
-    text = f"{row.name} errs {least}{factor} times less in all"
+    ratio = baseline.seen / row.seen if row.seen else math.inf
+    is_least = row.seen <= report.least_seen * (1 + 1e-9)
+    times = times_text(ratio, math.inf if is_least else ratio)
+    text = f"{row.name} errs {times} less in all"
     text += "" if row.cost is None else f" and {_price(row)}"
     pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
     worse = next(worse_columns(spreads([ratios(pair[0], pair[1], leasts_of(report))])), None)
