@@ -152,9 +152,9 @@ def compile_subject(
                 f"its timestep is {model.opt.timestep:g} s, and time goes forward", subject.place
             )
         if subject.fair and not subject.declarations_path:
-            declarations = fair_declarations(model, subject.path, quick=quick)
-        if loop is not None:
-            declarations = _under_control(declarations, loop, is_fair=not subject.declarations_path)
+            declarations = fair_declarations(model, subject.path, quick=quick, loop=loop)
+        elif loop is not None:
+            declarations = _under_control(declarations)
         if task:
             declarations = _with_task(model, declarations, task, loop)
         exact = _exact_motion(subject, host)
@@ -167,21 +167,13 @@ def compile_subject(
         return CompiledModel(subject, model, declarations, found_scenes, spec)
 
 
-def _under_control(declarations: Declarations, loop: Loop, *, is_fair: bool) -> Declarations:
-    """Scenarios in which a controller commands; those `is_fair` made become one."""
-    scenarios = declarations.scenarios
-    if is_fair:
-        words = f"under the controller {Path(loop.path).name}"
-        scenarios = tuple(
-            replace(s, name="loop", title=f"{(s.title or '').partition(', then')[0]}, {words}")
-            for s in scenarios[:1]
-        )
-        scenarios = tuple(replace(s, controls=(), hold=None) for s in scenarios)
-    for scenario in scenarios:
+def _under_control(declarations: Declarations) -> Declarations:
+    """What is declared of a model that a controller commands."""
+    for scenario in declarations.scenarios:
         if scenario.controls:
             message = "it has commands of its own, and a controller is to give them"
             raise SceneError(message, scenario.place("controls"))
-    return replace(declarations, scenarios=scenarios, sweeps=())
+    return replace(declarations, sweeps=())
 
 
 def _with_task(

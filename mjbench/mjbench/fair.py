@@ -2,19 +2,21 @@
 
 It begins in a keyframe (`home`, or else the first), or where the model comes to rest under no
 command, or in its own state if it does not. Then smooth random commands follow, within their
-ranges, from several seeds: what hangs still or lies about would say nothing. A model whose
-actuators do nothing, and that would not move, gets random velocities.
+ranges, from several seeds, or those of a controller: what hangs still or lies about would say
+nothing. A model that would not move for all that gets random velocities.
 """
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from mjbench.declarations import MOST_STEPS, Declarations, DeclaredScenario, Place
+from mjbench.loop import Loop, close_loop, step
 from mjbench.problem import Array
 from mjbench.simulation import advance, without_sleep
 
@@ -34,22 +36,33 @@ _STILL = 1e-3
 """The speed, in m/s or rad/s, below which a model has come to rest."""
 
 
-def fair_declarations(model: Any, path: str, *, quick: bool) -> Declarations:
-    """The scenarios of a model (`mjModel`) that nobody declared; none if nothing can move."""
+def fair_declarations(
+    model: Any, path: str, *, quick: bool, loop: Loop | None = None
+) -> Declarations:
+    """The scenarios of a model (`mjModel`) that nobody declared; none if nothing can move.
+
+    `loop`: the controller that commands it.
+    """
     if not model.nv:
         return Declarations(path)
     keyframe, words, data = _begin(model)
     seeds = QUICK_SEEDS if quick else SEEDS
     qpos = () if keyframe is not None else tuple(data.qpos.tolist())
-    if not model.nu or model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION):
-        return Declarations(path, (_passive(model, path, words, qpos, keyframe, data),))
-    step = float(model.opt.timestep)
-    hold = _HOLD * step
+    is_idle = not model.nu or model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    if is_idle or loop is not None:
+        if loop is not None:
+            words += f", under the controller {Path(loop.path).name}"
+        qvel = _velocities_at_rest(model, data, loop)
+        words += ", with random velocities, since else nothing would move" if qvel else ""
+        name = "start" if loop is None else "loop"
+        scenario = DeclaredScenario(name, words, keyframe, qpos=qpos, qvel=qvel, table=Place(path))
+        return Declarations(path, (scenario,))
+    hold = _HOLD * float(model.opt.timestep)
     slowest = max(_SLOWEST, _FEWEST * hold)
-    count = max(1, math.ceil(min(_PERIODS * slowest, MOST_STEPS * step) / hold - 1e-9))
+    count = max(1, math.ceil(min(_PERIODS * slowest / hold, MOST_STEPS / _HOLD) - 1e-9))
     scenarios = []
     for seed in seeds:
-        phases = 2 * math.pi * hold / slowest * np.arange(count)
+        phases = 2 * math.pi * hold / slowest * np.arange(count, dtype=float)
         rows = _commands(model, np.array(data.ctrl), seed, phases)
         scenarios.append(
             DeclaredScenario(
@@ -116,18 +129,12 @@ def _commands(model: Any, middle: Array, seed: int, angles: Array) -> Array:
     return np.array([_clip(model, row) for row in rows])
 
 
-def _passive(
-    model: Any,
-    path: str,
-    words: str,
-    qpos: tuple[float, ...],
-    keyframe: int | None,
-    data: Any,
-) -> DeclaredScenario:
+def _velocities_at_rest(model: Any, data: Any, loop: Loop | None) -> tuple[float, ...]:
+    """Random velocities where nothing would move from a state, under a controller; else none."""
+    if loop is not None:
+        close_loop(loop, model, data)
+        step(model, data, _HOLD)
     mujoco.mj_forward(model, data)
-    qvel: tuple[float, ...] = ()
-    if max(np.abs(data.qvel).max(), np.abs(data.qacc).max()) < _STILL:
-        qvel = tuple(np.random.default_rng(SEEDS[0]).uniform(-1, 1, int(model.nv)).tolist())
-        words += ", with random velocities, since else nothing would move"
-    place = Place(path)
-    return DeclaredScenario("start", words, keyframe, qpos=qpos, qvel=qvel, table=place)
+    if not max(np.abs(data.qvel).max(), np.abs(data.qacc).max()) < _STILL:
+        return ()
+    return tuple(np.random.default_rng(SEEDS[0]).uniform(-1, 1, int(model.nv)).tolist())

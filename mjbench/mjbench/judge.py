@@ -409,7 +409,7 @@ def parts_text(parts: ErrorParts | None) -> str:
         "contact_model": "the model of contacts'",
         "rounding": "rounding's",
     }[parts.dominant]
-    return f"; most of what is seen is {name}" + (f": {parts.mend}" if parts.mend else "")
+    return f"; most of it is {name}" + (f": {parts.mend}" if parts.mend else "")
 
 
 def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:

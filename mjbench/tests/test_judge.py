@@ -222,8 +222,7 @@ def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
     mend = "Euler at 2 ms, elliptic cone errs 83 times less in all and takes 1.2 times as long"
     assert report.parts.mend == mend
     assert report.verdict.lines[1].endswith(
-        "and by 8.3 with the model of contacts; most of what is seen is the model of contacts': "
-        + mend
+        "and by 8.3 with the model of contacts; most of it is the model of contacts': " + mend
     )
     small = judged(masked(), contact_model=CONES, parts=ErrorParts(1e-4, None, None, None, 0.001))
     assert small.parts is not None and small.parts.dominant == "", "none is resolved"
