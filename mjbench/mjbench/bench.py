@@ -29,14 +29,14 @@ from mjbench.fair import fair_declarations
 from mjbench.host import Host
 from mjbench.loop import Loop, LoopError
 from mjbench.machine import one_processor, this_machine
-from mjbench.problem import Array
+from mjbench.problem import Array, Scenario, Setup
 from mjbench.pruning.comparison import watch
 from mjbench.pruning.reachability import possible_pairs
 from mjbench.reports import PartFailure
 from mjbench.reports.model_report import SceneCard, SceneReport
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.scene import ExactMotion, ExactStates, Scene, SceneError, scenes
-from mjbench.simulation import silent
+from mjbench.simulation import silent, simulate
 from mjbench.sweep import THREADS, drawn_models, measure_sweep
 from mjbench.work_precision import measure_scenario
 
@@ -217,6 +217,8 @@ def run_scenario(
         if scene.declaration.draw and spec is None:
             message = "a compiled model has no parameters to draw"
             raise SceneError(message, scene.declaration.place("draw"))
+        if scene.scenario.loop is not None:
+            _check_repeats(compiled_model.model, scene.scenario, scene.scenario.loop)
         return measure_scenario(
             compiled_model.model,
             scene,
@@ -226,6 +228,14 @@ def run_scenario(
             tell=host.tell,
             profile=profile,
         )
+
+
+def _check_repeats(model: Any, scenario: Scenario, loop: Loop) -> None:
+    """A `LoopError` where a controller makes another motion of the same simulation."""
+    runs = [simulate(Setup(scenario=scenario), model).states for _ in range(2)]
+    if not np.array_equal(runs[0].qpos, runs[1].qpos, equal_nan=True):
+        message = f"{loop.path} commands another motion each time it is run"
+        raise LoopError(f"{message}: seed what is random in it, where its file begins")
 
 
 def run_sweep(

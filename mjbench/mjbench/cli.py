@@ -23,7 +23,7 @@ from mjbench.bench import CannotMeasureError, Subject
 from mjbench.cases import measure_case
 from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measure_engines
 from mjbench.host import LocalHost
-from mjbench.loop import LoopError, read_loop
+from mjbench.loop import LoopError, program_output, read_loop
 from mjbench.machine import one_processor, package_version, this_machine
 from mjbench.parts import Parts
 from mjbench.problems import all_problems
@@ -193,9 +193,10 @@ def _dependencies(file: Path) -> list[Path]:
 def _subject_of_python(file: Path) -> Subject:
     """The model that a program makes: its `spec` or `model`, or what a function so called gives."""
     try:
-        names = runpy.run_path(str(file))
-        product = names.get("spec", names.get("model"))
-        product = product() if callable(product) else product
+        with program_output():
+            names = runpy.run_path(str(file))
+            product = names.get("spec", names.get("model"))
+            product = product() if callable(product) else product
         if isinstance(product, mujoco.MjSpec):
             product = product.compile()
     except (Exception, SystemExit) as error:
