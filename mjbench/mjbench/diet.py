@@ -117,7 +117,6 @@ def look_at(
             readers=tuple(readers),
             keeps={" ".join(keep.finding.split()): keep for keep in keeps},
             locked=locked or {},
-            numbered_kinds=frozenset(_numbered_kinds(declarations)),
             clock=time.thread_time_ns,
             only=only,
             quick=quick,
@@ -173,15 +172,6 @@ def _changes(
     return tuple(
         FileChange(path, read(path) or b"", data) for path, data in sorted(new_files.items())
     )
-
-
-def _numbered_kinds(declarations: Declarations) -> Iterator[str]:
-    """The kinds of findings about things that scenarios give by number."""
-    for scenario in declarations.scenarios:
-        if scenario.controls:
-            yield "actuator-idle"
-        if isinstance(scenario.keyframe, int):
-            yield "unused-keyframe"
 
 
 def _read(source: ReaderSource, modules: frozenset[str]) -> Iterator[ModelReader]:

@@ -391,7 +391,7 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     error += parts_text(report.parts) if value else ""
     lines = [speed, error, better, stability_text(report)]
     if report.horizon < report.duration * (1 - 1e-9):
-        missing.append(f"nothing beyond {seconds_text(report.horizon, 3)} can be predicted")
+        missing.append(f"the motion beyond {seconds_text(report.horizon, 3)}")
     if report.parts is None and row.parted is None and row.status == "ok":
         missing.append("the error was not taken apart")
     if missing:

@@ -122,7 +122,7 @@ def run_trial(
     interval = max(2, steps // _LOOKS)
     holds = setup.scenario.holds(span)
     commands = {min(math.ceil(begin / timestep - 1e-9), steps): new for begin, _, new in holds}
-    is_late = any(begin and not is_multiple(begin, timestep) for begin, _, _ in holds)
+    late = [begin for begin, _, _ in holds if begin and not is_multiple(begin, timestep)]
     times = () if motion is None or start else motion.states.times.tolist()
     samples = _nearest_samples(times, timestep)
     stops = sorted(
@@ -155,7 +155,8 @@ def run_trial(
         if motion is not None and count in samples and not astray:
             distance = motion.distance(model, data, samples[count])
             if not distance < 1:
-                astray = f"off by {motion.far} at {data.time:.3g} s" + _LATE * is_late
+                astray = f"off by {motion.far} at {data.time:.3g} s"
+                astray += _LATE if late and late[0] < data.time else ""
         if stop in commands:
             commands[stop].give(data)
         sizes.append((count, math.hypot(*data.qvel.tolist())))

@@ -375,7 +375,10 @@ def test_commands_that_come_late_are_told() -> None:
     motion = KeptMotion(simulate(setup, models[1e-4]).states, np.array([1e-3]), "0.001 m")
     texts = {h: run_trial(setup, models[h], 0.4, motion).astray for h in (0.02, 0.03)}
     assert texts[0.02] == "off by 0.001 m at 0.1 s"
-    assert texts[0.03] == "off by 0.001 m at 0.09 s, with commands up to a step late"
+    assert texts[0.03] == "off by 0.001 m at 0.09 s", "before any command changes"
+    motion = replace(motion, units=np.array([0.02]), far="0.02 m")
+    astray = run_trial(setup, models[0.03], 0.4, motion).astray
+    assert astray == "off by 0.02 m at 0.21 s, with commands up to a step late"
 
 
 def test_energy_that_cannot_be_is_instability() -> None:
