@@ -39,7 +39,7 @@ def test_actuators_that_nobody_commands() -> None:
     assert names(finding) == ["push", "last"] and finding.label == INTERFACE_LABEL
     assert finding.saving.time == 1.0
     assert "0 0 0 0 0 0" in {edit.new for edit in finding.edits}, "of the keyframe"
-    assert not finding.is_fault and fixed_text(survey) == scene(PENDULUM + resting, rest=rest)
+    assert not finding.is_fault and rest in fixed_text(survey), "who commands may be elsewhere"
 
 
 def test_proof_holds_in_states_that_no_scenario_passes_through() -> None:
