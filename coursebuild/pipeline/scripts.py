@@ -390,7 +390,7 @@ def measure_sensitivity(
 
     Scripts that use MuJoCo and print what is recorded run four times with their initial states
     moved (`core.run.perturbation`), each with three times the time limit; if `halve`, twice more
-    with a half and a quarter of the timestep, and twice with shifted steps. All runs are remembered
+    with a half and a quarter of the timestep, and with shifted steps. All runs are remembered
     like others.
     `documents`: only recorded outputs in documents with these paths count.
     """

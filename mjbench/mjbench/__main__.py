@@ -1,6 +1,7 @@
 """The start of the command `mjbench`, and of `python -m mjbench`."""
 
 import os
+import signal
 import sys
 
 
@@ -12,8 +13,12 @@ def main() -> int:
     os.environ["PYTHONSAFEPATH"] = "1"
     places = filter(os.path.isabs, os.environ.get("PATH", os.defpath).split(os.pathsep))
     os.environ["PATH"] = os.pathsep.join(places)
+    handler = signal.getsignal(signal.SIGINT)
+    if handler is signal.default_int_handler:  # a half-done import says nothing but a traceback
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
     from mjbench.cli import main as run
 
+    signal.signal(signal.SIGINT, handler)
     return run()
 
 

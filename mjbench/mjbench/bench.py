@@ -29,14 +29,14 @@ from mjbench.fair import fair_declarations
 from mjbench.host import Host
 from mjbench.loop import Loop, LoopError
 from mjbench.machine import one_processor, this_machine
-from mjbench.problem import Array
+from mjbench.problem import Array, Scenario, Setup
 from mjbench.pruning.comparison import watch
 from mjbench.pruning.reachability import possible_pairs
 from mjbench.reports import PartFailure
 from mjbench.reports.model_report import SceneCard, SceneReport
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.scene import ExactMotion, ExactStates, Scene, SceneError, scenes
-from mjbench.simulation import silent
+from mjbench.simulation import silent, simulate
 from mjbench.sweep import THREADS, drawn_models, measure_sweep
 from mjbench.work_precision import measure_scenario
 
@@ -147,10 +147,14 @@ def compile_subject(
     with report_errors(subject, "the model `{}` does not compile", ValueError):
         model = subject.compile()
     with report_errors(subject):
+        if not model.opt.timestep > 0:
+            raise SceneError(
+                f"its timestep is {model.opt.timestep:g} s, and time goes forward", subject.place
+            )
         if subject.fair and not subject.declarations_path:
-            declarations = fair_declarations(model, subject.path, quick=quick)
-        if loop is not None:
-            declarations = _under_control(declarations, loop, is_fair=not subject.declarations_path)
+            declarations = fair_declarations(model, subject.path, quick=quick, loop=loop)
+        elif loop is not None:
+            declarations = _under_control(declarations)
         if task:
             declarations = _with_task(model, declarations, task, loop)
         exact = _exact_motion(subject, host)
@@ -163,21 +167,13 @@ def compile_subject(
         return CompiledModel(subject, model, declarations, found_scenes, spec)
 
 
-def _under_control(declarations: Declarations, loop: Loop, *, is_fair: bool) -> Declarations:
-    """Scenarios in which a controller commands; those `is_fair` made become one."""
-    scenarios = declarations.scenarios
-    if is_fair:
-        words = f"under the controller {Path(loop.path).name}"
-        scenarios = tuple(
-            replace(s, name="loop", title=f"{(s.title or '').partition(', then')[0]}, {words}")
-            for s in scenarios[:1]
-        )
-        scenarios = tuple(replace(s, controls=(), hold=None) for s in scenarios)
-    for scenario in scenarios:
+def _under_control(declarations: Declarations) -> Declarations:
+    """What is declared of a model that a controller commands."""
+    for scenario in declarations.scenarios:
         if scenario.controls:
             message = "it has commands of its own, and a controller is to give them"
             raise SceneError(message, scenario.place("controls"))
-    return replace(declarations, scenarios=scenarios, sweeps=())
+    return replace(declarations, sweeps=())
 
 
 def _with_task(
@@ -221,6 +217,8 @@ def run_scenario(
         if scene.declaration.draw and spec is None:
             message = "a compiled model has no parameters to draw"
             raise SceneError(message, scene.declaration.place("draw"))
+        if scene.scenario.loop is not None:
+            _check_repeats(compiled_model.model, scene.scenario, scene.scenario.loop)
         return measure_scenario(
             compiled_model.model,
             scene,
@@ -230,6 +228,14 @@ def run_scenario(
             tell=host.tell,
             profile=profile,
         )
+
+
+def _check_repeats(model: Any, scenario: Scenario, loop: Loop) -> None:
+    """A `LoopError` where a controller makes another motion of the same simulation."""
+    runs = [simulate(Setup(scenario=scenario), model).states for _ in range(2)]
+    if not np.array_equal(runs[0].qpos, runs[1].qpos, equal_nan=True):
+        message = f"{loop.path} commands another motion each time it is run"
+        raise LoopError(f"{message}: seed what is random in it, where its file begins")
 
 
 def run_sweep(

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import mujoco
@@ -23,7 +23,7 @@ from mjbench.bench import CannotMeasureError, Subject
 from mjbench.cases import measure_case
 from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measure_engines
 from mjbench.host import LocalHost
-from mjbench.loop import LoopError, read_loop
+from mjbench.loop import LoopError, program_output, read_loop
 from mjbench.machine import one_processor, package_version, this_machine
 from mjbench.parts import Parts
 from mjbench.problems import all_problems
@@ -40,6 +40,7 @@ from mjbench.reports.records import (
     Departure,
     RecordError,
     case_departures,
+    read_report,
     scene_departures,
 )
 from mjbench.reports.scene_report import ScenarioReport
@@ -52,8 +53,7 @@ _DESCRIPTION = """\
 Measures MuJoCo models: speed against error of every integrator and timestep, the largest stable
 timestep, and what a model could do without. `mjbench MODEL.xml` is `mjbench bench MODEL.xml`.
 """
-
-
+_T = TypeVar("_T")
 _STOPPED = 130
 """The exit status of a command that the user stopped."""
 
@@ -73,7 +73,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("mjbench: stopped before anything was known", file=sys.stderr)
         return _STOPPED
-    except (_UsageError, LoopError, UnknownEngineError, RecordError, OSError) as error:
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        print(f"mjbench: error: {place}{error.strerror}", file=sys.stderr)
+        return 2
+    except (_UsageError, LoopError, UnknownEngineError) as error:
         print(f"mjbench: error: {error}", file=sys.stderr)
         return 2
     except CannotMeasureError as error:
@@ -160,9 +164,7 @@ def read_subject(file: Path) -> Subject:
     for file_beside in (declarations, exact):
         if file_beside.is_file():
             digest.update(file_beside.read_bytes())
-    is_mjcf = file.suffix == ".xml"
-    dependencies = mujoco.mju_getXMLDependencies(str(folder / file.name)) if is_mjcf else []
-    for part in map(Path, dependencies):
+    for part in _dependencies(folder / file.name) if file.suffix == ".xml" else ():
         if part.exists() and not part.samefile(file):
             digest.update(part.read_bytes())
             parts += part.stat().st_size
@@ -180,13 +182,26 @@ def read_subject(file: Path) -> Subject:
     )
 
 
+def _dependencies(file: Path) -> list[Path]:
+    """The files that a MJCF pulls in; none where it cannot be read, which compiling it tells."""
+    try:
+        return [Path(path) for path in mujoco.mju_getXMLDependencies(str(file))]
+    except mujoco.FatalError:
+        return []
+
+
 def _subject_of_python(file: Path) -> Subject:
     """The model that a program makes: its `spec` or `model`, or what a function so called gives."""
-    names = runpy.run_path(str(file))
-    product = names.get("spec", names.get("model"))
-    product = product() if callable(product) else product
-    if isinstance(product, mujoco.MjSpec):
-        product = product.compile()
+    try:
+        with program_output():
+            names = runpy.run_path(str(file))
+            product = names.get("spec", names.get("model"))
+            product = product() if callable(product) else product
+        if isinstance(product, mujoco.MjSpec):
+            product = product.compile()
+    except (Exception, SystemExit) as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise _UsageError(f"{file} fails: {reason}") from error
     if not isinstance(product, mujoco.MjModel):
         raise _UsageError(f"{file} defines no `spec` or `model` of MuJoCo's")
     folder = tempfile.TemporaryDirectory(prefix="mjbench-")
@@ -233,7 +248,7 @@ def _bench(arguments: argparse.Namespace) -> int:
         _print(arguments, ENGINES.encode(report), text.engines_text(report, _style()), remarks)
         return 0
     timed = arguments.check is None
-    recorded = None if timed else BENCH.decode(arguments.check.read_bytes())
+    recorded = None if timed else _read(arguments.check, BENCH.decode)
     compiled_model = bench.compile_subject(
         subject, host, quick=quick, loop=loop, task=arguments.task
     )
@@ -303,19 +318,22 @@ def _style() -> Style:
 
 def _show(arguments: argparse.Namespace) -> int:
     """Show a report of any kind; what follows from its figures is derived anew."""
-    data, style = arguments.report.read_bytes(), _style()
-    for kind in (BENCH, DIET, ENGINES, STABILITY):
-        try:
-            report = kind.decode(data)
-        except RecordError as error:
-            problem = error
-            continue
-        if isinstance(report, SceneReport) and arguments.html is not None:
-            arguments.html.write_text(scene_page(report), "utf-8")
-            return 0
-        sys.stdout.write(text.report_text(report, style))
+    report = _read(arguments.report, read_report)
+    if arguments.html is None:
+        sys.stdout.write(text.report_text(report, _style()))
         return 0
-    raise problem
+    if not isinstance(report, SceneReport):
+        raise _UsageError(f"{arguments.report} is no report on a model in scenarios: no page")
+    arguments.html.write_text(scene_page(report), "utf-8")
+    return 0
+
+
+def _read(file: Path, decode: Callable[[bytes], _T]) -> _T:
+    """What a file of a report holds."""
+    try:
+        return decode(file.read_bytes())
+    except RecordError as error:
+        raise _UsageError(f"{file} {error}") from None
 
 
 def _stability(arguments: argparse.Namespace) -> int:
@@ -328,7 +346,7 @@ def _stability(arguments: argparse.Namespace) -> int:
         cases |= matches
     recorded = None
     if arguments.check is not None:
-        recorded = STABILITY.decode(arguments.check.read_bytes())
+        recorded = _read(arguments.check, STABILITY.decode)
     machine, reports, parts = this_machine(pinned=True), [], Parts()
     for name, problem in cases.items():
         with one_processor():

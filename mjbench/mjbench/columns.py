@@ -126,8 +126,8 @@ class Spread(Struct, frozen=True):
         """
         if self.column[0] == LOST:
             return "it is lost"
-        least = "at least " if self.is_worse and self.column in unresolved else ""
-        times = f"{least}{times_text(self.low, self.low if least else self.high)}"
+        is_least = self.is_worse and self.column in unresolved
+        times = times_text(self.low, math.inf if is_least else self.high)
         return f"{self.label(figure)} is {times} as large {self.column[1]}"
 
     def label(self, figure: str) -> str:
@@ -156,9 +156,11 @@ def spreads(starts: Sequence[Mapping[Column, float]]) -> list[Spread]:
 
 
 def times_text(low: float, high: float) -> str:
-    """A factor, or the factors between which it lies, in words."""
+    """A factor, or the factors between which it lies, in words; the second may be infinite."""
     least, most = number_text(low), number_text(high)
-    return f"{least} times" if least == most else f"{least} to {most} times"
+    if least == most:
+        return f"{least} times"
+    return f"at least {least} times" if math.isinf(high) else f"{least} to {most} times"
 
 
 def number_text(number: float) -> str:

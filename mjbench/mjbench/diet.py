@@ -22,6 +22,7 @@ from mjbench.bench import CannotMeasureError, Subject, report_errors
 from mjbench.declarations import DeclarationError, Declarations, parse_declarations
 from mjbench.host import Host
 from mjbench.machine import this_machine
+from mjbench.pruning.candidates import KINDS
 from mjbench.pruning.comparison import pruning_scenes
 from mjbench.pruning.model_text import ModelText, ModelTextError, model_bytes, open_model
 from mjbench.pruning.readers import VIEWS, ModelReader, read_code
@@ -87,6 +88,9 @@ def look_at(
     with the reason; `only`: kinds of findings to look for, else all; `rerun`: whether the host runs
     programs with what is left.
     """
+    if unknown := sorted(set(only) - set(KINDS)):
+        message = f"no finding is of the kind `{unknown[0]}`"
+        raise CannotMeasureError(message, subject.place, f"known: {', '.join(KINDS)}")
     files: dict[str, bytes | None] = {}
     declarations = subject.read_declarations()
 
@@ -113,7 +117,6 @@ def look_at(
             readers=tuple(readers),
             keeps={" ".join(keep.finding.split()): keep for keep in keeps},
             locked=locked or {},
-            numbered_kinds=frozenset(_numbered_kinds(declarations)),
             clock=time.thread_time_ns,
             only=only,
             quick=quick,
@@ -169,15 +172,6 @@ def _changes(
     return tuple(
         FileChange(path, read(path) or b"", data) for path, data in sorted(new_files.items())
     )
-
-
-def _numbered_kinds(declarations: Declarations) -> Iterator[str]:
-    """The kinds of findings about things that scenarios give by number."""
-    for scenario in declarations.scenarios:
-        if scenario.controls:
-            yield "actuator-idle"
-        if isinstance(scenario.keyframe, int):
-            yield "unused-keyframe"
 
 
 def _read(source: ReaderSource, modules: frozenset[str]) -> Iterator[ModelReader]:

@@ -2,50 +2,68 @@
 
 It begins in a keyframe (`home`, or else the first), or where the model comes to rest under no
 command, or in its own state if it does not. Then smooth random commands follow, within their
-ranges, from several seeds: what hangs still or lies about would say nothing. A model without
-actuators that would not move gets random velocities.
+ranges, from several seeds, or those of a controller: what hangs still or lies about would say
+nothing. A model that would not move for all that gets random velocities.
 """
 
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from mjbench.declarations import MOST_STEPS, Declarations, DeclaredScenario, Place
+from mjbench.loop import Loop, close_loop, step
 from mjbench.problem import Array
 from mjbench.simulation import advance, without_sleep
 
 SEEDS, QUICK_SEEDS = (1, 2, 3), (1, 2)
-_SECONDS, _SETTLING = 2.0, 4.0
-"""How long a scenario is, and how long a model may take to come to rest, s."""
+_SETTLING = 4.0
+"""How long a model may take to come to rest, s."""
 _HOLD = 16
 """Timesteps for which a command holds; the longer timesteps that are tried divide it."""
 _SHARE, _FREE = 0.2, 0.3
 """How far commands go from where they begin: as a part of their range, or without a range."""
-_WAVES, _SLOWEST = 3, 1.0
-"""How many sine waves a command is made of, and the period of the first, s; each is shorter."""
+_WAVES, _SLOWEST, _FEWEST = 3, 1.0, 24
+"""How many sine waves a command is made of, and the period of the first, s; each is shorter. With
+fewer commands in it they would be no waves: where timesteps are long, it is longer."""
+_PERIODS = 2
+"""How long a scenario is, in periods of the first wave."""
 _STILL = 1e-3
 """The speed, in m/s or rad/s, below which a model has come to rest."""
 
 
-def fair_declarations(model: Any, path: str, *, quick: bool) -> Declarations:
-    """The scenarios of a model (`mjModel`) that nobody declared; none if nothing can move."""
+def fair_declarations(
+    model: Any, path: str, *, quick: bool, loop: Loop | None = None
+) -> Declarations:
+    """The scenarios of a model (`mjModel`) that nobody declared; none if nothing can move.
+
+    `loop`: the controller that commands it.
+    """
     if not model.nv:
         return Declarations(path)
     keyframe, words, data = _begin(model)
     seeds = QUICK_SEEDS if quick else SEEDS
     qpos = () if keyframe is not None else tuple(data.qpos.tolist())
-    if not model.nu:
-        return Declarations(path, (_passive(model, path, words, qpos, keyframe, data),))
-    step = float(model.opt.timestep)
-    hold = _HOLD * step
-    count = max(1, math.ceil(min(_SECONDS, MOST_STEPS * step) / hold - 1e-9))
+    is_idle = not model.nu or model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    if is_idle or loop is not None:
+        if loop is not None:
+            words += f", under the controller {Path(loop.path).name}"
+        qvel = _velocities_at_rest(model, data, loop)
+        words += ", with random velocities, since else nothing would move" if qvel else ""
+        name = "start" if loop is None else "loop"
+        scenario = DeclaredScenario(name, words, keyframe, qpos=qpos, qvel=qvel, table=Place(path))
+        return Declarations(path, (scenario,))
+    hold = _HOLD * float(model.opt.timestep)
+    slowest = max(_SLOWEST, _FEWEST * hold)
+    count = max(1, math.ceil(min(_PERIODS * slowest / hold, MOST_STEPS / _HOLD) - 1e-9))
     scenarios = []
     for seed in seeds:
-        rows = _commands(model, np.array(data.ctrl), seed, hold * np.arange(count, dtype=float))
+        phases = 2 * math.pi * hold / slowest * np.arange(count, dtype=float)
+        rows = _commands(model, np.array(data.ctrl), seed, phases)
         scenarios.append(
             DeclaredScenario(
                 name=f"seed-{seed}",
@@ -94,32 +112,29 @@ def _clip(model: Any, commands: Array) -> Array:
     return clipped
 
 
-def _commands(model: Any, middle: Array, seed: int, times: Array) -> Array:
-    """Commands (n, nu) at times (n,): sine waves about where they begin, within their ranges."""
+def _commands(model: Any, middle: Array, seed: int, angles: Array) -> Array:
+    """Commands (n, nu): sine waves about where they begin, within their ranges.
+
+    `angles`: those of the first wave, rad (n,).
+    """
     random = np.random.default_rng(seed)
     limited = model.actuator_ctrllimited != 0
     spans = np.ptp(model.actuator_ctrlrange, axis=1)
     sizes = np.where(limited, _SHARE * spans, _FREE)
-    rows = np.tile(middle, (len(times), 1))
+    rows = np.tile(middle, (len(angles), 1))
     for wave in range(1, _WAVES + 1):
         phases = random.uniform(0, 2 * math.pi, model.nu)
-        parts = np.sin(2 * math.pi * wave / _SLOWEST * times[:, None] + phases) - np.sin(phases)
+        parts = np.sin(wave * angles[:, None] + phases) - np.sin(phases)
         rows += sizes / _WAVES * random.uniform(0.5, 1.0, model.nu) * parts
     return np.array([_clip(model, row) for row in rows])
 
 
-def _passive(
-    model: Any,
-    path: str,
-    words: str,
-    qpos: tuple[float, ...],
-    keyframe: int | None,
-    data: Any,
-) -> DeclaredScenario:
+def _velocities_at_rest(model: Any, data: Any, loop: Loop | None) -> tuple[float, ...]:
+    """Random velocities where nothing would move from a state, under a controller; else none."""
+    if loop is not None:
+        close_loop(loop, model, data)
+        step(model, data, _HOLD)
     mujoco.mj_forward(model, data)
-    qvel: tuple[float, ...] = ()
-    if max(np.abs(data.qvel).max(), np.abs(data.qacc).max()) < _STILL:
-        qvel = tuple(np.random.default_rng(SEEDS[0]).uniform(-1, 1, int(model.nv)).tolist())
-        words += ", with random velocities, since else nothing would move"
-    place = Place(path)
-    return DeclaredScenario("start", words, keyframe, qpos=qpos, qvel=qvel, table=place)
+    if not max(np.abs(data.qvel).max(), np.abs(data.qacc).max()) < _STILL:
+        return ()
+    return tuple(np.random.default_rng(SEEDS[0]).uniform(-1, 1, int(model.nv)).tolist())

@@ -226,11 +226,12 @@ def _gain_text(starts: Sequence[Mapping[Column, float]], figure: str) -> str:
 def _price(row: WorkPrecisionRow) -> str:
     """What a setting costs beside the scene's own, as far as timing can tell."""
     cost = row.cost
-    if cost is None or cost.low <= 1 <= cost.high or abs(cost.value - 1) <= COST_SLACK:
+    share = "1" if cost is None else number_text(cost.value)
+    if cost is None or cost.low <= 1 <= cost.high or share == "1":
         return "takes about as long"
-    if cost.value < 1:
-        return f"takes {cost.value:.2g} of the time"
-    return f"takes {number_text(cost.value)} times as long"
+    if abs(cost.value - 1) <= COST_SLACK:
+        return "takes about as long"
+    return f"takes {share} of the time" if cost.value < 1 else f"takes {share} times as long"
 
 
 def _is_cheap(row: WorkPrecisionRow) -> bool:
@@ -375,18 +376,22 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     if report.overlaps:
         speed += f"; it begins with one inside the other: {report.overlaps}"
     error = "its error is not known" if row.parted is None else ""  # chaos is told by the verdict
+    value = quantity.value_of(row)
     if row.status != "ok":
         error = "it is lost"
-    elif (value := quantity.value_of(row)) is not None:
+    elif value == 0:
+        error = "it makes no error"
+    elif value is not None:
         is_known = value > quantity.least * (1 + 1e-9)
         error = f"errs by {'' if is_known else 'less than '}{rounded_text(value, 2)}"
         error += f" in {quantity.label}"
         if quantity.name == "step_error" and row.seen is not None and row.seen > value:
             error += f", and by {rounded_text(row.seen, 2)} with the model of contacts"
     better, *_ = report.verdict.text.split("; the scene's own error")
-    lines = [speed, error + parts_text(report.parts), better, stability_text(report)]
+    error += parts_text(report.parts) if value else ""
+    lines = [speed, error, better, stability_text(report)]
     if report.horizon < report.duration * (1 - 1e-9):
-        missing.append(f"nothing beyond {seconds_text(report.horizon, 3)} can be predicted")
+        missing.append(f"the motion beyond {seconds_text(report.horizon, 3)}")
     if report.parts is None and row.parted is None and row.status == "ok":
         missing.append("the error was not taken apart")
     if missing:
@@ -404,7 +409,7 @@ def parts_text(parts: ErrorParts | None) -> str:
         "contact_model": "the model of contacts'",
         "rounding": "rounding's",
     }[parts.dominant]
-    return f"; most of what is seen is {name}" + (f": {parts.mend}" if parts.mend else "")
+    return f"; most of it is {name}" + (f": {parts.mend}" if parts.mend else "")
 
 
 def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
@@ -422,9 +427,10 @@ def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
     row = _mending_row(report, baseline, name)
     if row is None or row.seen is None or baseline.seen is None:
         return ""
-    least = "at least " if 0 < row.seen <= report.least_seen * (1 + 1e-9) else ""
-    factor = number_text(baseline.seen / row.seen) if row.seen else "far"
-    text = f"{row.name} errs {least}{factor} times less in all"
+    ratio = baseline.seen / row.seen if row.seen else math.inf
+    is_least = row.seen <= report.least_seen * (1 + 1e-9)
+    times = times_text(ratio, math.inf if is_least else ratio)
+    text = f"{row.name} errs {times} less in all"
     text += "" if row.cost is None else f" and {_price(row)}"
     pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
     worse = next(worse_columns(spreads([ratios(pair[0], pair[1], leasts_of(report))])), None)

@@ -10,8 +10,10 @@
 from __future__ import annotations
 
 import math
+import sys
 import weakref
 from collections import deque
+from contextlib import AbstractContextManager, redirect_stdout
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -24,6 +26,11 @@ from numpy.typing import NDArray
 
 class LoopError(Exception):
     """A controller cannot be used; the message says why, and names its file."""
+
+
+def program_output() -> AbstractContextManager[Any]:
+    """Let what a program of the user's prints go to where errors go: the output is the report's."""
+    return redirect_stdout(sys.stderr)
 
 
 class Loop(Struct, frozen=True, eq=False):
@@ -67,8 +74,9 @@ def _names(loop: Loop) -> dict[str, Any]:
     """What the file of a controller defines, run anew."""
     names: dict[str, Any] = {"__name__": "__mjbench__", "__file__": loop.path}
     try:
-        exec(loop.code, names)
-    except Exception as error:
+        with program_output():
+            exec(loop.code, names)
+    except (Exception, SystemExit) as error:
         raise LoopError(f"{loop.path} fails: {type(error).__name__}: {error}") from error
     return names
 
@@ -99,12 +107,15 @@ class _LoopRun:
         mujoco.mj_copyState(model, data, copy, int(mujoco.mjtState.mjSTATE_INTEGRATION))
         mujoco.mj_forward(model, copy)
         try:
-            commands = np.array(self._control(model, copy), dtype=np.float64).ravel()
-        except Exception as error:
+            with program_output():
+                answer = self._control(model, copy)
+            commands = np.array([] if answer is None else answer, dtype=np.float64).ravel()
+        except (Exception, SystemExit) as error:
             reason = f"{type(error).__name__}: {error}"
             raise LoopError(f"{loop.path} fails at {data.time:g} s: {reason}") from error
         if len(commands) != model.nu:
-            message = f"the number of commands is {model.nu}, and {loop.path} gives {len(commands)}"
+            message = f"the number of commands is {model.nu}, and {loop.path} "
+            message += "returns none" if answer is None else f"gives {len(commands)}"
             raise LoopError(message)
         if loop.noise:
             limited = model.actuator_ctrllimited != 0

@@ -165,13 +165,14 @@ _MOST_OVERLAPS = 3
 def _initial_overlaps(model: Any, data: Any, half_thickness: Array) -> str:
     """What lies inside something else at the beginning, the deepest first, in words."""
     mujoco.mj_fwdPosition(model, data)
-    depths: dict[tuple[int, int], float] = {}
+    depths: dict[str, float] = {}
     for contact in data.contact[: data.ncon]:
         pair, depth = (int(contact.geom[0]), int(contact.geom[1])), -float(contact.dist)
         if min(pair) >= 0 and depth > _OVERLAP * half_thickness[list(pair)].min():
-            depths[pair] = max(depth, depths.get(pair, 0.0))
+            names = pair_names(model, pair)
+            depths[names] = max(depth, depths.get(names, 0.0))
     deepest = sorted(depths.items(), key=lambda item: -item[1])
-    parts = [f"{pair_names(model, pair)} by {depth:.3g} m" for pair, depth in deepest]
+    parts = [f"{names} by {depth:.3g} m" for names, depth in deepest]
     rest = len(parts) - _MOST_OVERLAPS
     return "; ".join(parts[:_MOST_OVERLAPS]) + (f"; and {rest} more" if rest > 0 else "")
 

@@ -100,6 +100,7 @@ def test_what_a_model_does_not_need_is_taken_out_and_its_interface_stays(
         (["{}.txt"], "", 2, "there is no file "),
         (["{}", "--quick", "--record", "a"], "", 2, "--quick measures only a part"),
         (["{}", "--engines", "mjocuo"], "", 2, "there is no engine `mjocuo`: known are mujoco, "),
+        (["diet", "{}", "--only", "x"], "", 1, "arm.xml: no finding is of the kind `x`"),
         (["stability", "nope"], "", 2, "no hard case is called `nope`: tumbling-box, "),
         (["{}"], SWING.replace("0.1", "0.1001"), 1, "arm.toml: scenario.0.duration: `duration`"),
         (["{}"], SWING + "hold = true\n", 1, "arm.toml: Expected `float | null`, got `bool`"),
@@ -111,6 +112,47 @@ def test_mistakes_are_told_in_words(
     model.with_suffix(".toml").write_text(toml)
     assert main([part.format(model) for part in arguments]) == status
     assert f"mjbench: error: {message}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "source", "status", "message"),
+    [
+        ("a.xml", "<mujoco>", 1, "the model `a` does not compile: XML parse error"),
+        ("a.xml", "", 1, "the model `a` does not compile: ParseXML: empty file"),
+        ("a.xml", '<mujoco><include file="b.xml"/></mujoco>', 1, "Error opening file 'b.xml'"),
+        ("a.xml", ARM.replace("0.002", "0"), 1, "its timestep is 0 s, and time goes forward"),
+        ("a.xml", ARM.replace("0.002", "-1"), 1, "its timestep is -1 s, and time goes forward"),
+        ("a.py", "1 / 0", 2, "a.py fails: ZeroDivisionError: division by zero"),
+        ("a.py", "raise SystemExit('no key')", 2, "a.py fails: SystemExit: no key"),
+        ("a.py", "def spec(n): pass", 2, "a.py fails: TypeError: spec() missing 1 required"),
+        ("a.py", "spec = 1", 2, "a.py defines no `spec` or `model` of MuJoCo's"),
+    ],
+)
+def test_a_model_that_cannot_be_had_is_told_in_words(
+    name: str, source: str, status: int, message: str, tmp_path: Path, capsys: Capture
+) -> None:
+    (tmp_path / name).write_text(source)
+    assert main([str(tmp_path / name), "--quick"]) == status
+    error = capsys.readouterr().err
+    assert error.startswith("mjbench: error: ") and message in error
+
+
+def test_what_is_no_report_is_told_with_its_name(model: Path, capsys: Capture) -> None:
+    file = model.with_name("old.json")
+    for text, reason in (
+        ("{", "is damaged: Input data was truncated"),
+        ("[]", "holds no report of mjbench"),
+        ('{"holds": "mjbench diet", "version": 4}', "has version 4 of its format, and this one is"),
+        ('{"holds": "mjbench diet", "version": 5}', "is damaged: Object missing required field"),
+    ):
+        file.write_text(text)
+        assert main(["show", str(file)]) == 2
+        assert capsys.readouterr().err.startswith(f"mjbench: error: {file} {reason}")
+    assert main([str(model), "--check", str(file)]) == 2
+    error = capsys.readouterr().err
+    assert error == f"mjbench: error: {file} holds no report of `mjbench bench`\n"
+    assert main(["show", str(file.with_name("none"))]) == 2
+    assert capsys.readouterr().err.endswith("none: No such file or directory\n")
 
 
 SPRING = """\

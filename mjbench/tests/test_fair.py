@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mjbench.fair import fair_declarations
+from mjbench.loop import Loop
 from mjbench.scene import scenes
 
 ARM = """<mujoco><option timestep="0.002"/><worldbody>
@@ -32,6 +33,15 @@ def test_commands_are_smooth_within_their_ranges_and_differ_by_seed() -> None:
     assert len(again) == 2 and again[0].controls == seeded_scenes[0].scenario.controls
 
 
+def test_commands_are_waves_however_long_the_timestep_is() -> None:
+    for timestep in (0.002, 0.02, 1.0):
+        text = ARM.replace("0.002", str(timestep)).format(MOTORS)
+        model = mujoco.MjModel.from_xml_string(text)
+        (first, *_) = fair_declarations(model, "arm.xml", quick=True).scenarios
+        turns = np.diff(np.sign(np.diff(np.array(first.controls)[:, 1])))
+        assert 4 <= np.count_nonzero(turns) <= 12, f"three waves and two periods at {timestep} s"
+
+
 def test_without_a_keyframe_it_begins_where_the_model_comes_to_rest() -> None:
     quick_arm = ARM.replace('damping="9"', 'damping="0.6"')
     model = mujoco.MjModel.from_xml_string(quick_arm.format(MOTORS))
@@ -43,8 +53,21 @@ def test_without_a_keyframe_it_begins_where_the_model_comes_to_rest() -> None:
 def test_what_would_not_move_gets_velocities_and_what_cannot_has_no_scenario() -> None:
     weightless = ARM.replace("<option", '<option gravity="0 0 0"').format("")
     still = mujoco.MjModel.from_xml_string(weightless)
-    (scenario,) = fair_declarations(still, "arm.xml", quick=True).scenarios
-    assert scenario.title is not None and "random velocities" in scenario.title
-    assert scenario.qvel and scenario.qvel[0] != 0
+    still_motors = weightless.replace("/>", '><flag actuation="disable"/></option>', 1)
+    disabled = mujoco.MjModel.from_xml_string(
+        still_motors.replace("</mujoco>", f"{MOTORS}</mujoco>")
+    )
+    for model in (still, disabled):
+        (scenario,) = fair_declarations(model, "arm.xml", quick=True).scenarios
+        assert scenario.title is not None and "random velocities" in scenario.title
+        assert scenario.qvel and scenario.qvel[0] != 0
+    held = mujoco.MjModel.from_xml_string(weightless.replace("</mujoco>", f"{MOTORS}</mujoco>"))
+    for command, is_moving in ((0.0, False), (1.0, True)):
+        code = compile(f"def control(m, d): return [{command}, 0]", "hold.py", "exec")
+        loop = Loop("hold.py", code, 0.02)
+        (scenario,) = fair_declarations(held, "arm.xml", quick=True, loop=loop).scenarios
+        assert scenario.name == "loop" and scenario.title is not None
+        assert ", under the controller hold.py" in scenario.title
+        assert bool(scenario.qvel) is not is_moving
     fixed = mujoco.MjModel.from_xml_string("<mujoco/>")
     assert fair_declarations(fixed, "a.xml", quick=True).scenarios == ()

@@ -222,8 +222,7 @@ def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
     mend = "Euler at 2 ms, elliptic cone errs 83 times less in all and takes 1.2 times as long"
     assert report.parts.mend == mend
     assert report.verdict.lines[1].endswith(
-        "and by 8.3 with the model of contacts; most of what is seen is the model of contacts': "
-        + mend
+        "and by 8.3 with the model of contacts; most of it is the model of contacts': " + mend
     )
     small = judged(masked(), contact_model=CONES, parts=ErrorParts(1e-4, None, None, None, 0.001))
     assert small.parts is not None and small.parts.dominant == "", "none is resolved"
@@ -349,6 +348,12 @@ def test_a_mend_that_errs_less_than_is_known_errs_at_least_so_many_times_less() 
     report = judged(rows, least_seen=0.25, parts=parts)
     assert report.parts is not None
     assert report.parts.mend.startswith("RK4 at 10 ms errs at least 2.4 times less in all")
+    rows, parts = rows_of((1, 0.6), (1.04, 1e-9)), ErrorParts(0.6, None, None, 1e-9, 1e-9)
+    mend = "RK4 at 10 ms errs over 10000 times less in all and takes about as long"
+    for least in (1e-8, 1e-10):
+        parts = judged(rows, least_seen=least, parts=parts).parts
+        assert parts is not None and parts.mend == mend
+    assert judged(rows_of((1, 0.0)), parts=parts).verdict.lines[1] == "it makes no error"
 
 
 def test_verdicts_claim_only_what_holds() -> None:

@@ -7,8 +7,10 @@ import math
 from msgspec.structs import replace
 
 from mjbench.reports import reach, reach_bound
-from mjbench.reports.limits import limit_text, map_text, reach_text
+from mjbench.reports.limits import limit_text, map_text, reach_text, stability_text
 from mjbench.reports.scene_report import StableRow
+from samples.reports import row as setting_row
+from samples.reports import scenario
 
 LOW, HIGH = 1.0, 1000.0
 ROW = StableRow("RK4", 25.44, (LOW, HIGH), None, 5.0, 1, 9, None, (25.44, 25.48))
@@ -41,6 +43,22 @@ def test_where_digits_do_not_hold_the_least_limit_is_given_and_why() -> None:
     assert limit_text(nowhere) == "none from 1 s on"
     near = StableRow("RK4", 0.056, (0.1, 1.0), None, 1.0, 8, 8, None, (0.05502, 0.05656))
     assert limit_text(near).startswith("55 ms; "), "not 60 ms"
+
+
+def test_the_sentence_tells_which_starts_it_speaks_of() -> None:
+    def sentence(**changes: object) -> str:
+        row = replace(ROW, near="all", through=None, **changes)
+        report = scenario(
+            [setting_row("RK4", own=True)], stable=(replace(row, shown=limit_text(row)),)
+        )
+        return stability_text(report)
+
+    every, near = "every step tried, to 1000 s", "near the motion of small steps"
+    assert sentence(largest="all", bracket=None) == f"RK4 stays bounded and {near} at {every}"
+    text = f"RK4 stays bounded from every start at steps to 19 s; {near} from its own at {every}"
+    assert sentence(largest="all", bracket=(19.0, HIGH)) == text
+    text = f"RK4 stays bounded from every start at no step from 1 s on; {near} from its own at "
+    assert sentence(largest="all", bracket=(0.0, HIGH)) == f"{text}{every}"
 
 
 def test_all_and_none_are_values_of_their_own() -> None:

@@ -168,6 +168,17 @@ def growth(period: float, late: int) -> float:
         (POLICY, ["--task", "t"], "no sensor, site or body `t`"),
         (POLICY, ["--task", "shake"], "the sensor `shake` reads what commands do"),
         ("def control(m, d): return [0, 0]", ["--period", "1"], "number of commands is 1, and"),
+        ("def control(m, d): d.ctrl[0] = 1", ["--period", "1"], "policy.py returns none"),
+        (
+            "def control(m, d): exit('no key')",
+            ["--period", "1"],
+            "fails at 0 s: SystemExit: no key",
+        ),
+        (
+            "import os\ndef control(m, d): return [os.urandom(1)[0]]",
+            ["--period", "0.05"],
+            "policy.py commands another motion each time it is run: seed what is random in it",
+        ),
         ("def control(m, d): d.body('z')", ["--period", "1"], "fails at 0 s: KeyError"),
         (
             "def control(m, d): return float('nan') if d.time else 0",
@@ -185,6 +196,15 @@ def test_mistakes_in_a_loop_are_told(
     captured = capsys.readouterr()
     assert message in " ".join(f"{captured.out} {captured.err}".split())
     assert status in (1, 2)
+
+
+def test_what_a_controller_prints_is_not_in_the_report(model: Path, capsys: Any) -> None:
+    policy = "print('loaded')\ndef control(m, d):\n    print('asked')\n    1 / 0"
+    model.with_name("policy.py").write_text(policy, "utf-8")
+    words = ["--quick", "--json", "--control", str(model.with_name("policy.py")), "--period", "1"]
+    main([str(model), *words])
+    captured = capsys.readouterr()
+    assert "loaded\nasked\n" in captured.err and "asked" not in captured.out
 
 
 def test_commands_of_a_scenario_and_a_controller_exclude_each_other(

@@ -350,7 +350,18 @@ def test_a_motion_that_dies_is_not_near_however_small_it_was() -> None:
     """The pivot moves by 0.012 m, less than a tenth of the extent: `discrete` stops it."""
     discrete = rows_of(TOPPLING.format("1e8"), qpos=(0.005, 0.0), search=(2e-4, 1e-2))["discrete"]
     assert discrete.largest == "all"
-    assert discrete.near == "none" and "/ 0.00299 m at " in discrete.near_reason
+    assert discrete.near == "none" and "or 0.00299 m at " in discrete.near_reason
+
+
+def test_a_long_step_is_compared_where_it_ends() -> None:
+    """RK4 is exact in free fall, and at 0.2 s it is not where samples at 0.18 and 0.22 s are."""
+    xml = """<mujoco><option timestep="{}" integrator="RK4"/><worldbody><body>
+    <joint name="z" type="slide" axis="0 0 1"/><geom size=".1" mass="1"/></body></worldbody>
+    </mujoco>"""
+    models = {h: mujoco.MjModel.from_xml_string(xml.format(h)) for h in (0.02, 0.1)}
+    setup = Setup(scenario=Scenario(0.6, 0.02, (0.0,), (0.0,)))
+    motion = KeptMotion(simulate(setup, models[0.02]).states, np.array([1e-6]), "1e-6 m")
+    assert run_trial(setup, models[0.1], 0.6, motion).astray == ""
 
 
 def test_commands_that_come_late_are_told() -> None:
@@ -364,7 +375,10 @@ def test_commands_that_come_late_are_told() -> None:
     motion = KeptMotion(simulate(setup, models[1e-4]).states, np.array([1e-3]), "0.001 m")
     texts = {h: run_trial(setup, models[h], 0.4, motion).astray for h in (0.02, 0.03)}
     assert texts[0.02] == "off by 0.001 m at 0.1 s"
-    assert texts[0.03] == "off by 0.001 m at 0.09 s, with commands up to a step late"
+    assert texts[0.03] == "off by 0.001 m at 0.09 s", "before any command changes"
+    motion = replace(motion, units=np.array([0.02]), far="0.02 m")
+    astray = run_trial(setup, models[0.03], 0.4, motion).astray
+    assert astray == "off by 0.02 m at 0.21 s, with commands up to a step late"
 
 
 def test_energy_that_cannot_be_is_instability() -> None:

@@ -17,7 +17,7 @@ from coursebuild.core.run.perturbation import model_and_data
 def change_steps(mujoco: ModuleType, numpy: ModuleType, run: int) -> None:
     """Change the steps of this process from now on.
 
-    The run's number: −1 makes each step as two, −2 as four; −3 and −4 shift steps by thirds.
+    The run's number: −1 makes each step as two, −2 as four; −3 to −5 shift them by thirds.
     """
     if run >= -2:
         DividedSteps(mujoco, numpy, 2**-run)

@@ -42,9 +42,10 @@ PERTURBATION = 1e-12
 RUNS = 4
 """Runs with moved states of each script: two pairs in opposite directions, the second pair half as
 far away."""
-FINER_RUNS, SHIFTED_RUNS = (-1, -2), (-3, -4)
+FINER_RUNS, SHIFTED_RUNS = (-1, -2), (-3, -4, -5)
 """The numbers of the runs in which each step is made as 2 and as 4, and of those in which a script
-sees states of a third and of two thirds of a timestep later."""
+sees states of a third, of two thirds and of a whole timestep later. The whole one changes each time
+that is looked for at every step; the others tell it from one between steps."""
 CHAOTIC = 1e8
 """A simulation is chaotic if its states are more than this many times as far apart at the end as at
 the beginning: fewer than eight of a number's sixteen digits are left."""

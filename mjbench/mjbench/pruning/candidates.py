@@ -52,8 +52,6 @@ class FindingKind(Struct, frozen=True):
     """Why such a thing changes no motion, in any state; empty where only runs speak for it."""
     fields: str = ""
     """Fields of the compiled model that differ without it, beside those of its view."""
-    numbered: str = ""
-    """Why such things stay where scenarios give them by number."""
     interface: bool = False
     """Whether such things are there for whoever drives the model, whose code may be elsewhere."""
 
@@ -85,7 +83,7 @@ KINDS = {
         "Actuator",
         "its force is a multiple of a command that is always 0",
         "key_ctrl nu nout nJmom tree_sleep_policy",
-        "scenarios give commands by number: their rows would have to be shortened",
+        interface=True,
     ),
     "tendon-idle": FindingKind(
         "nothing acts along the {}",
@@ -99,7 +97,7 @@ KINDS = {
         "keyframe",
         "Keyframe",
         _UNUSED,
-        numbered="scenarios give keyframes by number: another would have the number",
+        interface=True,
     ),
     "unused-site": FindingKind("nothing uses the {}", "site", "Site", _UNMOVED, interface=True),
     "unused-material": FindingKind("nothing uses the {}", "material", "Material", _UNUSED),

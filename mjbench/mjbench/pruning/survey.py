@@ -96,8 +96,6 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     """By the finding: `KIND`, or `KIND NAME`."""
     locked: Mapping[str, str]
     """Files that are not to be changed, and why."""
-    numbered_kinds: Collection[str]
-    """Kinds of findings about things that scenarios give by their number."""
     clock: Clock | None
     """`None`: nothing is timed."""
     quick: bool
@@ -374,7 +372,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         change = frozenset() if trial is None else trials.difference(trial, rest)
         timed = not kind.startswith("unused-") or kind == "unused-site"
         reader = self._find_noticing_reader((), views_of(items), change)
-        unfixed = self._reason_unfixed(kind, reason, label, edits)
+        unfixed = self._reason_unfixed(reason, label, edits)
         places = []
         for item in items:
             if (element := item.element) is not None:
@@ -400,18 +398,14 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         )
         return PrunedGroup(tuple(items), finding)
 
-    def _reason_unfixed(
-        self, kind: str, keep_reason: str, label: str, edits: Iterable[ModelEdit]
-    ) -> str:
+    def _reason_unfixed(self, keep_reason: str, label: str, edits: Iterable[ModelEdit]) -> str:
         """Why `--fix` does not act on a finding; empty where it does."""
         if keep_reason:
             return "it is kept"
         if label == INTERFACE_LABEL:
-            return "whoever drives the model may read it"
+            return "whoever drives the model may use it"
         if label != PROVED_LABEL:
             return f"only what is {PROVED_LABEL} is changed"
-        if kind in self.numbered_kinds:
-            return KINDS[kind].numbered
         locked = (self.locked.get(edit.path, "") for edit in edits)
         return next(filter(None, locked), "")
 

@@ -87,6 +87,7 @@ def stability_text(report: ScenarioReport) -> str:
     if row is None:
         return ""
     low, high = (seconds_text(step, 3) for step in row.searched)
+    bound, _, own_bound = row.shown.partition("; ")
     answers: dict[str, list[str]] = {}
     for limit, words, reason in (
         (row.largest, "bounded", ""),
@@ -96,12 +97,15 @@ def stability_text(report: ScenarioReport) -> str:
         is_bound = words == "bounded" or row.largest == "all"
         if limit is None or not (is_bound or reach_bound(limit) < reach_bound(row.largest)):
             continue  # not asked, or as long as it stays bounded
-        text = row.shown if words == "bounded" else reach_text(limit, row.searched)
+        text = bound if words == "bounded" else reach_text(limit, row.searched)
         if text[:1].isdigit():
             text = f"steps to {text}"
-        elif limit in ("all", "none"):
-            text = f"every step tried, to {high}" if limit == "all" else f"no step from {low} on"
+        else:
+            is_all = text.startswith("all")
+            text = f"every step tried, to {high}" if is_all else f"no step from {low} on"
         text = f"at {text}" + (f" ({reason})" if reason else "")
+        if own_bound:  # what else is asked is asked of the own start alone
+            words += " from every start" if words == "bounded" else " from its own"
         answers.setdefault(text, []).append(words)
     stays = "; ".join(f"{_enumerate(words)} {text}" for text, words in answers.items())
     return f"{row.integrator} stays {stays}"

@@ -56,15 +56,14 @@ class ReportKind(Struct, Generic[_T], frozen=True):
         """Read a file; a `RecordError` where it holds no such report."""
         fields = [("holds", str), ("version", int), (self.field, self.type)]
         file = msgspec.defstruct("File", fields, forbid_unknown_fields=True)
+        head = _head(data)
+        if head.get("holds") != f"mjbench {self.name}":
+            raise RecordError(f"holds no report of `mjbench {self.name}`")
+        if (version := head.get("version")) != VERSION:
+            raise RecordError(f"has version {version} of its format, and this one is {VERSION}")
         try:
-            value = msgspec.json.decode(data)
-            head = value if isinstance(value, dict) else {}
-            if head.get("holds") != f"mjbench {self.name}":
-                raise RecordError(f"holds no report of `mjbench {self.name}`")
-            if (version := head.get("version")) != VERSION:
-                raise RecordError(f"has version {version} of its format, and this one is {VERSION}")
-            report: _T = getattr(msgspec.convert(value, file), self.field)
-        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            report: _T = getattr(msgspec.convert(head, file), self.field)
+        except (msgspec.ValidationError, RecursionError) as error:
             raise RecordError(f"is damaged: {error}") from None
         return report
 
@@ -75,6 +74,25 @@ DIET = ReportKind("diet", "diet", DietReport)
 STABILITY: ReportKind[tuple[CaseReport, ...]] = ReportKind(
     "stability", "cases", tuple[CaseReport, ...]
 )
+
+
+def read_report(data: bytes) -> Any:
+    """Read a file with a report of any kind; a `RecordError` where it holds none."""
+    name = _head(data).get("holds")
+    kinds: tuple[ReportKind[Any], ...] = (BENCH, DIET, ENGINES, STABILITY)
+    for kind in kinds:
+        if name == f"mjbench {kind.name}":
+            return kind.decode(data)
+    raise RecordError("holds no report of mjbench")
+
+
+def _head(data: bytes) -> dict[str, Any]:
+    """The keys and values of a file; a `RecordError` where it is no JSON."""
+    try:
+        value = msgspec.json.decode(data)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise RecordError(f"is damaged: {error}") from None
+    return value if isinstance(value, dict) else {}
 
 
 def _text(value: Any, indent: int, lists: int) -> str:

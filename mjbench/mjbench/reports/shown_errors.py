@@ -170,7 +170,7 @@ def seconds_text(value: float, digits: int = 6) -> str:
 
 def horizon_error_text(errors: Mapping[str, float]) -> str:
     """The errors at which predictions end."""
-    return " / ".join(f"{error:.3g} {unit}" for unit, error in errors.items()) or "0.1"
+    return " or ".join(f"{error:.3g} {unit}" for unit, error in errors.items()) or "0.1"
 
 
 def setting_text(setting: MeasuredSetting, like: MeasuredSetting | None = None) -> str:

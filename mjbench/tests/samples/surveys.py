@@ -73,7 +73,6 @@ def run_survey(
     *,
     lesson: str = "",
     keeps: Mapping[str, str] | None = None,
-    numbered_kinds: Collection[str] = (),
     declarations: Declarations = NO_DECLARATIONS,
     quick: bool = True,
     clock: Clock | None = None,
@@ -93,7 +92,6 @@ def run_survey(
             key: Keep(key, reason, "models/a.toml", 1, 1) for key, reason in (keeps or {}).items()
         },
         locked={},
-        numbered_kinds=numbered_kinds,
         clock=clock,
         quick=quick,
         tell=lambda _: None,

@@ -42,7 +42,7 @@ def measure(
     """What runs that printed this say of a recorded output; four runs, the last repeated.
 
     `finer` was printed with half and with a quarter of the timestep, `shifted` with steps of 2 ms
-    and of 1/240 s shifted by a third and by two thirds.
+    and of 1/240 s shifted by a third, two thirds and a whole.
     """
     block = recording(recorded) if isinstance(recorded, str) else recorded
     assert base is not None or isinstance(recorded, str)
@@ -124,10 +124,8 @@ def test_a_time_that_is_looked_for_at_every_step_is_known_to_a_step(
     printed: str, finer: str, shifted: str, expected: list[int | str]
 ) -> None:
     text = "value {}"
-    half, quarter, third, two_thirds = map(text.format, f"{finer} {shifted}".split())
-    result = measure(
-        *(text.format(printed),) * 2, finer=(half, quarter), shifted=(third, two_thirds)
-    )
+    half, quarter, *later = map(text.format, f"{finer} {shifted}".split())
+    result = measure(*(text.format(printed),) * 2, finer=(half, quarter), shifted=tuple(later))
     values = [(d.converged, d.instead, d.sampled) for d in result.doubts]
     assert values == ([tuple(expected)] if expected else [])
 

@@ -101,8 +101,12 @@ def test_model_of_the_course_is_a_case_if_something_is_known_of_it(
     (course / "models" / "drop.xml").write_text(
         f"<mujoco><worldbody><body>{joint}{geom}</body></worldbody></mujoco>"
     )
-    assert run(course, "drap") == 2
-    assert capsys.readouterr().err.endswith("is called `drap`; did you mean `drop`?\n")
+    folder = course / "models" / "arms"
+    folder.mkdir()
+    (folder / "gripper.xml").write_text("<mujoco/>")
+    for name, meant in (("drap", "drop"), ("arms/griper", "arms/gripper")):
+        assert run(course, name) == 2
+        assert capsys.readouterr().err.endswith(f"is called `{name}`; did you mean `{meant}`?\n")
     assert run(course, "drop") == 2
     assert capsys.readouterr().err == (
         "coursebuild: no theory is known for `drop`; "
