@@ -120,6 +120,7 @@ class MainRun(TypedDict):
     diverged: bool
     pictures: Annotated[list[MainPicture], Meta(min_length=1)]
     plots: MainPlots
+    reach: NotRequired[list[tuple[Number, Number] | None]]
     scene: dict[str, Any]
     film: list[Any]
     arrows: dict[str, Number | str] | None

@@ -188,6 +188,7 @@ class LabTrials:
             seconds=reply.seconds,
             tried=reply.tried,
             parity=_in_english(*reply.describe(lab.kind)),
+            clipped=tuple(verdict.clipped_curves(lab.fields.plots, reply.reach)),
             cached=kept_reply is not None,
         )
         output = LabOutput("", {"id": trial.name} | config, parity=reply.describe(lab.kind))
@@ -332,6 +333,9 @@ class _LabTrial(Struct, frozen=True):
                 f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
                 for body in ([] if reply.main is None else reply.main.get("fallen", []))
             ),
+            clipped=()
+            if reply.main is None or reply.main["diverged"]
+            else tuple(verdict.clipped_curves(lab.fields.plots, reply.main.get("reach", []))),
             cached=cached_evaluation is not None,
             unexported=export.reason,
         )
