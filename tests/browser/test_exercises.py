@@ -72,6 +72,25 @@ def test_attempts_are_judged_watched_and_kept(page: Page) -> None:
     expect(bar.get_by_text("You have solved this exercise before.")).to_be_visible()
 
 
+def test_the_start_is_seen_before_anything_runs(
+    browsers: Mapping[str, Browser], sites: Mapping[str, Site]
+) -> None:
+    with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
+        page, _ = watch_page(context)
+        asked: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(sites["exercises"].url(ADDRESS))
+        titles = ("A bar that balances", "Hold it", "A push")
+        for element, _ in (exercise(page, title) for title in titles):
+            until_shown = "img => img.complete && img.naturalWidth === 640"
+            poster = element.locator(".lab-view img")
+            wait_for_condition(page, lambda: bool(poster.evaluate(until_shown)))
+        assert not any(address.endswith(".wasm") for address in asked)
+        bar, _ = exercise(page, titles[0])
+        press(bar, "Play")
+        expect(bar.locator(".lab-view img")).to_have_count(0)
+
+
 def pytest_of(path: Path) -> tuple[int, str]:
     """The exit status and the output of `pytest` on a file, as a reader without plugins runs it."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", path.name]

@@ -26,7 +26,7 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
     """Draw an exercise without its editor."""
     lab = page.inputs.trials.get(block.lab.span.start)
     language, words = LANGUAGES[block.subject], page.renderer.words
-    config = script = name = ""
+    title, config, script, name = block.title or words("exercise.untitled"), "", "", ""
     if isinstance(lab, PublishedLab):
         name, config = lab.name, page.place.href(lab.config)
         script = page.place.href(lab.script)
@@ -36,9 +36,10 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
         return page.template("blocks/code.html", language=language, html=html)
 
     download = page.inputs.trials.get(block.span.start)
-    file = href = ""
-    if isinstance(download, PublishedExercise) and download.path:
-        file, href = download.name, page.place.href(download.path)
+    file = href = picture = ""
+    if isinstance(download, PublishedExercise):
+        file = download.name if download.path else ""
+        href, picture = (page.place.href(p) if p else "" for p in (download.path, download.picture))
     return page.template(
         "exercise/exercise.html",
         file=file,
@@ -49,7 +50,10 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
         config=config,
         script=script,
         data=json.dumps(block.data(), ensure_ascii=False, separators=(",", ":")),
-        title=block.title or words("exercise.untitled"),
+        title=title,
+        picture=picture,
+        size=lab.record.size if isinstance(lab, PublishedLab) and lab.record else (),
+        alt=words("lab.picture", title=title, t=number(0)),
         task=page.blocks(block.task),
         subject=_subject(words, block),
         start=code(block.start.text),

@@ -386,7 +386,8 @@ class _LabTrial(Struct, frozen=True):
 
             picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
             keep = self.context.run_store.store.get_or_make
-            picture = keep("pictures", picture_key, lambda: draw_picture(self.lab, main))
+            start = main["scene"], main["pictures"][0]["frame"]
+            picture = keep("pictures", picture_key, lambda: draw_picture(self.lab, *start))
             film = b""
             if main["film"]:
                 film = keep("films", picture_key, lambda: draw_film(self.lab, main))
