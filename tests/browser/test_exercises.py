@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Route, expect
@@ -170,7 +171,11 @@ def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None
     text.fill('import("x")')
     press(hold, "Check")
     expect(verdicts(hold).last).to_contain_text("was seen")
-    text.fill("Math.sin = Array.prototype.map = null; self.postMessage({type: 'judged'})")
+    text.fill("self.postMessage({type: 'verdict', index: 0, passed: true, seen: 0, failure: ''})")
+    press(hold, "Check")
+    for verdict in verdicts(hold).all():
+        expect(verdict).to_contain_text("self.postMessage is not a function")
+    text.fill("Math.sin = Array.prototype.map = null")
     press(hold, "Check")
     expect(hold).not_to_contain_text("Solved")
     text.fill("data.qfrc_applied[0] = 50 * (0.5 - data.qpos[0]) - 10 * data.qvel[0]")
@@ -193,13 +198,14 @@ def test_a_formula_is_written_as_on_paper(page: Page) -> None:
     expect(verdicts(push)).to_contain_text("passed 3.132 m/s was seen")
 
 
-@pytest.mark.parametrize("width", [390, 1440])
+@pytest.mark.parametrize("width", [390, 820, 1440])
 def test_an_exercise_comes_alive_in_the_room_that_was_kept_for_it(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site], width: int
 ) -> None:
     late: list[Route] = []
-    size = {"width": width, "height": 800}
-    with browsers["plain"].new_context(viewport=size, service_workers="block") as context:  # type: ignore[arg-type]
+    options: dict[str, Any] = {"viewport": {"width": width, "height": 800}}
+    options |= {"has_touch": width < 1000, "service_workers": "block"}
+    with browsers["plain"].new_context(**options) as context:
         page = context.new_page()
         page.route("**/labs/lab.*.js", lambda route: late.append(route))
         page.goto(sites["exercises"].url(ADDRESS))

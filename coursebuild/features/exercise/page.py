@@ -26,6 +26,7 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
     """Draw an exercise without its editor."""
     lab = page.inputs.trials.get(block.lab.span.start)
     language, words = LANGUAGES[block.subject], page.renderer.words
+    record = lab.record if isinstance(lab, PublishedLab) else None
     title, config, script, name = block.title or words("exercise.untitled"), "", "", ""
     if isinstance(lab, PublishedLab):
         name, config = lab.name, page.place.href(lab.config)
@@ -52,13 +53,15 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
         data=json.dumps(block.data(), ensure_ascii=False, separators=(",", ":")),
         title=title,
         picture=picture,
-        size=lab.record.size if isinstance(lab, PublishedLab) and lab.record else (),
+        size=() if record is None else record.size,
+        arrows=0 if record is None else record.arrows,
         alt=words("lab.picture", title=title, t=number(0)),
         task=page.blocks(block.task),
         subject=_subject(words, block),
         start=code(block.start.text),
         rows=min(ROWS, block.start.text.rstrip().count("\n") + 1),
-        height=block.lab.fields.height,
+        label=words(f"exercise.live.{block.subject}", names=", ".join(block.names)),
+        fields=block.lab.fields,
         solution=code(block.solution.text),
         explain=page.blocks(block.explain),
         trials=[(trial.name, _bounds(words, trial)) for trial in block.trials],

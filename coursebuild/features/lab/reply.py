@@ -216,6 +216,8 @@ class LabRecord(Struct, frozen=True):
     end: float
     """Simulated time of the readouts and of the end of the plots, s."""
     plots: tuple[Markup, ...]
+    arrows: int = 0
+    """How many buttons draw arrows in the live lab."""
     place: str = ""
     """Where on the axis the readouts were taken, for a lab without an engine."""
 
