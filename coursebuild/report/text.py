@@ -152,6 +152,7 @@ def lab_line(line: TrialLine, style: Style) -> str:
     parts += [line.play] if line.play else []
     parts += [f"motion fills {100 * line.fill:.1f} %"] if line.fill is not None else []
     parts += [f"falls out of the scene: {body}" for body in line.fallen]
+    parts += [f"leaves its plot: {curve}" for curve in line.clipped]
     parts += [f"no Python export: {line.unexported}"] if line.unexported else []
     parts += ["cached"] if line.cached else [f"{line.seconds:.2f} s"]
     return f"{verdict} {line.name}  {style.paint(', '.join(parts), FAINT)}"

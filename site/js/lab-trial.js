@@ -7,7 +7,8 @@
  *   boot('')            → ''             compiles and starts the engine; ends before the next call
  *   booted('')          → version        or throws why it did not start
  *   trial(requestJson)  → replyJson      lab/trial/trial.js; `mjb` of the request, a model in base64, goes before the buffer
- *   judge(requestJson)  → replyJson      an attempt at an exercise (exercise/judge.js): `{refused, verdicts, moved}` of `{config, code, plays}`
+ *   judge(requestJson)  → replyJson      an attempt at an exercise (exercise/judge.js): `{refused, verdicts}` of `{config, code, plays}`,
+ *                                        and with `plays` what `played` of lab/trial/motion.js says
  *   lookUp(pathsJson)   → JSON           which of `data.qpos` and the like exist, with the model in 'mjb'
  *   trying('')          → JSON           for a trial that was stopped from outside: `stuck`, the entry whose code may never return, or
  *                                        `null`, and `trying`, the entry that was tried
@@ -22,7 +23,7 @@ import { Lab } from './lab/core/lab.js'
 import { current } from './lab/core/piece.js'
 import { fromBase64 } from './lab/trial/base64.js'
 import { Guard } from './lab/trial/guard.js'
-import { playedShare } from './lab/trial/motion.js'
+import { played } from './lab/trial/motion.js'
 import { lookUp } from './lab/trial/names.js'
 import { runTrial, stuckEntry } from './lab/trial/trial.js'
 
@@ -79,16 +80,16 @@ globalThis.judge = (json) => {
   const bytes = new Uint8Array(buffers.get('mjb'))
   guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
   const verdicts = []
-  let [refused, moved] = ['', null]
+  let [refused, seen] = ['', {}]
   try {
     const functions = new Function(`"use strict"; return ${code}`)()
     for (const verdict of judge(engine, config, functions, bytes, () => beats[0]++)) verdicts.push(verdict)
-    if (plays) moved = playedShare(() => new Lab(engine, config.exercise.subject === 'model' ? config.attempt : bytes, config, attemptCode(config, functions)))
+    if (plays) seen = played(() => new Lab(engine, config.exercise.subject === 'model' ? config.attempt : bytes, config, attemptCode(config, functions)))
   } catch (error) {
     refused = error.message ?? String(error)
   }
   guard.repair()
-  return JSON.stringify({ refused, verdicts: refused === '' ? verdicts : [], moved })
+  return JSON.stringify({ refused, verdicts: refused === '' ? verdicts : [], ...seen })
 }
 
 globalThis.lookUp = (json) => JSON.stringify(lookUp(engine, new Uint8Array(buffers.get('mjb')), JSON.parse(json)))

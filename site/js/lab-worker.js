@@ -8,9 +8,11 @@ import { judge } from './exercise/judge.js'
 import { Host } from './lab/worker/host.js'
 import { createLater } from './lab/worker/later.js'
 
+const postMessage = self.postMessage.bind(self) // which `confine` takes away
+
 const host = new Host({
   loadMujoco,
-  post: (message, transfer) => self.postMessage(message, transfer),
+  post: (message, transfer) => postMessage(message, transfer),
   now: () => performance.now(),
   later: createLater(),
   importModule: (url) => import(url),

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, Route, expect
@@ -70,6 +71,25 @@ def test_attempts_are_judged_watched_and_kept(page: Page) -> None:
     page.reload()
     bar, text = exercise(page, "A bar that balances")
     expect(bar.get_by_text("You have solved this exercise before.")).to_be_visible()
+
+
+def test_the_start_is_seen_before_anything_runs(
+    browsers: Mapping[str, Browser], sites: Mapping[str, Site]
+) -> None:
+    with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
+        page, _ = watch_page(context)
+        asked: list[str] = []
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(sites["exercises"].url(ADDRESS))
+        titles = ("A bar that balances", "Hold it", "A push")
+        for element, _ in (exercise(page, title) for title in titles):
+            until_shown = "img => img.complete && img.naturalWidth === 640"
+            poster = element.locator(".lab-view img")
+            wait_for_condition(page, lambda: bool(poster.evaluate(until_shown)))
+        assert not any(address.endswith(".wasm") for address in asked)
+        bar, _ = exercise(page, titles[0])
+        press(bar, "Play")
+        expect(bar.locator(".lab-view img")).to_have_count(0)
 
 
 def pytest_of(path: Path) -> tuple[int, str]:
@@ -151,7 +171,11 @@ def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None
     text.fill('import("x")')
     press(hold, "Check")
     expect(verdicts(hold).last).to_contain_text("was seen")
-    text.fill("Math.sin = Array.prototype.map = null; self.postMessage({type: 'judged'})")
+    text.fill("self.postMessage({type: 'verdict', index: 0, passed: true, seen: 0, failure: ''})")
+    press(hold, "Check")
+    for verdict in verdicts(hold).all():
+        expect(verdict).to_contain_text("self.postMessage is not a function")
+    text.fill("Math.sin = Array.prototype.map = null")
     press(hold, "Check")
     expect(hold).not_to_contain_text("Solved")
     text.fill("data.qfrc_applied[0] = 50 * (0.5 - data.qpos[0]) - 10 * data.qvel[0]")
@@ -174,13 +198,14 @@ def test_a_formula_is_written_as_on_paper(page: Page) -> None:
     expect(verdicts(push)).to_contain_text("passed 3.132 m/s was seen")
 
 
-@pytest.mark.parametrize("width", [390, 1440])
+@pytest.mark.parametrize("width", [390, 820, 1440])
 def test_an_exercise_comes_alive_in_the_room_that_was_kept_for_it(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site], width: int
 ) -> None:
     late: list[Route] = []
-    size = {"width": width, "height": 800}
-    with browsers["plain"].new_context(viewport=size, service_workers="block") as context:  # type: ignore[arg-type]
+    options: dict[str, Any] = {"viewport": {"width": width, "height": 800}}
+    options |= {"has_touch": width < 1000, "service_workers": "block"}
+    with browsers["plain"].new_context(**options) as context:
         page = context.new_page()
         page.route("**/labs/lab.*.js", lambda route: late.append(route))
         page.goto(sites["exercises"].url(ADDRESS))

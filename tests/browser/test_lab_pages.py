@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping
 
@@ -170,6 +171,62 @@ def test_goal_is_reached_kept_and_its_motion_shown_to_others(
         second_page.goto(base + "progress/index.html")
         expect(second_page.locator('[data-progress="overall"]')).to_contain_text("1 of 1 task done")
         assert [*console, *also_said] == []
+
+
+def test_run_that_stopped_by_itself_is_gone_through_kept_and_repeated(
+    context: BrowserContext, base: str
+) -> None:
+    def answer(route: Route) -> None:
+        route.fulfill(json=json.loads(fetch_text(route)) | {"stopAt": 1})
+
+    context.route(re.compile(r"/labs/[^/]*lab-1\.[0-9a-f]+\.json$"), answer)
+    page, console = watch_page(context)
+    page.goto(base + PAGE)
+    swing = lab(page)
+    bar, clock = swing.get_by_label("Time of the run"), swing.locator(".lab-time")
+
+    def play_to_the_end() -> dict[str, object]:
+        note_changes(swing)
+        press(swing, "Play")
+        has_been(swing, "playing")
+        reach(page, SWING, "paused")
+        expect(clock).to_have_text("1.000 s")
+        return state_of(page, swing)
+
+    last = play_to_the_end()
+    assert last["n"] == 500
+    expect(swing.locator(".lab-announce")).to_have_text("Stopped at 1.00 s.")
+    press(swing, "One step back")
+    expect(clock).to_have_text("0.998 s")
+    press(swing, "One step")
+    expect(clock).to_have_text("1.000 s")
+    assert state_of(page, swing) == last
+    bar.fill("0.5")
+    expect(clock).to_have_text("0.500 s")
+    plot = swing.locator(".lab-live .lab-plot")
+    plot.click(position={"x": 60, "y": 60})
+    wait_for_condition(page, lambda: 0 < time_of(swing) < 0.5)
+    bar.press("End")
+    expect(clock).to_have_text("1.000 s")
+    press(swing, "Keep this run")
+    bar.fill("0.5")
+    expect(clock).to_have_text("0.500 s")
+    assert play_to_the_end() == last
+    press(swing, "Reset")
+    expect(clock).to_have_text("0.000 s")
+    expect(bar).to_be_disabled()
+    expect(swing.get_by_role("button", name="Drop the kept run")).to_be_visible()
+    assert play_to_the_end() == last
+    note_changes(swing)
+    press(swing, "Play")  # goes on from there
+    has_been(swing, "playing")
+    wait_for_condition(page, lambda: time_of(swing) > 1)
+    press(swing, "Pause")
+    reach(page, SWING, "paused")
+    bar.fill("1")
+    expect(clock).to_have_text("1.000 s")
+    assert floats(state_of(page, swing)).tobytes() == floats(last).tobytes()
+    assert console == []
 
 
 # ------------------------------------------------------------------------- what goes wrong

@@ -326,6 +326,8 @@ class TrialLine(Struct, frozen=True):
     """What Play alone moves, in words."""
     fallen: tuple[str, ...] = ()
     """What has fallen out of the scene, and to where."""
+    clipped: tuple[str, ...] = ()
+    """Which curves leave the part of a plot that its author has fixed, and how far."""
     untried: str = ""
     """Why it was not tried; empty if it was."""
 

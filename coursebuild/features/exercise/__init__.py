@@ -39,15 +39,19 @@ def start(context: TrialContext) -> TrialRun:
 
 
 def publish(results: Results, assets: Assets) -> PublishedTrials:
-    """Publish the files in Python; in the page an exercise runs on the files of its lab."""
+    """Publish files in Python and pictures; in the page an exercise runs on the files of its lab."""
     values: dict[str, PublishedExercise] = {}
     files: list[OutputFile] = []
     for trial in results.trials:
         if isinstance(trial.output, ExerciseOutput):
             name, text = trial.output.script or ("", "")
-            path = hashed_name(f"assets/labs/{name}", text.encode()) if name else ""
-            values[trial.line.name] = PublishedExercise(name, path)
-            files += [OutputFile(path, text.encode())] if name else []
+            made = {name: text.encode(), f"{trial.line.name}.png": trial.output.picture}
+            paths = {
+                file: hashed_name(f"assets/labs/{file}", data) for file, data in made.items() if data
+            }
+            files += [OutputFile(path, made[file]) for file, path in paths.items()]
+            path, picture = (paths.get(file, "") for file in made)
+            values[trial.line.name] = PublishedExercise(name, path, picture)
     return PublishedTrials(values, tuple(files))
 
 

@@ -132,14 +132,18 @@ class ExerciseOutput(Struct, frozen=True):
 
     script: tuple[str, str] | None
     """Name and text of a file in Python that judges what a reader writes in it."""
+    picture: bytes = b""
+    """What a reader begins with, as PNG; empty if that cannot be shown."""
 
 
 class PublishedExercise(Struct, frozen=True):
-    """The file of an exercise in a site."""
+    """The files of an exercise in a site."""
 
     name: str
     path: str
     """Its site path; empty if there is none."""
+    picture: str = ""
+    """The site path of the picture; likewise."""
 
 
 def exercise_trials(course: Course) -> Iterator[Trial]:

@@ -26,7 +26,8 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
     """Draw an exercise without its editor."""
     lab = page.inputs.trials.get(block.lab.span.start)
     language, words = LANGUAGES[block.subject], page.renderer.words
-    config = script = name = ""
+    record = lab.record if isinstance(lab, PublishedLab) else None
+    title, config, script, name = block.title or words("exercise.untitled"), "", "", ""
     if isinstance(lab, PublishedLab):
         name, config = lab.name, page.place.href(lab.config)
         script = page.place.href(lab.script)
@@ -36,9 +37,10 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
         return page.template("blocks/code.html", language=language, html=html)
 
     download = page.inputs.trials.get(block.span.start)
-    file = href = ""
-    if isinstance(download, PublishedExercise) and download.path:
-        file, href = download.name, page.place.href(download.path)
+    file = href = picture = ""
+    if isinstance(download, PublishedExercise):
+        file = download.name if download.path else ""
+        href, picture = (page.place.href(p) if p else "" for p in (download.path, download.picture))
     return page.template(
         "exercise/exercise.html",
         file=file,
@@ -49,12 +51,17 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
         config=config,
         script=script,
         data=json.dumps(block.data(), ensure_ascii=False, separators=(",", ":")),
-        title=block.title or words("exercise.untitled"),
+        title=title,
+        picture=picture,
+        size=() if record is None else record.size,
+        arrows=0 if record is None else record.arrows,
+        alt=words("lab.picture", title=title, t=number(0)),
         task=page.blocks(block.task),
         subject=_subject(words, block),
         start=code(block.start.text),
         rows=min(ROWS, block.start.text.rstrip().count("\n") + 1),
-        height=block.lab.fields.height,
+        label=words(f"exercise.live.{block.subject}", names=", ".join(block.names)),
+        fields=block.lab.fields,
         solution=code(block.solution.text),
         explain=page.blocks(block.explain),
         trials=[(trial.name, _bounds(words, trial)) for trial in block.trials],

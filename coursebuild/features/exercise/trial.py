@@ -82,6 +82,8 @@ class Judgement(Struct, frozen=True):
     verdicts: tuple[TrialVerdict, ...] = ()
     moved: float | None = None
     """The part of the picture in which something moves by Play, of the start."""
+    picture: bytes = b""
+    """The start before anything runs, as PNG; empty if there is none."""
 
 
 class Judgements(Struct, frozen=True):
@@ -135,7 +137,7 @@ class ExerciseTrials:
                 mjb = save_model(context, self._engines.native, model)
         except NativeError:
             return None  # its lab reports it
-        key = fingerprint((inputs.text, inputs.conditions, mjb))
+        key = fingerprint((inputs.text, inputs.conditions, mjb, lab_digest("picture")))
         kept_judgements = runs.store.get_value("exercises", key, Judgements)
         judgements = kept_judgements or self._judge_all(trial, exercise, mjb)
         diagnostics = list(_diagnose(exercise, judgements.of_attempts))
@@ -167,7 +169,7 @@ class ExerciseTrials:
             cached=kept_judgements is not None,
             unexported=export.reason,
         )
-        output = ExerciseOutput(export.script)
+        output = ExerciseOutput(export.script, start.picture)
         return TrialResult(exercise.span, line, output), diagnostics
 
     def _judge_all(self, trial: Trial, exercise: Exercise, mjb: bytes) -> Judgements:
@@ -190,7 +192,12 @@ class ExerciseTrials:
             return Judgement(_ENDLESS)
         except ScriptError as error:
             return Judgement(str(error).splitlines()[0])
-        return msgspec.convert(reply, Judgement)
+        picture = b""
+        if begin := reply.pop("begin", None):
+            from coursebuild.features.lab.picture.static import draw_picture
+
+            picture = draw_picture(exercise.lab, begin["scene"], begin["frame"])
+        return msgspec.convert({**reply, "picture": picture}, Judgement)
 
 
 _ENDLESS = "it does not end in time"

@@ -120,6 +120,7 @@ class MainRun(TypedDict):
     diverged: bool
     pictures: Annotated[list[MainPicture], Meta(min_length=1)]
     plots: MainPlots
+    reach: NotRequired[list[tuple[Number, Number] | None]]
     scene: dict[str, Any]
     film: list[Any]
     arrows: dict[str, Number | str] | None
@@ -215,6 +216,8 @@ class LabRecord(Struct, frozen=True):
     end: float
     """Simulated time of the readouts and of the end of the plots, s."""
     plots: tuple[Markup, ...]
+    arrows: int = 0
+    """How many buttons draw arrows in the live lab."""
     place: str = ""
     """Where on the axis the readouts were taken, for a lab without an engine."""
 

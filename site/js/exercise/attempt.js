@@ -43,10 +43,13 @@ function compile({ subject, bounds: [before, after] }, attempt) {
 
 const REACH = [
   'fetch', 'XMLHttpRequest', 'WebSocket', 'WebSocketStream', 'WebTransport', 'EventSource', 'importScripts', 'Worker', 'SharedWorker', 'BroadcastChannel',
-  'indexedDB', 'caches', 'cookieStore', 'navigator', 'Notification',
+  'indexedDB', 'caches', 'cookieStore', 'navigator', 'Notification', 'postMessage', 'close',
 ] // prettier-ignore
 
-/** Take from this worker, for good, all by which its code could reach the network, what a browser keeps, or other pages. */
+/**
+ * Take from this worker, for good, all by which its code could reach the network, what a browser keeps, or other pages, and by which it
+ * could speak to the page in the place of its judge.
+ */
 export function confine() {
   // What a text begins and nobody awaits, such as an import, fails silently: at each step, the page would be told again.
   globalThis.addEventListener?.('unhandledrejection', (event) => event.preventDefault())

@@ -126,6 +126,30 @@ def test_what_falls_through_the_floor_is_told_in_the_labs_line(
     assert line["fallen"] == []
 
 
+@pytest.mark.engine
+def test_curve_that_leaves_its_plot_is_told_in_the_labs_line(tmp_path: Path, stores: Path) -> None:
+    plot = (
+        '{"ymin": -5, "ymax": 1, "traces": [{"label": "height", "expr": "data.qpos[2]"},'
+        ' {"label": "none", "expr": "null"}, {"label": "still", "expr": "1.0001"}]}'
+    )
+    curve = """
+```lab plot
+title = "A curve"
+x = { name = "x", max = 2 }
+plots = [{ ymax = 3, traces = [{ label = "square", expr = "x**2" }] }]
+```
+"""
+    lab = fence(f'{{"model": "ball", "stopAt": 2, "plots": [{plot}]}}')
+    folder = course(tmp_path / "course", stores, f"## Labs\n\n{lab}{curve}")
+    folder.write("models/ball.xml", BALL)
+    clipped = {line["name"]: line["clipped"] for line in run_check(folder, status=0)["labs"]}
+    assert clipped == {
+        "1.2-lab-1": ["`height`, down to -19.6 (`ymin` is -5)"],
+        "1.2-lab-2": ["`square`, up to 4 (`ymax` is 3)"],
+    }
+    assert "leaves its plot: `height`, down to -19.6" in folder.main("check").out
+
+
 def test_models_are_live_on_their_pages_and_seen_in_the_gallery(site: BuiltSite) -> None:
     models = site.public / "models"
     for name, lab in (("ball", "1.2-lab-1"), ("a/still", "model-a-still"), ("lost", "model-lost")):

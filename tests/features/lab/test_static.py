@@ -148,7 +148,7 @@ def test_an_orthographic_camera(bench: Bench) -> None:
     lab, main = main_of(
         bench, xml=xml, camera={"azimuth": 90, "elevation": 0, "target": [0, 0, 0]}, height=480
     )
-    pixels = read_png(draw_picture(lab, main))
+    pixels = read_png(draw_picture(lab, main["scene"], main["pictures"][0]["frame"]))
     rows = np.nonzero(pixels[..., 3].any(axis=1))[0]
     # A box of 1 m in a view that is 2 m high.
     assert rows.max() - rows.min() + 1 == pytest.approx(pixels.shape[0] / 2, abs=2)

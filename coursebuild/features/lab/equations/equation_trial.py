@@ -80,6 +80,13 @@ class EquationReply(Struct, frozen=True):
     timestamp: int = 0
     lasting: bool = True
 
+    @property
+    def reach(self) -> list[tuple[float, float] | None]:
+        """The least and the greatest value of each curve as the lab starts; `None`: it has none."""
+        plots = [] if self.start is None or self.start.failure is not None else self.start.plots
+        lines = ([y for y in line if y is not None] for plot in plots for line in plot["traces"])
+        return [(min(line), max(line)) if line else None for line in lines]
+
     def describe(self, kind: str) -> tuple[str, dict[str, str]]:
         """The key of an interface text that describes the comparison, and its values."""
         library = "NumPy" if kind == PLOT else "SciPy"

@@ -32,6 +32,7 @@ from coursebuild.features.lab.schema import FILM_RATE, Plot, TraceFields
 _WIDTH = 640
 _USUAL = 1.6
 """Width of a usual view over its height."""
+_ARROWS = ("momentum", "angularMomentum", "forces")
 _FROM_AFAR = 1000.0
 _BAR = 0.2
 """The largest part of the picture's width that the scale bar takes."""
@@ -41,10 +42,9 @@ _LARGE = 1e9
 """From here on numbers are written with powers of ten, as in the live lab."""
 
 
-def draw_picture(lab: Lab, main: MainRun) -> bytes:
-    """Draw the start of the main run of a lab's trial, as PNG."""
-    frame = unpack_arrays(main["pictures"][0]["frame"])
-    return png(_draw_frame(lab, unpack_arrays(main["scene"]), frame, _size(lab)))
+def draw_picture(lab: Lab, scene: dict[str, Any], frame: Any) -> bytes:
+    """Draw a frame of a lab's trial, as PNG."""
+    return png(_draw_frame(lab, unpack_arrays(scene), unpack_arrays(frame), _size(lab)))
 
 
 def draw_film(lab: Lab, main: MainRun) -> bytes:
@@ -102,7 +102,8 @@ def lab_record(lab: Lab, main: MainRun) -> LabRecord:
     metre = height / (2 * camera.distance * math.tan(math.radians(camera.fovy) / 2))
     length = round_length(_BAR * width / metre)
     scale = length, length * metre
-    return LabRecord(_size(lab), scale, first["time"], readouts, last["time"], plots)
+    arrows = sum(name in (main["arrows"] or {}) for name in _ARROWS)
+    return LabRecord(_size(lab), scale, first["time"], readouts, last["time"], plots, arrows=arrows)
 
 
 def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun) -> LabRecord:

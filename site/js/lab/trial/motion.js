@@ -9,6 +9,8 @@
  */
 
 import { cameraAxes, dot, Framing, isShown } from '../core/framing.js'
+import { packed } from './base64.js'
+import { withSmallTextures } from './record.js'
 
 const SECONDS = 3
 const MOMENTS = 60 // at which a run is looked at
@@ -68,19 +70,23 @@ export class Motion {
 }
 
 /**
- * The same for a reader who plays what an exercise begins with, in a camera that shows all of it; null if the lab cannot run.
+ * What a reader sees who plays what an exercise begins with, in a camera that shows all of it: `moved`, the part of the picture, or null if
+ * the lab cannot run; and `begin`, the `scene` and the `frame` of the start, or null if there is none.
  *
  * @param {() => import('../core/lab.js').Lab} open
  */
-export function playedShare(open) {
+export function played(open) {
   let lab = null
+  const seen = { moved: null, begin: null }
   try {
     lab = open()
     lab.start()
-    const { camera } = lab.scene()
+    const { start, controls, camera: placed } = lab.config
+    const scene = withSmallTextures(lab.scene())
+    const { camera } = scene
+    seen.begin = { scene, frame: lab.frame(null).slice() }
     const framing = new Framing(lab, camera)
     const motion = new Motion(lab)
-    const { start, controls, camera: placed } = lab.config
     framing.begin()
     const button = controls.findIndex(({ label }) => label === start)
     if (button >= 0) lab.press(button)
@@ -90,13 +96,15 @@ export function playedShare(open) {
       motion.observe(lab)
     } while (lab.time < motion.end && lab.step(slice).steps > 0 && lab.diverged === null)
     const fitting = camera.orthographic ? null : framing.fit()
-    if (fitting === null) return 0
-    return motion.share(placed?.distance == null && placed?.target == null ? { ...camera, ...fitting } : camera)
+    if (fitting !== null && placed?.distance == null && placed?.target == null) Object.assign(camera, fitting)
+    scene.floor = framing.floor()
+    seen.moved = fitting === null ? 0 : motion.share(camera)
   } catch {
-    return null
+    // The trials tell what is wrong.
   } finally {
     lab?.dispose()
   }
+  return packed(seen)
 }
 
 /** Mark the cells of the rectangle around some points, each of which has a radius in metres around it. */

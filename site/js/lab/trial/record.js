@@ -38,6 +38,16 @@ export function fallenBodies(lab, engine, heights) {
   return [...heights].map(([body, height]) => ({ name: name(body), height, time: lab.time }))
 }
 
+/** Widen the least and the greatest value of each trace, `[low, high]`, by the samples of a run. */
+export function widen(reach, { traces, values }) {
+  traces.forEach((_, j) => {
+    for (let i = j; i < values.length; i += traces.length) {
+      const [low, high] = reach[j] ?? [values[i], values[i]]
+      if (Number.isFinite(values[i])) reach[j] = [Math.min(low, values[i]), Math.max(high, values[i])]
+    }
+  })
+}
+
 /** The samples since the lab's start, at most POINTS of them: {times, plots: [[values of each trace]]}. */
 export function record(lab) {
   const { times, values } = lab.sampler.take()

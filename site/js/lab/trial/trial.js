@@ -29,6 +29,7 @@
  *
  *     stopped, diverged          `stopAt`, `code` or `null`; whether it diverged
  *     plots                      `{times, plots: [[values of each trace]]}`, at most 1000 times; a gap is `null`
+ *     reach                      the least and the greatest value of each trace after Play, `[low, high]`, or `null` if it has none
  *     pictures                   `{time, frame, readouts}` at the start and at the end
  *     scene                      as the page gets it, with textures of at most 256 × 256 and faces of cubes of 64 × 64
  *     film                       what is seen in the first `film` seconds after Play, ten times a second; without `film`, nothing
@@ -54,7 +55,7 @@ import { packed } from './base64.js'
 import { deepContact } from './deep.js'
 import { Motion } from './motion.js'
 import { ParityRecorder } from './parity.js'
-import { fallenBodies, film, picture, record, withSmallTextures } from './record.js'
+import { fallenBodies, film, picture, record, widen, withSmallTextures } from './record.js'
 import { resetDiffers } from './reset.js'
 import { watchedCode } from './watched.js'
 
@@ -105,6 +106,7 @@ class Trial {
     this.framing = null
     this.motion = null // while it is measured
     this.playedMotion = null
+    this.reach = [] // of each trace
     this.arrowScales = new ArrowScales()
   }
 
@@ -143,13 +145,14 @@ class Trial {
       this.observe(lab)
       lab.press(controls.findIndex(({ label }) => label === start))
       this.advance(lab, Math.min(stopAt ?? Infinity, lab.time + SECONDS))
-      this.endMotion()
+      this.endMotion(lab)
     })
   }
 
-  endMotion() {
+  endMotion(lab) {
     this.playedMotion = this.motion
     this.motion = null
+    widen(this.reach, lab.sampler)
   }
 
   /** Measure the speed of a lab of which only the recorded run was tried: run it once more, without recording. */
@@ -363,7 +366,7 @@ class Trial {
     if (stopAt !== null && reason !== 'stopAt' && lab.diverged === null && lab.time >= stopAt) {
       this.fail(['stopAt'], 'stopAt', `the lab does not stop at ${stopAt} s`, lab.time)
     }
-    this.endMotion()
+    this.endMotion(lab)
     const parity = lab.recorder?.result() ?? null
     lab.recorder = null
     const pictures = packed([start, picture(lab)])
@@ -378,6 +381,7 @@ class Trial {
       scene: packed(withSmallTextures(lab.scene())),
       pictures,
       plots: record(lab),
+      reach: this.reach,
       parity,
       fallen: fallenBodies(lab, this.engine, this.framing.fallen),
       film: [], // see `film`
