@@ -113,9 +113,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _prove(options: Options, remarks: tuple[str, ...], most_seconds: float) -> Report:
-    new = prove(options, most_seconds)
+    findings = prove(options, most_seconds)
     report = check(options)
-    return replace(report, remarks=(*remarks, *new, *report.remarks), depends=None)
+    findings.write({}, report.diagnostics)
+    return replace(report, remarks=(*remarks, *findings.remarks(), *report.remarks), depends=None)
 
 
 def _examine(options: Options, remarks: tuple[str, ...]) -> Report:
