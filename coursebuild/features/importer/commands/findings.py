@@ -35,9 +35,11 @@ class Rank(enum.IntEnum):
     """A recorded output does not hold."""
     FAILED = 2
     """A cell cannot run, and no missing module is the reason."""
-    MISSING = 3
+    LIKELY = 3
+    """A text says another number than is printed with the same words: perhaps of something else."""
+    MISSING = 4
     """A cell cannot run without a module."""
-    CHANGED = 4
+    CHANGED = 5
     """Something was written."""
 
 
