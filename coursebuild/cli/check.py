@@ -110,14 +110,17 @@ def _mend(arguments: argparse.Namespace) -> int:
     """Mend what can be mended, and print what is left."""
     option = "--fix" if arguments.fix else "--propose"
     conflicts = ["--propose"] if arguments.fix and arguments.propose else []
-    conflicts += _special_options(arguments)
+    conflicts += (o for o in _special_options(arguments) if (option, o) != ("--propose", "--truth"))
     if conflicts:
         raise UsageError(f"{option} cannot be combined with {conflicts[0]}")
     options, names = options_of(arguments), tuple(arguments.lessons)
     streams = (sys.stdin, sys.stdout)
     can_ask = arguments.format == "text" and all(s is not None and s.isatty() for s in streams)
+    ask = _ask if can_ask else None
     report = (
-        fix(options, names) if arguments.fix else propose(options, names, _ask if can_ask else None)
+        fix(options, names)
+        if arguments.fix
+        else propose(options, names, ask, truth=arguments.truth)
     )
     return print_report(report, arguments.format, options)
 

@@ -17,7 +17,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import change_files
-from coursebuild.core.model import Citation, Course, document_scripts, find_inlines
+from coursebuild.core.model import Citation, Course, Document, document_scripts, find_inlines
 from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.model.results import Reports, Results, ScriptRun, TrialLine
 from coursebuild.core.pages.library import named_models
@@ -28,6 +28,8 @@ from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.scripts.extract import extract, is_run
 from coursebuild.core.scripts.findings import unproven_units
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.scripts.unbound import find_printed
+from coursebuild.core.syntax.document import read_again
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
@@ -86,7 +88,7 @@ def check(
                 course, checked_course.options, runs, selected, halve=True
             )
             diagnostics += (warning for s in sensitivities for warning in noise_warnings(s))
-        inventory = [*_list_unproven(checked_course)] if truth else []
+        inventory = [*list_unproven(checked_course)] if truth else []
         report = checked_course.report(diagnostics, inventory)
         if shard is None:
             checked_course.write_records()
@@ -203,7 +205,7 @@ def read_and_verify(
 # --- from diagnostics to a report
 
 
-def _list_unproven(checked_course: CheckedCourse) -> Iterator[Diagnostic]:
+def list_unproven(checked_course: CheckedCourse) -> Iterator[Diagnostic]:
     """What nothing gives in the checked documents, and in what the map says of their lessons."""
     course, results = checked_course.course, checked_course.verification.results
     places = [
@@ -213,7 +215,18 @@ def _list_unproven(checked_course: CheckedCourse) -> Iterator[Diagnostic]:
     ]
     entries, paths = {span for span, _ in places}, {path for _, path in places}
     diagnostics = (*unproven(course), *unproven_units(course, results.runs, results.verdicts))
-    return (d for d in diagnostics if d.span in entries or d.span.path in paths)
+    outputs = PrintedOutputs(results.verdicts, results.runs)
+    texts = {document.source.path: (owner, document) for owner, document in course.owned_documents}
+
+    @functools.cache
+    def read(path: str) -> Document:
+        return read_again(course, *texts[path])
+
+    for diagnostic in diagnostics:
+        path = diagnostic.span.path
+        if diagnostic.span in entries or path in paths:
+            is_number = diagnostic.rule == "number-unproven" and path in texts
+            yield find_printed(diagnostic, read(path), outputs) if is_number else diagnostic
 
 
 def diagnostics_of(

@@ -4,7 +4,8 @@
    stays if its mistake is gone and the course has no more errors than before; else each half of the
    fixes is tried. Where reading finds nothing more to fix, scripts and labs run, and what they show
    is fixed likewise.
-2. `--propose` shows the others one by one; a human accepts or declines each.
+2. `--propose` shows the others one by one; a human accepts or declines each. With `--truth` it
+   proposes to bind numbers as well.
 3. The files, texts in `content/` and `models/` behind no link, are written at the end, all or none,
    with a journal for `coursebuild undo`.
 """
@@ -25,7 +26,7 @@ from coursebuild.core.files.write import FileChange, change_files, check_writabl
 from coursebuild.core.scripts.edit import edited_texts, select_harmless
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
-from coursebuild.pipeline.check import judge, read_and_verify
+from coursebuild.pipeline.check import judge, list_unproven, read_and_verify
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.outputs import changed_text
@@ -115,10 +116,15 @@ def fix(options: Options, names: tuple[str, ...] = ()) -> Report:
     return replace(report, remarks=(*report.remarks, *fixer.write("fixed", report)))
 
 
-def propose(options: Options, names: tuple[str, ...] = (), ask: Ask | None = None) -> Report:
-    """Propose one by one what a human should decide; without `ask`, only say what that is."""
+def propose(
+    options: Options, names: tuple[str, ...] = (), ask: Ask | None = None, *, truth: bool = False
+) -> Report:
+    """Propose one by one what a human should decide; without `ask`, only say what that is.
+
+    `truth`: also to bind numbers that a text states to the outputs that have them.
+    """
     with project_lock(options.root, options.progress.say), Reader(options) as reader:
-        fixer = _Fixer(options, reader, names)
+        fixer = _Fixer(options, reader, names, truth=truth)
         report, proposals = fixer.propose(ask)
     if ask is not None:
         return replace(report, remarks=(*report.remarks, *fixer.write("changed", report)))
@@ -134,8 +140,10 @@ def propose(options: Options, names: tuple[str, ...] = (), ask: Ask | None = Non
 class _Fixer:
     """Mends the texts of a course in memory."""
 
-    def __init__(self, options: Options, reader: Reader, names: tuple[str, ...]) -> None:
-        self.options, self.reader, self.names = options, reader, names
+    def __init__(
+        self, options: Options, reader: Reader, names: tuple[str, ...], *, truth: bool = False
+    ) -> None:
+        self.options, self.reader, self.names, self.truth = options, reader, names, truth
         self.code: Code = "run" if options.sandbox is None else "refuse"
         self.texts: dict[str, str] = {}
         """The mended texts, by path."""
@@ -207,7 +215,9 @@ class _Fixer:
 
     def _verify(self) -> Report:
         outcome = read_and_verify(self.options, self.reader, self.names, texts=self.texts)
-        return outcome if isinstance(outcome, Report) else outcome.report()
+        if isinstance(outcome, Report):
+            return outcome
+        return outcome.report(inventory=[*list_unproven(outcome)] if self.truth else [])
 
     def _read(self, texts: Mapping[str, str]) -> tuple[Diagnostic, ...]:
         """What is wrong with the course with these texts, as far as reading it shows."""

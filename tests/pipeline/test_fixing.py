@@ -48,6 +48,15 @@ def test_fix_mends_all_form_and_undo_takes_it_back(make: Make) -> None:
     assert again.err.startswith("coursebuild: there is nothing to undo\n")
 
 
+def test_numbers_that_a_script_printed_are_proposed_to_be_bound(make: Make) -> None:
+    script = "```python file=examples/a.py\nprint('mass', 3 * 17.1, 'kg')\n```\n\n"
+    lesson = f"{script}```output digits\nmass 51.3 kg\n```\n\nIt has a mass of 51.3 kg.\n"
+    folder = make(lesson)
+    assert "proposal" not in folder.main("check", "--propose").out.replace("there is nothing", "")
+    out = folder.main("check", "--propose", "--truth").out
+    assert "\n+It has a mass of `51.3`{out} kg.\n1 proposal; in a terminal" in out
+
+
 def test_names_are_proposed_and_changed_by_nobody_else(make: Make) -> None:
     folder = make(MISSPELT, "## Two\n\nText.\n")
     result = folder.main("check", "--fix")

@@ -48,7 +48,13 @@ _CALLOUTS = {
 _MAX_DEPTH = 20
 """Blocks that may be around another."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
-_TITLE = re.compile(r"\b(?:title|tab|filename|lst-cap)=(?:\"([^\"]*)\"|'([^']*)')")
+_TITLE = re.compile(r"\b(?:title|tab|filename|lst-cap|name)=(?:\"([^\"]*)\"|'([^']*)')")
+_TAB_CHANGE = "a title in bold, and what it holds: pages show one tab below the other"
+_HIGHLIGHT = re.compile(
+    r"^[ \t]*(?:#|//|--|%|/\*|<!--|\{/\*)[ \t]*highlight-(?:next-line|start|end)\b.*\n?",
+    re.MULTILINE,
+)
+"""A comment by which Docusaurus colours lines."""
 _CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
 _QUOTED_KIND = re.compile(
@@ -109,9 +115,21 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             return _convert_fence(head, text, context)
 
 
+def _bold_headings(text: str) -> str:
+    """Return a set of tabs of Quarto with their titles, which are headings, in bold."""
+    first = re.search(r"^(#{1,6})[ \t]", text, re.MULTILINE)
+    if first is None:
+        return text
+    pattern = rf"^{first[1]}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
+    parts = re.split(r"(^(?P<mark>`{3,}|~{3,}).*?^(?P=mark)[ \t]*$)", text, flags=re.M | re.S)
+    for at in range(0, len(parts), 3):  # what lies between blocks of code, which have two groups
+        parts[at] = re.sub(pattern, r"**\1**\n", parts[at], flags=re.MULTILINE)
+        parts[at + 2 : at + 3] = [""]
+    return "".join(parts)
+
+
 def _write_tab(title: str, text: str, context: LessonContext) -> str:
-    change = "a title in bold, and what it holds: pages show one tab below the other"
-    _note_change(context, "tab", change)
+    _note_change(context, "tab", _TAB_CHANGE)
     return f"**{rewrite_prose(title, context).strip()}**\n\n{_convert_nested(text, context)}"
 
 
@@ -127,9 +145,9 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     fold_mark = "-" if re.search(r"collapse=\"?true", head) else ""
     if callout is not None:
         title, text = (title, text) if title else _take_heading(text)
-        label = re.search(r"#([\w-]+)", head)
-        mark = f'<a id="{to_anchor(label[1])}"></a>\n\n' if label else ""
-        return mark + _write_callout(callout[1], title, text, context, fold_mark=fold_mark)
+        label = re.search(r"#([a-z]+)-([\w-]+)", head)
+        title += f" {{#{label[1]}:{to_anchor(label[2])}}}" if label else ""
+        return _write_callout(callout[1], title, text, context, fold_mark=fold_mark)
     plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)
     if plain is not None:  # as Docusaurus and its likes write callouts
         if plain[1] == "details":
@@ -143,8 +161,8 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         title, text = (title, text) if title else _take_heading(text)
         if proof is None:
             return _write_callout(kind, title, text, context)
-        anchor = f'<a id="{to_anchor(proof[0])}"></a>\n\n'
-        return anchor + _write_callout(PROOF_LABELS[proof[1]], title, text, context)
+        title += f" {{#{proof[1]}:{to_anchor(proof[2])}}}"
+        return _write_callout(PROOF_LABELS[proof[1]], title, text, context)
     if condition := re.search(r"content-(visible|hidden).*?(when|unless)-format=\W?(\w+)", head):
         is_visible = (condition[1] == "visible") == (condition[2] == "when")
         if is_visible != ("html" in condition[3]):
@@ -154,6 +172,9 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     if re.fullmatch(r"[A-Za-z_]\w*(?:\.\w+)+", head):
         context.leave("division", f"documentation that its tool makes from the code of `{head}`")
         return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
+    if "panel-tabset" in classes:
+        _note_change(context, "tab", _TAB_CHANGE)
+        return _convert_nested(_bold_headings(text), context)
     _note_change(context, "division", "what it holds, without a frame")
     if figure := re.search(r"#fig-([\w-]+)", head):
         return f'<a id="fig-{to_anchor(figure[1])}"></a>\n\n{_convert_nested(text, context)}'
@@ -199,7 +220,8 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     if kind in ("mjcf", *fence_names()) or (kind == "python" and "file=" in head):
         context.files.account.taken[f"block of `{kind}`"] += 1
         return marks.fence(head, text)
-    language = re.split(r"[\s,{}]", head.strip("{}. "), maxsplit=1)[0]
+    classes = re.search(r"(?:^|\s)\.([\w+-]+)", head.strip("{} "))
+    language = classes[1] if classes else re.split(r"[\s,{}]", head.strip("{}. "), maxsplit=1)[0]
     language = "" if re.search("[=#]", language) and language.lower() != "c#" else language
     if language not in highlighted_languages() and language.lower() in highlighted_languages():
         language = language.lower()
@@ -215,12 +237,17 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         text = code_for_readers(cell)
         caption = options.get("fig-cap") or options.get("lst-cap") or ""
         head += f' title="{caption}"' if caption else ""
+    text, count = _HIGHLIGHT.subn("", text)
+    if count:
+        _note_change(context, "comment in code", "dropped: its tool colours the lines beside it")
     title = _TITLE.search(head)
     words = re.sub(r"(?<!\\)[_*`]", r"\\\g<0>", title[1] or title[2] or "") if title else ""
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
     kind = f"block of `{language}`" if language else "block without a kind"
-    new = marks.fence(language, text)
+    listing = re.search(r"#lst-([\w-]+)", head)
+    label = f" {{#lst:{to_anchor(listing[1])}}}" if listing else ""
+    new = marks.fence(f"{language or 'text' * bool(label)}{label}", text)
     context.convert(kind, "without what its tool adds", head, lambda: language)
     return (f"**{words}**\n\n" if words else "") + new
 
@@ -252,7 +279,8 @@ def _callout_kind(kind: str, context: LessonContext) -> str:
 def _write_callout(
     kind: str, title: str, text: str, context: LessonContext, *, fold_mark: str = ""
 ) -> str:
-    title = " ".join(rewrite_prose(title, context).split())
+    title, brace, label = title.partition("{#")
+    title = " ".join(f"{rewrite_prose(title, context)} {brace}{label}".split())
     head = f"[!{_callout_kind(kind, context)}]{fold_mark} {title}".rstrip()
     _note_change(context, "callout", "a quotation that begins with its kind")
     return marks.block_quote(f"{head}\n{_convert_nested(text, context)}".rstrip("\n"))

@@ -19,6 +19,8 @@ from coursebuild.features.importer.source_files import Segment, read_yaml
 _OPTION = re.compile(r"^(?:(?:#|//|%%)\|(.*)|:([\w-]+):[ \t]*(.*))\n?", re.MULTILINE)
 """A line of options of a cell: YAML of Quarto, or one option of MyST."""
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
+_TIMES = re.compile(r"^(?:CPU times|Wall time|.* per loop \(mean)\b.*\n?", re.MULTILINE)
+"""What it prints."""
 _WINDOW = re.compile(
     r"^([ \t]*)(?:display\()?(?:plt|(?:\w+\.)?pyplot)\.show\([^()\n]*\)+[ \t;]*$", re.MULTILINE
 )
@@ -66,7 +68,11 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     word = " part" if context.parts else ""
     context.parts.append(code)
     account.changed["cell", "a part of the lesson's script"] += 1
-    blocks = [marks.fence(f"python file={context.script_path}{word}{how_shown(cell)}", code)]
+    options = options_of(cell)
+    title = caption_of_code(options, context)
+    label = re.sub("^lst-", "", options.get("lst-label", ""))
+    word += how_shown(cell) + (f" {{#lst:{to_anchor(label)}}}" if label else "")
+    blocks = [*title, marks.fence(f"python file={context.script_path}{word}", code)]
     if output := recorded_output(cell, code):
         blocks.append(marks.fence("output", output))
         account.taken["output that is recorded"] += 1
@@ -283,7 +289,10 @@ def recorded_output(cell: Segment, code: str) -> str:
     """Return what is recorded of a cell which the script has as `code`: what it should print."""
     output = ""
     prints_value = code.count("print(") > cell.text.count("print(")
-    for text in (cell.printed, cell.value if prints_value else ""):
+    printed = cell.printed
+    if _TIMING.match(cell.text.lstrip("\n")):
+        printed = _TIMES.sub("", printed)
+    for text in (printed, cell.value if prints_value else ""):
         output += text and text.removesuffix("\n") + "\n"
     return plain_output(output)
 
@@ -291,6 +300,13 @@ def recorded_output(cell: Segment, code: str) -> str:
 def plain_output(text: str) -> str:
     """Return what is recorded without what colours it or moves the cursor."""
     return _ESCAPE.sub("", text).strip("\n")
+
+
+def caption_of_code(options: Mapping[str, str], context: LessonContext) -> list[str]:
+    """Return the caption of a listing, or of a table that is printed, as a paragraph, if any."""
+    captions = (options.get(name) for name in ("lst-cap", "tbl-cap"))
+    words = " ".join(next(filter(None, captions), "").split())
+    return [f"**{rewrite_prose(words, context)}**"] if words else []
 
 
 def how_shown(cell: Segment) -> str:
@@ -311,7 +327,8 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
     """Return what the script runs of a cell; empty where that is nothing."""
     options = options_of(cell)
     text = _OPTION.sub("", _YAML_HEAD.sub("", cell.text, count=1))
-    if "raises-exception" in cell.head + options.get("tags", ""):
+    tags = cell.head + options.get("tags", "")
+    if "raises-exception" in tags or options.get("error") == "true":
         context.leave("cell", "a cell that is meant to fail is shown, not run")
         return ""
     if options.get("eval", "").lower() == "false":
@@ -361,4 +378,7 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
     lines = text.split("\n")
     before = "\n".join(lines[: last.lineno - 1])
     lead = lines[last.lineno - 1].encode()[: last.col_offset].decode()
-    return f"{before}\n{lead}print({ast.get_source_segment(text, last.value)})"
+    value = ast.get_source_segment(text, last.value)
+    if re.match(r"['\"]|[A-Za-z_][\w.]*\(", cell.value.lstrip()):  # `array([…])`, a text
+        value = f"repr({value})"
+    return f"{before}\n{lead}print({value})"

@@ -12,6 +12,7 @@ from textwrap import shorten
 from coursebuild.api import Edit, Options, Recording, ScriptRun, Span, marks, model
 from coursebuild.core.run.packages import distributions
 from coursebuild.core.run.part_marks import FAILURE
+from coursebuild.features.importer.commands.findings import Rank
 from coursebuild.features.importer.context import script_path_of
 from coursebuild.report.values import plural
 
@@ -58,7 +59,7 @@ class Chain:
         )
         self.codes = [part.code.text.strip("\n") for part in self.parts]
         self.is_of_cells = script.path == script_path_of(script.span.path)
-        self.remarks: list[str] = []
+        self.findings: list[tuple[Rank, str, Span | None]] = []
         self.failures: dict[int, list[str]] = {}
         """The errors of each cell that failed."""
         stderr = script_run.stderr
@@ -97,16 +98,19 @@ class Chain:
             else:
                 names -= _bound_names(code)
                 continue
+            if reasons[number].startswith("`"):
+                message = f": `{shorten(errors[0], 200, placeholder='…')}`, so the cell is not run"
+                self.findings.append((Rank.FAILED, message, self.parts[number].span))
             names |= _bound_names(code)
         rest = (imports.get(n, c) for n, c in enumerate(self.codes) if n not in reasons)
         if self.modules and not any(rest):
             return  # nothing would be left of it: a key says what it requires
         yield from self._edits(reasons, imports, keys)
         count = plural(len(reasons), "cell") if reasons else "an import"
-        errors = list(dict.fromkeys(chain(*self.failures.values())))
-        rest_of_errors = f", and {plural(len(errors) - 1, 'more error')}" if errors[1:] else ""
-        error = shorten(errors[0], 200, placeholder="…")
-        self.remarks.append(f"{self.script.path}: {count} shown, not run: {error}{rest_of_errors}")
+        errors = [e for e in dict.fromkeys(chain(*self.failures.values())) if missing_modules(e)]
+        reason = f": {shorten('; '.join(errors), 200, placeholder='…')}" if errors else ""
+        message = f"{self.script.path}: {count} shown, not run{reason}"
+        self.findings.append((Rank.MISSING if errors else Rank.CHANGED, message, None))
 
     def _without_modules(self) -> tuple[dict[int, str], set[str]]:
         """Return the cells that import a missing module without these imports, and their names."""
@@ -152,7 +156,8 @@ class Chain:
                 head = re.sub(r"\s+(?:open|folded|hidden)\b", "", head)
                 names = ",".join(name for name in figures if name not in figure_names)
                 head = re.sub(r"\s+figure=\S+", f" figure={names}" if names else "", head)
-                head = " ".join((head, *keys, *([word[0]] if word else [])))
+                head, brace, label = head.partition(" {#")
+                head = " ".join((head, *keys, *([word[0]] if word else []))) + brace + label
             if number in cells:
                 for name in figure_names:
                     lines = rf'^[\w.]+\.savefig\("{re.escape(name)}"\)\n[\w.]+\.close\("all"\)$'

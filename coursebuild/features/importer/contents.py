@@ -15,6 +15,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from coursebuild.api import UsageError
+from coursebuild.features.importer.bookdown import read_book
 from coursebuild.features.importer.outlines import (
     find_text,
     flatten,
@@ -23,6 +24,7 @@ from coursebuild.features.importer.outlines import (
     make_level,
     read_outline,
 )
+from coursebuild.features.importer.segments import read_front_matter
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedCourse,
@@ -55,6 +57,8 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     myst, quarto, _, mkdocs = settings = [_read_settings(name, files) for name in names]
     titles = [value_at(mapping, *path, "title") for mapping in settings for path in _TITLE_PATHS]
     titles.append(value_at(mkdocs, "site_name"))
+    if "_bookdown.yml" in files and "index.Rmd" in files:
+        titles.append(read_front_matter(files.read_text("index.Rmd"))[0].get("title"))
     title = next((" ".join(text.split()) for text in titles if isinstance(text, str)), "")
     parts = [
         *_read_parts(_read_settings("_toc.yml", files), files),
@@ -62,6 +66,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         *_read_parts(value_at(quarto, "book", "chapters"), files),
         *_read_parts(value_at(quarto, "website", "sidebar"), files),
         *_read_parts(value_at(quarto, "book", "appendices"), files),
+        *read_book(files),
         *_read_nav(value_at(mkdocs, "nav"), str(value_at(mkdocs, "docs_dir") or "docs"), files),
     ]
     outline = None if parts else read_outline(files)
@@ -94,6 +99,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         language=outline.language if outline is not None else "",
         has_own_titles=True,
         substitutions=_read_substitutions(settings, files),
+        macros=dict(_read_macros(settings, files)),
         levels=tuple(levels),
         pages=tuple(pages),
         has_hidden_lines=outline is not None and outline.has_hidden_lines,
@@ -112,6 +118,24 @@ def _read_substitutions(
         text = re.search(r"(?ms)^myst_substitutions\s*=\s*(\{.*?\})$", files.read_text(name))
         values.append(read_yaml(text[1]) if text else None)  # a literal is a value of YAML
     return {key: value for mapping in values for key, value in _named_values(mapping)}
+
+
+def _read_macros(
+    settings: Sequence[Mapping[str, Any]], files: SourceFiles
+) -> Iterator[tuple[str, str]]:
+    """Yield the macros of formulas that the settings of Jupyter Book or MyST have, defined."""
+    mathjax = ("sphinx", "config", "mathjax3_config", "tex", "macros")
+    for path in (mathjax, ("project", "math")):
+        for mapping in settings:
+            macros = value_at(mapping, *path)
+            for name, value in macros.items() if isinstance(macros, Mapping) else ():
+                value = value.get("macro") if isinstance(value, Mapping) else value
+                tex, count = (*value, 0)[:2] if isinstance(value, list) else (value, 0)
+                arguments = max([int(count), *map(int, re.findall(r"#(\d)", str(tex)))])
+                command = "\\" + str(name).lstrip("\\")
+                number = f"[{arguments}]" if arguments else ""
+                files.account.changed["macro", "defined in the formulas that use it"] += 1
+                yield command, f"\\newcommand{{{command}}}{number}{{{tex}}}"
 
 
 def _named_values(value: object, name: str = "") -> Iterator[tuple[str, str]]:

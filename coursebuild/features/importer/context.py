@@ -13,6 +13,23 @@ from msgspec.structs import replace
 from coursebuild.features.importer.source_files import TEXTS, SourceFiles, stem_of
 
 
+class JoinedCells(Struct):
+    """Cells of a text that go on from each other, as one script."""
+
+    path: str
+    lines: list[str] = field(default_factory=list)
+    printed: str = ""
+    """What is recorded below them."""
+
+    def add(self, code: str, printed: str) -> str:
+        """Add a cell, and return the name of its lines in the script."""
+        first = len(self.lines) + 1
+        self.lines += code.split("\n")
+        if printed:
+            self.printed += printed.removesuffix("\n") + "\n"
+        return f"L{first}-L{len(self.lines)}"
+
+
 class LessonContext(Struct, frozen=True, kw_only=True):
     """Resolves what a lesson names while it is converted, and collects files and leftovers.
 
@@ -54,6 +71,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """The cells that are parts of it by now."""
     scripts: list[str] = field(default_factory=list)
     """The scripts that its cells of other languages are."""
+    joined: dict[str, JoinedCells] = field(default_factory=dict)
+    """The scripts that its cells of other languages are together, by language."""
     single_languages: frozenset[str] = frozenset()
     """The languages of which it has a single cell."""
     figures: list[str] = field(default_factory=list)
@@ -149,6 +168,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
 
     def resolve_anchor(self, anchor: str) -> str:
         """Return the address of an anchor; empty where no text of the course sets it."""
+        names = (anchor, *(f"{kind}:{anchor}" for kind in NUMBERED))
+        anchor = next((name for name in names if name in self.labels), anchor)
         target = self.labels.get(anchor)
         if target is None:
             return ""
@@ -214,6 +235,11 @@ PROOF_LABELS = {
     "cau": "caution",
 }
 """Kinds of callouts by the labels that Quarto numbers them by."""
+NUMBERED = frozenset(
+    "theorem lemma definition algorithm axiom proof remark corollary proposition example property "
+    "criterion conjecture observation assumption exercise solution lst".split()
+)
+"""Kinds of which MyST numbers what has a label: callouts, and listings."""
 
 
 def script_path_of(document: str) -> str:

@@ -22,14 +22,14 @@ from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.absent_labs import lab_files
 from coursebuild.features.importer.account import Account
+from coursebuild.features.importer.anchors import find_anchors
 from coursebuild.features.importer.blocks import convert_segment
 from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext, script_path_of, to_anchor
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.jsx import is_mdx
 from coursebuild.features.importer.lost_words import find_lost_words
-from coursebuild.features.importer.other_cells import languages_of_single_cells
-from coursebuild.features.importer.prose import find_anchors
+from coursebuild.features.importer.other_cells import languages_of_single_cells, write_joined_cells
 from coursebuild.features.importer.references import complete_texts
 from coursebuild.features.importer.source_files import (
     TEXTS,
@@ -322,7 +322,7 @@ def _convert_texts(
         files.leave(files_of[link], message, kind)
 
     callouts = frozenset((*CALLOUTS, *context.callouts))
-    completed = complete_texts(new, resolve_label, leave, callouts)
+    completed = complete_texts(new, resolve_label, leave, callouts, course.macros)
     out = {text.path: _encode(new_text) for text, new_text in zip(texts, completed, strict=True)}
     return {**out, **context.copies}, context
 
@@ -345,11 +345,13 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
         title=text.title,
         parts=[],
         scripts=[],
+        joined={},
         single_languages=languages_of_single_cells(text.segments),
         figures=[],
         notes=[],
     )
     parts = [convert_segment(segment, context) for segment in text.segments]
+    parts += write_joined_cells(context)
     new = "\n\n".join(part.strip("\n") for part in parts if part.strip()) + "\n"
     if context.figures:  # the first part has the keys of the script
         head = f"python file={context.script_path}"

@@ -21,7 +21,9 @@ from coursebuild.api import UsageError, model
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
+from coursebuild.features.importer.bookdown import read_bookdown
 from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
+from coursebuild.features.importer.pandoc_tables import number_examples
 from coursebuild.features.importer.segments import read_segments
 from coursebuild.features.importer.source_files import (
     TEXTS,
@@ -261,6 +263,10 @@ def _read_file(
         source = files.read_text(text.file)
         if not text.file.endswith(".ipynb"):
             source = expand_includes(source, text.file, files)
+        if text.file.endswith(".Rmd"):
+            source = read_bookdown(source)
+        if text.file.endswith((".qmd", ".Rmd")):
+            source = number_examples(source)
         if text.file.endswith(".qmd"):  # there a tag need not be apart from a block
             source = _TAG_BESIDE_BLOCK.sub(r"\g<0>\n", source)
         if has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
@@ -282,14 +288,16 @@ def _read_file(
         title = read.title
     title = _plain_text(_ROLE.sub(r"\1", title or read.title)) or title_of_file(text.file)
     slug = slug_of(slug or title_of_file(text.file))
-    if not re.search("[a-z]", slug):
+    if not re.search("[a-z]", slug) or (slug == "index" and not text.slug):
         slug = slug_of(title)
     page = slug_of(text.old_id or title)
     if used_ids is not None:
         page = _free_id(page, (f"{page}-{n}" for n in itertools.count(2)), used_ids)
     path = f"content/lessons/{id}-{slug}.md" if id else f"content/pages/{page}.md"
     if id and not any(segment.text.strip() for segment in read.segments):
-        path = ""  # a title alone: it is planned
+        path = ""  # a title alone
+        message = "a text of which nothing is left: a lesson that is planned"
+        files.leave(text.file, message, "text")
     text = replace(text, summary=text.summary or read.summary)
     text = replace(text, segments=read.segments, pictures=read.pictures)
     text = replace(text, substitutions=read.substitutions)

@@ -9,10 +9,11 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.api import marks
 from coursebuild.core.registry import missing_package
-from coursebuild.features.importer.context import LessonContext, label_anchor, to_anchor
+from coursebuild.features.importer.context import NUMBERED, LessonContext, label_anchor, to_anchor
 from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import rewrite_prose
@@ -29,12 +30,19 @@ class Directive(Struct, frozen=True):
     nested: Callable[[str], str]
     """Converts a text in it."""
     callout: Callable[[str, str, str, bool], str]
-    """Writes a callout of a kind, with a title and a text, which may be folded."""
+    """Writes a callout of a kind, with a title, label and all, and a text; it may be folded."""
 
     @property
     def label(self) -> str:
         """The name by which texts refer to it; may be empty."""
         return self.options.get("name") or self.options.get("label") or ""
+
+    @property
+    def number(self) -> str:
+        """What gives it a number, behind a blank; empty without a label."""
+        kind = self.name.removeprefix("prf:")
+        kind = kind if kind in NUMBERED else "lst"
+        return f" {{#{kind}:{to_anchor(self.label)}}}" if self.label else ""
 
 
 _MYST_OPTION = re.compile(r":([\w-]+):[ \t]*(.*)")
@@ -58,12 +66,13 @@ _TITLED = frozenset(
     "admonition dropdown sidebar topic exercise example margin aside details card".split()
 )
 """Directives whose argument is a title; that of others is their first line."""
-_PROOFS = frozenset(
-    "theorem lemma definition algorithm axiom proof remark corollary proposition example property "
-    "criterion conjecture observation assumption".split()  # `prf:`, which MyST need not say
+_PROOFS = NUMBERED - {"exercise", "solution", "lst"}  # `prf:`, which MyST need not say
+_WITH_LABELS = frozenset(
+    "math figure figure-md table list-table csv-table code code-block sourcecode".split()
 )
+"""What bears its label itself."""
 _FRAMES = frozenset(
-    "div container grid grid-item tab-set tab-set-code "
+    "div compound acks container grid grid-item tab-set tab-set-code "
     "card-carousel centered hlist rst-class table-of".split()
 )
 """What only places what it holds."""
@@ -80,7 +89,8 @@ _CHANGES = {
 def convert_directive(directive: Directive, context: LessonContext, callouts: Sequence[str]) -> str:
     """Return a directive in Markdown; `callouts` are those that are callouts here."""
     anchor = ""
-    if directive.label and directive.name not in ("math", "figure", "table", "list-table"):
+    kind = directive.name.removeprefix("prf:")
+    if directive.label and not (kind in _WITH_LABELS or kind in NUMBERED):
         anchor = f'<a id="{to_anchor(directive.label)}"></a>\n\n'
     return anchor + _write(directive, context, callouts)
 
@@ -99,12 +109,24 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             return display_formula(tex, directive.label)
         case "figure" | "image":
             return _write_figure(directive, context)
+        case "figure-md":  # its argument is its label, its first paragraph the picture
+            picture, _, caption = text.strip("\n").partition("\n\n")
+            patterns = (r"\]\(([^()\s]+)|src=[\"']([^\"']+)", r"!\[([^\]]*)\]|alt=[\"']([^\"']*)")
+            found = (re.search(pattern, picture) for pattern in patterns)
+            source, alt = ((match[1] or match[2] or "") if match else "" for match in found)
+            new = {**options, "alt": alt, "name": argument}
+            figure = replace(directive, name="figure", argument=source, options=new, text=caption)
+            return _write_figure(figure, context)
+        case "doctest" | "plot":
+            return marks.fence("pycon" if name == "doctest" else "python", text.strip("\n"))
+        case "line-block":
+            return directive.nested("\\\n".join(text.strip("\n").split("\n")))
         case "code" | "code-block" | "sourcecode" | "highlight" | "parsed-literal":
             language = argument if name != "parsed-literal" else ""
             caption = options.get("caption", "")
             head = f"**{rewrite_prose(caption, context)}**\n\n" if caption else ""
             code = text.strip("\n")
-            return head + marks.fence(language or "text", code) if code else ""
+            return head + marks.fence((language or "text") + directive.number, code) if code else ""
         case "code-cell":
             context.leave(kind, f"a cell of `{argument}` is shown and not run")
             return marks.fence(argument or "text", text.strip("\n"))
@@ -145,12 +167,13 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             body = f"{rest}\n{text}".strip()
             return directive.callout("version", f"{_CHANGES[name]} {version}", body, False)
         case _ if (proof := name.removeprefix("prf:")) in _PROOFS and name not in callouts:
-            return directive.callout(proof, argument, text, False)
+            return directive.callout(proof, argument + directive.number, text, False)
         case "solution":  # its argument is the label of an exercise
-            return directive.callout(name, "", text, True)
+            return directive.callout(name, directive.number, text, True)
         case _ if name in callouts:
             is_folded = name in ("details", "toggle") or "dropdown" in options.get("class", name)
             title = argument if name in _TITLED else ""
+            title += directive.number if name in NUMBERED else ""
             if subtitle := options.get("subtitle"):
                 text = f"**{subtitle}**\n\n{text}"
             body = text if title else f"{argument}\n{text}"
@@ -214,8 +237,10 @@ def _write_card(directive: Directive, context: LessonContext) -> str:
     title = rewrite_prose(directive.argument.strip(), context)
     link = directive.options.get("link", "")
     if link and title:
+        is_label = directive.options.get("link-type") == "ref"
         is_text = directive.options.get("link-type") == "doc" or not re.search(r"[:.#/]", link)
-        address = context.resolve_link(f"{link}.md" if is_text else link)
+        address = context.resolve_anchor(to_anchor(link)) if is_label else ""
+        address = address or context.resolve_link(f"{link}.md" if is_text else link)
         title = f"[{title}]({address})" if address else title
     inside = (directive.nested(part).strip() for part in parts)
     return "\n\n".join(part for part in (f"**{title}**" if title else "", *inside) if part)
@@ -231,7 +256,7 @@ def _write_table(directive: Directive, context: LessonContext) -> str:
         text, name = directive.text, directive.options.get("file", "")
         if name and (path := context.resolve_path(name)) in context.files:
             text = context.files.read_text(path)
-        rows = [row for row in csv.reader(text.strip().splitlines()) if row]
+        rows = [row for row in csv.reader(text.strip().splitlines(), skipinitialspace=True) if row]
         if header := directive.options.get("header"):
             rows = [next(csv.reader([header], skipinitialspace=True)), *rows]
     else:
@@ -254,6 +279,7 @@ def _cell(text: str, context: LessonContext) -> str:
 def _write_glossary(text: str, context: LessonContext) -> str:
     """Return the entries of a glossary as paragraphs that mark their terms."""
     out, terms = [], list[str]()
+    text = re.sub(r"^:[ \t]+", "  ", text, flags=re.MULTILINE)  # as of a list of definitions
     for entry in re.split(r"\n(?=\S)", text.strip("\n")):
         term, _, meaning = entry.partition("\n")
         terms.append(term.strip())

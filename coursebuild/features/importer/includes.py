@@ -36,17 +36,26 @@ _SECTION = (
 
 
 _IMPORT = re.compile(
-    r"^import[ ]+(?P<name>\w+)[ ]+from[ ]+['\"](?P<file>[^'\"\n]+\.(?:mdx?|png|svg|jpe?g|gif|webp))"
+    r"^import[ ]+(?P<name>\w+)[ ]+from[ ]+"
+    r"['\"](?P<file>!!raw-loader![^'\"\n]+|[^'\"\n]+\.(?:mdx?|png|svg|jpe?g|gif|webp))"
     r"['\"];?[ \t]*(?:\n|\Z)",
     re.MULTILINE,
 )
-"""What MDX imports from a text or a picture."""
+"""What MDX imports from a text or a picture, or as the text of any file."""
 
 
 def _place_imports(text: str) -> str:
     """Return a text of MDX that names texts and pictures where it uses what it imports."""
     for name, file in _IMPORT.findall(text):
-        if file.endswith((".md", ".mdx")):
+        if file.startswith("!!"):
+            block = rf"^[ \t]*<CodeBlock\b([^<>]*)>[ \t\n]*\{{{name}\}}[ \t\n]*</CodeBlock>[ \t]*$"
+            for code in re.finditer(block, text, re.MULTILINE):
+                language = re.search(r"language=[\"']([\w+-]+)", code[1])
+                title = re.search(r"title=\"[^\"]*\"", code[1])
+                head = f"{language[1] if language else 'text'} {title[0] if title else ''}".rstrip()
+                inclusion = f"{{!{file.rpartition('!')[2]}!}}"
+                text = text.replace(code[0], f"```{head}\n{inclusion}\n```")
+        elif file.endswith((".md", ".mdx")):
             inclusion = f"{{!{file}!}}"
             text = re.sub(rf"<{name}\b[^<>]*(?:/>|>[ \t]*</{name}>)", inclusion, text)
         else:

@@ -74,7 +74,10 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
         words = (label[1] or label[2] or "") if label else ""
         if picture := _ADDRESS.search(attributes):
             return f"![{words}]({picture[1]})"
-        return f"**{words}**" if words else ""
+        before, after = part.string[: part.start()], part.string[part.end() :]
+        is_first = not before.rpartition("\n")[2].strip()
+        gap = "\n\n" if words and is_first and after[:1] not in ("\n", "") else ""
+        return f"**{words}**{gap}" if words else ""
 
     def write_attribute(computed: re.Match[str]) -> str:
         address = _ADDRESS.search(computed[0])

@@ -2,7 +2,8 @@
 
 A cell of a shell is a process of its own in every tool, and becomes a script. The cells of other
 languages share what they define, and scripts have parts in Python alone: so one that is alone in
-its text becomes a script, and several are shown.
+its text becomes a script, and several become one, which ends the text. Each of these stands where
+it was, as lines of that script.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from coursebuild.features.importer.cells import (
     plain_output,
     write_outputs,
 )
-from coursebuild.features.importer.context import LessonContext, to_anchor
+from coursebuild.features.importer.context import JoinedCells, LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment
 
@@ -36,6 +37,7 @@ _HEAD = re.compile(
     r"\{code-cell\}[ \t]+(?P<myst>\w+).*|\{(?P<name>\w+)(?:[\s,]+(?P<options>[^{}]*))?\}", re.DOTALL
 )
 _MAGIC = re.compile(r"\s*%%(\w+)[^\n]*\n")
+_SETTINGS = re.compile(r"(?:library\(knitr\)\s*)?(?:knitr::)?opts_chunk\$set\([^()]*\)\s*")
 _KNITR = re.compile(r"([\w.]+)\s*=\s*(\"[^\"]*\"|'[^']*'|[^,\s]+)")
 """An option of a cell as knitr has it, in the head."""
 
@@ -78,26 +80,56 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     captions = (options[name] for name in ("fig-cap", "lst-cap") if options.get(name))
     caption = rewrite_prose(" ".join(next(captions, "").split()), context)
     label = options.get("label", "")
+    if own_label := _own_label(cell.head):  # of which only figures and tables are referred to
+        label = f"fig-{own_label}" if "fig-cap" in options else ""
+        label = label or (f"tbl-{own_label}" if "caption" in code else "")
     mark = f'<a id="{to_anchor(label)}"></a>' if label else ""
     head = [part for part in (mark, f"**{caption}**" if caption else "") if part]
+    if _SETTINGS.fullmatch(code):
+        context.leave(kind, f"a {kind} that sets how its tool shows others")
+        code = ""
     if not code:
         return "\n\n".join(head)
-    is_alone = language in _SHELLS or language in context.single_languages
-    if options.get("eval", "").lower() == "false" or not is_alone:
-        reason = "which goes on from others, is shown: to run it, join them to one script"
-        if is_alone or options.get("eval", "").lower() == "false":
-            reason = "which its tool does not run, is shown"
-        context.leave(kind, f"a {kind}, {reason}")
+    if options.get("eval", "").lower() == "false":
+        context.leave(kind, f"a {kind}, which its tool does not run, is shown")
         return "\n\n".join((*head, marks.fence(language, code), *write_outputs(cell, context)))
+    word = how_shown(replace(cell, text="\n".join(f"#| {n}: {v}" for n, v in options.items())))
+    if not (language in _SHELLS or language in context.single_languages):
+        context.files.account.changed[kind, "lines of one script, which ends the text"] += 1
+        joined = context.joined.setdefault(language, JoinedCells(_new_path(language, context)))
+        lines = joined.add(code, cell.printed + (cell.value if language in _PRINTING else ""))
+        shown = marks.fence(f"{language} show={joined.path}#{lines}", code)
+        head += [shown] if word != " hidden" else []
+        return "\n\n".join((*head, *write_outputs(cell, context)))
     message = f"a {kind} is a script, which runs when `[runners]` of the map says how"
     context.leave(kind, message)
-    stem = context.script_path.removesuffix(".py")
-    number = f"_{len(context.scripts) + 1}" if context.scripts else ""
-    path = f"{stem}{number}.{_EXTENSIONS[language]}"
-    context.scripts.append(path)
-    word = how_shown(replace(cell, text="\n".join(f"#| {n}: {v}" for n, v in options.items())))
+    context.scripts.append(path := _new_path(language, context))
     script = marks.fence(f"{language} file={path}{word}", code)
     return "\n\n".join((*head, script, *_outputs(cell, language, context)))
+
+
+def write_joined_cells(context: LessonContext) -> Iterator[str]:
+    """Yield the scripts that the cells of a text make together, with what they print."""
+    for language, joined in context.joined.items():
+        message = f"the cells of `{language}` are one script, which runs when `[runners]` says how"
+        context.leave(f"script of `{language}`", message)
+        yield marks.fence(f"{language} file={joined.path} folded", "\n".join(joined.lines))
+        if output := plain_output(joined.printed):
+            context.files.account.taken["output that is recorded"] += 1
+            context.notebook_outputs.append((joined.path, output))
+            yield marks.fence("output", output)
+
+
+def _new_path(language: str, context: LessonContext) -> str:
+    stem = context.script_path.removesuffix(".py")
+    number = f"_{len(context.scripts) + 1}" if context.scripts else ""
+    return f"{stem}{number}.{_EXTENSIONS[language]}"
+
+
+def _own_label(head: str) -> str:
+    """The label of a cell as knitr has it, the word behind the language."""
+    label = re.fullmatch(r"\{r[ \t]+([\w.-]+)[ \t]*(?:,.*)?\}", head, re.DOTALL)
+    return label[1] if label else ""
 
 
 def _outputs(cell: Segment, language: str, context: LessonContext) -> Iterator[str]:

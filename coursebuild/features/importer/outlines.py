@@ -79,12 +79,9 @@ def read_outline(files: SourceFiles) -> Outline | None:
     config = next((p for p in files if re.fullmatch(r"docusaurus\.config\.[cm]?[jt]s", p)), "")
     if not config:
         return None
-    settings = {
-        key: text
-        for key, _, text in re.findall(
-            r"^\s*(title|tagline):\s*([\"'`])(.+?)\2", files.read_text(config), re.MULTILINE
-        )
-    }
+    pattern = r"(?:^|[{,])\s*(title|tagline):\s*([\"'`])(.+?)\2"
+    fields = re.findall(pattern, files.read_text(config), re.MULTILINE)
+    settings = {key: text for key, _, text in reversed(fields)}  # the first is that of the site
     name = next((path for path in files if re.fullmatch(r"sidebars\.[cm]?[jt]s(?:on)?", path)), "")
     parts: list[ImportedText | ImportedLevel] = []
     if name:

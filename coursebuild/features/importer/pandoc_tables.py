@@ -7,6 +7,7 @@ same columns of the text, of which a wide character takes two.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, groupby, pairwise
@@ -277,3 +278,21 @@ def _read_verse(lines: Sequence[str]) -> list[str]:
 
 _READERS = ((_INDENT, _read_grid), (_QUOTE, _read_ruled))
 """What reads tables, and what stands before each of their lines."""
+
+
+_EXAMPLE = re.compile(r"^([ ]{0,3})\(@([\w-]*)\)(?=[ \t]+\S)", re.MULTILINE)
+
+
+def number_examples(text: str) -> str:
+    """Return a text in which the items of Pandoc's lists of examples have their numbers.
+
+    These go on through the text, and are what `(@label)` stands for in it.
+    """
+    numbers: dict[str, int] = {}
+    for number, example in enumerate(_EXAMPLE.finditer(text), 1):
+        numbers.setdefault(example[2] or str(number), number)
+    count = itertools.count(1)
+    text = _EXAMPLE.sub(lambda example: f"{example[1]}{next(count)}.", text)
+    return re.sub(
+        r"\(@([\w-]+)\)", lambda m: f"({numbers[m[1]]})" if m[1] in numbers else m[0], text
+    )

@@ -9,13 +9,8 @@ from __future__ import annotations
 import re
 import textwrap
 
-from coursebuild.features.importer.context import (
-    PROOF_LABELS,
-    LessonContext,
-    formula_anchor,
-    label_anchor,
-    to_anchor,
-)
+from coursebuild.features.importer.anchors import FIGURE, TARGET
+from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.displays import normalize_formulas
 from coursebuild.features.importer.pandoc_tables import rewrite_tables
 from coursebuild.features.importer.roles import (
@@ -45,7 +40,7 @@ _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
 # each beginning before it.
 _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
-    r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`))"
+    r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)(?:\{=\w+\})?)"
     rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?P<hover>{_LINK_TITLE})?[ \t]*\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
@@ -78,9 +73,6 @@ _LINE = re.compile(
     r"|(?P<markdown>(?P<before><[a-z]\w*(?:[ ][^<>\n]*?)?)[ ]markdown(?:=[\"'\w]+)?(?=[ >]))"
     rf"|(?P<attributes>(?:(?<=[^\s$])|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
     rf"|(?P<span>\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
-)
-_TARGET = re.compile(
-    r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE
 )
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
@@ -133,10 +125,6 @@ _OVER_LINES = re.compile(
 )
 """A role, a note, a citation or the address of a link that goes on in the next line."""
 _TAG_OVER_LINES = re.compile(r"<(?i:a|img|source|video)[ \t\n](?=[^<>\n]*\n)[^<>]*>")
-_FIGURE = re.compile(
-    r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"
-    r"\{#fig-(?P<label>[\w-]+)(?:[^{}\n]*?fig-alt=\"(?P<alternative>[^\"\n]*)\")?[^{}\n]*\}(?=\n|\Z)"
-)
 _KINDS = {
     "role": ("", "Markdown"),
     "code": ("code in a line", "code without the tool's mark"),
@@ -190,6 +178,9 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     if count:
         change = "its rows between bars, a cell in one line; or a verse in lines that end"
         account.changed["table or verse of Pandoc", change] += count
+    text, count = _MARKDOWN_FIGURE.subn(_write_captioned, text)
+    if count:
+        account.changed["figure", "a picture with its caption"] += count
     text, count = _CONTENTS.subn("", text)
     if count:
         account.changed["table of contents", "dropped: the site has its own"] += count
@@ -205,7 +196,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         account.changed["comment of MyST", "a comment of HTML"] += count
     text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
-    text, count = _TARGET.subn(write_target, text)
+    text, count = TARGET.subn(write_target, text)
     if count:
         account.changed["label", "an anchor"] += count
     for abbreviation in _ABBREVIATION.finditer(text):
@@ -228,7 +219,22 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         elif edge is not None and edge[1].startswith(mark):
             mark = "" if mark else edge[1]
         out.append(line)
-    return _FIGURE.sub(_write_figure, "\n".join(out))
+    return FIGURE.sub(_write_figure, "\n".join(out))
+
+
+_MARKDOWN_FIGURE = re.compile(
+    r"^<figure\b[^<>]*>\s*(?P<picture>!\[[^\]\n]*\]\([^()\n]*\))(?:\{[^{}\n]*\})?\s*"
+    r"(?:<figcaption\b[^<>]*>\s*(?P<caption>[^<>]*?)\s*</figcaption>\s*)?</figure>[ \t]*$",
+    re.MULTILINE,
+)
+"""A picture of Markdown between tags of HTML, as MkDocs has it."""
+
+
+def _write_captioned(match: re.Match[str]) -> str:
+    """Return a picture with its caption, in as many lines."""
+    caption = " ".join((match["caption"] or "").split())
+    new = f"Figure: {match['picture']} {caption}" if caption else match["picture"]
+    return new + "\n" * match[0].count("\n")
 
 
 def _write_comment(match: re.Match[str]) -> str:
@@ -273,34 +279,6 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
 def _move_caption(match: re.Match[str]) -> str:
     label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
     return f"Table: {match['caption']}{label}\n\n{match['table']}"
-
-
-_FIGURE_NAME = re.compile(
-    r"\{(?P<kind>figure|table|list-table)\}[^\n]*\n"
-    r"(?:[ \t]*(?::(?!name|label)[\w-]+:|---|(?!name)\w+:)[^\n]*\n)*"
-    r"[ \t]*:?(?:name|label):[ \t]*(?P<name>\S+)"
-)
-
-
-def find_anchors(text: str) -> set[str]:
-    """Return the anchors that a text of any dialect sets, `eq:name` of formulas among them."""
-    labelled = [*_FIGURE_NAME.finditer(text)]
-    figures = {label_anchor(m["name"]) for m in labelled if m["kind"] == "figure"}
-    figures |= {to_anchor(match["label"]) for match in _FIGURE.finditer(text)}
-    cells = re.findall(r"^(?:#\|[ \t]*label:[ \t]*|!\[[^\n]*\{#)fig-([\w-]+)", text, re.MULTILINE)
-    figures |= {to_anchor(label) for label in cells}
-    anchors = {to_anchor(match["name"]) for match in _TARGET.finditer(text)}
-    anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)", text)}
-    proofs = re.findall(rf"#((?:{'|'.join(PROOF_LABELS)})-[\w-]+)", text)
-    anchors |= {to_anchor(name) for name in proofs}
-    anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", normalize_formulas(text)))
-    labels = re.findall(r"^\s*:(?:label|name):[ \t]*(\S+)", text, re.MULTILINE)
-    anchors |= {to_anchor(label) for label in labels}
-    anchors |= {f"eq:{formula_anchor(label)}" for label in labels}
-    anchors |= {f"tab:{to_anchor(label)}" for label in re.findall(r"\{#tbl-([\w-]+)", text)}
-    anchors |= {f"fig:{name}" for name in figures}
-    anchors |= {f"tab:{label_anchor(m['name'])}" for m in labelled if m["kind"] != "figure"}
-    return anchors - {to_anchor(match["name"]) for match in labelled}
 
 
 def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
@@ -415,7 +393,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "attributes":
             return convert_attributes(match)
         case "span":
-            return _rewrite_line(match["words"], context)
+            label = re.search(r"\]\{[ ]*#([\w-]+)", whole)
+            anchor = f'<a id="{to_anchor(label[1])}"></a>' if label else ""
+            return anchor + _rewrite_line(match["words"], context)
         case _:
             return whole
 

@@ -47,18 +47,20 @@ def complete_texts(
     resolve_label: Callable[[str, str], str],
     leave: Callable[[str, str, str], None],
     callouts: frozenset[str],
+    macros: Mapping[str, str],
 ) -> Iterator[str]:
     """Yield the new texts of lessons and pages, each by its link and with its title, completed.
 
     `resolve_label` gives the address of an anchor for a link in a text; empty if no text sets it.
     `leave` is told of what a page cannot hold, and is changed: the link, the kind, a message.
+    `macros` are the definitions of those that hold in all texts, by their names.
     """
     read = {
         link: _read(link, title, text, leave, callouts) for link, (title, text) in texts.items()
     }
     for link, text in read.items():
         edits = {edit.span.start: edit for edit in _edit_links(link, read, resolve_label)}
-        edits |= {edit.span.start: edit for edit in _carry_macros(text.document)}
+        edits |= {edit.span.start: edit for edit in _carry_macros(text.document, macros)}
         yield _GONE.sub("", apply_edits(text.document.source.text, edits.values())).lstrip("\n")
 
 
@@ -209,9 +211,9 @@ def _edit_links(
                 yield Edit(Span(inline.span.source, at, at), words)
 
 
-def _carry_macros(document: model.Document) -> Iterator[Edit]:
+def _carry_macros(document: model.Document, course_macros: Mapping[str, str]) -> Iterator[Edit]:
     """Define macros anew in each formula below that uses them: here they hold in one."""
-    macros: dict[str, str] = {}
+    macros = dict(course_macros)
     for _, formula in model.find_formulas(document):
         tex, definitions = formula.tex.text, ""
         own_macros = {match[1] or match[2]: match[0] for match in _DEFINITION.finditer(tex)}

@@ -44,7 +44,8 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             if ":" in address.rpartition("#")[2]:  # what has a number is called by it
                 rest = words.partition("%s")[2] if "%s" in words else ""
                 return write_link("" if "%s" in words else words, address) + rest
-            return write_link(words.replace("%s", "").strip() or title_of_file(target), address)
+            words = words.replace("%s", "").strip()
+            return write_link(words if address else words or title_of_file(target), address)
         case _ if name.partition(":")[0] in ("cite", "citep", "citet"):
             keys = [key.strip() for key in body.split(",")]
             if context.are_sources(keys):
@@ -54,6 +55,8 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             message = f"`{body}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave(f"role `{{{name}}}`", message)
             return f"`{body}`"
+        case "pep" | "rfc":
+            return words or f"{name.upper()} {body}"
         case "index":
             return words or ("" if ":" in body or "!" in body else body)
         case "download":
@@ -77,9 +80,7 @@ _CODE_ROLES = frozenset(
     "code file command program option envvar samp func function class mod module meth method attr "
     "attribute data const exc exception obj object type".split()
 )
-_WORD_ROLES = frozenset(
-    "abbr chem dfn guilabel menuselection pep raw rfc sc smallcaps span term".split()
-)
+_WORD_ROLES = frozenset("abbr chem dfn guilabel menuselection raw sc smallcaps span term".split())
 _INLINE_RUN = re.compile(r"`(?:\{(?:python|r|julia)\}|r)[ ]+([^`]+)`")
 _LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)\w+[ ]+")
 """The language of code in a line, as MkDocs marks it."""
@@ -87,6 +88,11 @@ _LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)\w+[ ]+")
 
 def convert_code(whole: str, context: LessonContext) -> str:
     """Return code in a line, without the mark of a tool that replaces it by its value."""
+    if raw := re.fullmatch(r"(`+)(.+?)\1\{=(\w+)\}", whole):
+        if raw[3] == "html":
+            return raw[2]
+        context.leave("code in a line", f"{whole}, which is for other forms than a site")
+        return ""
     run = _INLINE_RUN.fullmatch(whole)
     if run is None:
         return _LANGUAGE.sub(r"\1", whole)
@@ -100,17 +106,14 @@ def convert_cross_reference(whole: str, kind: str, label: str, context: LessonCo
     """Return a reference of Quarto, as `@fig-label`, as a link."""
     if kind == "eq":
         return write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
-    if kind in PROOF_LABELS:
-        words = PROOF_LABELS[kind].capitalize()
-        return write_link(words, context.resolve_anchor(f"{kind}-{to_anchor(label)}"))
-    if kind == "sec":
-        return write_link("this section", context.resolve_anchor(f"sec-{to_anchor(label)}"))
-    kind = kind.replace("tbl", "tab")
-    if address := context.resolve_anchor(f"{kind}:{to_anchor(label)}"):
-        return write_link("", address)
+    words = {"sec": "section", "fig": "figure", "tbl": "table", "lst": "listing", **PROOF_LABELS}
+    name = to_anchor(label)
+    numbered = context.resolve_anchor(f"{kind.replace('tbl', 'tab')}:{name}")
+    if address := numbered or context.resolve_anchor(f"{kind}-{name}"):
+        return write_link("" if numbered or kind == "sec" else f"the {words[kind]}", address)
     message = f"the reference `{whole}` to what no text labels: write what is meant"
     context.leave("cross-reference", message)
-    return {"fig": "the figure", "tab": "the table", "lst": "the listing"}[kind]
+    return f"the {words[kind]}"
 
 
 _FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split()

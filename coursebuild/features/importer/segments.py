@@ -32,7 +32,7 @@ _FRONT_MATTER = re.compile(
     re.DOTALL,
 )
 _TITLE = re.compile(
-    r"^#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?(?:[ \t]*\{[^{}]*\})?[ \t]*$"
+    r"^#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?(?:[ \t]*\{(?:[^{}]*#(?P<label>[\w-]+))?[^{}]*\})?[ \t]*$"
     r"|(?:\A|(?<=\n\n)|(?<==\n))(?:(?P<line>[^\s#>].*)\n=+|"
     r"(?P<lines>[^\s#>$][^$\n]*(?>(?:\n(?!=+[ \t]*$)[^\s#>$][^$\n]*)+))\n==+)[ \t]*$",
     re.MULTILINE,
@@ -106,7 +106,7 @@ def read_segments(text: str, name: str) -> ReadText:
             return heading["lower"] + "#" * (len(titles) > 1)
         titles.append(_text_of(heading))
         if len(titles) == 1 and own_title in ("", titles[0]):
-            return ""
+            return f"({heading['label']})=\n" if heading["label"] else ""
         return f"## {_text_of(heading)}" if heading["text"] is None else f"#{heading[0]}"
 
     shifted = [

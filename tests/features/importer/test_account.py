@@ -164,7 +164,7 @@ QUARTO: list[Construct] = [
     ),
     ("cell of `r`", LEFT, '```{r, echo=FALSE, fig.cap="Two wb18"}\nwb19\n```'),
     ("cell of `bash`", LEFT, "```{bash}\n#| label: wb60\necho wb61\n```"),
-    ("cell of `r`", LEFT, "```{r}\nwb62\n```\n\n```{r}\nwb63\n```"),
+    ("cell of `r`", CHANGED, "```{r}\nwb62\n```\n\n```{r}\nwb63\n```"),
     ("cell of `julia`", LEFT, "```{julia}\n#| eval: false\nwb64\n```"),
     ("caption of a table", CHANGED, "| a |\n| - |\n| wb20 |\n\n: Caption wb21 {#tbl-t}"),
     ("attributes", CHANGED, "[words wb22]{.smallcaps}"),

@@ -127,7 +127,7 @@ def test_what_a_notebook_recorded_is_replaced_unless_somebody_edited_it(folder: 
     assert "```output\nmass 4.79\n```" in lesson(folder / "new", "1.1-a")
     assert "```output\nmass 5\n```" in lesson_path.read_text()
     account = (folder / "new/IMPORT.md").read_text()
-    assert "1.1-a.md: the recorded output does not hold here" in account
+    assert "1.1-a.md:6: the recorded output does not hold here" in account
     before = files_of(folder / "new")
     assert main(["-C", "new", "import", "--prove"]) == 1
     assert files_of(folder / "new") == before
@@ -283,6 +283,54 @@ def test_text_that_says_what_is_printed_no_more_is_reported(
     sentence = "1.1-a.md:1 says `4.812` as was recorded, but `4.792` is printed"
     assert sentence in capsys.readouterr().out
     assert sentence in (folder / "new/IMPORT.md").read_text()
+
+
+def test_the_account_says_first_what_contradicts_the_course_each_with_its_place(
+    folder: Path,
+) -> None:
+    cells = [
+        {"cell_type": "code", "source": f"import {ABSENT} as absent", "outputs": []},
+        {"cell_type": "code", "source": "import math\nmath.gone(1)", "outputs": []},
+        {"cell_type": "code", "source": "absent.run()", "outputs": []},
+        {
+            "cell_type": "code",
+            "source": "print('mass', 4.79)",
+            "outputs": [{"output_type": "stream", "name": "stdout", "text": "mass 4.81\n"}],
+        },
+        {"cell_type": "markdown", "source": "# Mass\n\nIt weighs 4.81 kg. $16/70 = 17/70$"},
+    ]
+    (folder / "old").mkdir()
+    (folder / "old/a.ipynb").write_text(json.dumps({"cells": cells, "metadata": {}, "nbformat": 4}))
+    assert main(["import", "old", "--out", "new", "--prove"]) == 1
+    path = "content/lessons/1.1-a.md"
+    lines = (folder / "new" / path).read_text().splitlines()
+
+    def place(*words: str) -> str:
+        pairs = zip(*(lines[n:] for n in range(len(words))), strict=False)
+        found = (all(map(str.__contains__, pair, words)) for pair in pairs)
+        return f"{path}:{[*found].index(True) + 1}"
+
+    account = (folder / "new/IMPORT.md").read_text()
+    assert account.partition("## What does not hold\n\n")[2].splitlines()[:8] == [
+        f"- {place('16/70')}: 0.2285714286 and 0.2428571429 are not the same",
+        "",
+        "## What running showed",
+        "",
+        f"- {place('weighs')} says `4.81` as was recorded, but `4.79` is printed",
+        f"- {place('mass 4.79')}: the recorded output does not hold here and is replaced: "
+        "`4.81` was recorded, `4.79` is printed",
+        f"- {place('```python', 'import math')}: `AttributeError: module 'math' has no attribute "
+        "'gone'`, so the cell is not run",
+        f"- examples/l1_1_a.py: 2 cells shown, not run: ModuleNotFoundError: No module named "
+        f"'{ABSENT}'",
+    ]
+    (folder / "new" / path).write_text("\n".join(lines).replace("$16/70 = 17/70$", ""))
+    main(["-C", "new", "import", "--prove"])
+    assert (
+        account.partition("## What running")[2]
+        == ((folder / "new/IMPORT.md").read_text().partition("## What running")[2])
+    )
+    assert "## What does not hold" not in (folder / "new/IMPORT.md").read_text()
 
 
 def test_a_proof_that_was_killed_goes_on(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,6 +21,7 @@ from coursebuild.api import (
 )
 from coursebuild.core.files.write import undo_changes
 from coursebuild.core.model.results import TrialLine
+from coursebuild.features.importer.commands.findings import Rank
 from coursebuild.features.importer.commands.proof import keep_notebook_outputs, prove
 from coursebuild.features.importer.convert import convert, write_course
 from coursebuild.features.importer.source_files import SourceFiles
@@ -113,9 +114,25 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _prove(options: Options, remarks: tuple[str, ...], most_seconds: float) -> Report:
-    new = prove(options, most_seconds)
-    report = check(options)
-    return replace(report, remarks=(*remarks, *new, *report.remarks), depends=None)
+    findings = prove(options, most_seconds)
+    report = check(options, truth=True)
+    listed = [d for d in report.diagnostics if d.rule in _LISTED]
+    report = replace(
+        report, diagnostics=tuple(d for d in report.diagnostics if d.rule not in _LISTED)
+    )
+    for diagnostic in listed:
+        for note in diagnostic.notes:
+            message = f" says `{diagnostic.span.text}`, and {note.message}"
+            findings.add(Rank.LIKELY, message, diagnostic.span)
+    if count := sum(bool(diagnostic.edits) for diagnostic in listed):
+        numbers = f"{plural(count, 'number')} of texts, which scripts print, can be bound"
+        findings.add(Rank.CHANGED, f"{numbers}: `coursebuild check --propose --truth`")
+    findings.write({}, report.diagnostics)
+    return replace(report, remarks=(*remarks, *findings.remarks(), *report.remarks), depends=None)
+
+
+_LISTED = ("number-unproven", "unit-unproven")
+"""Rules of what only a list has: an import says what of it is printed."""
 
 
 def _examine(options: Options, remarks: tuple[str, ...]) -> Report:

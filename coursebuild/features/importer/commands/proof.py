@@ -36,16 +36,15 @@ from coursebuild.api import (
     marks,
     model,
 )
-from coursebuild.core.files.write import FileChange
 from coursebuild.core.model.results import Change, EffectKind, Sign
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.edit import apply_edits, update_body
+from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.extract import Extraction, jobs
 from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.chain import Chain, name_package
-from coursebuild.features.importer.convert import change_tried_lessons
+from coursebuild.features.importer.commands.findings import Findings, Rank
 from coursebuild.pipeline.load import load
-from coursebuild.pipeline.recordings import read_recorded, record_runs, write_figures
+from coursebuild.pipeline.recordings import record_runs, write_figures
 from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs
 from coursebuild.pipeline.scripts import run as run_scripts
 from coursebuild.report.values import plural
@@ -56,27 +55,25 @@ _LONG_TIMEOUT = 900.0
 """Seconds that a script may take here, if it does not say itself."""
 _TIME_FACTOR = 3.0
 """A script's new time limit, as a multiple of the time it took here."""
-_HEADING = "\n## What running showed\n\n"
 
 
-def prove(options: Options, most_seconds: float) -> tuple[str, ...]:
+def prove(options: Options, most_seconds: float) -> Findings:
     """Run the scripts of an imported course, and write what that shows into its files.
 
-    What takes more than `most_seconds` is recorded once. Returns remarks on what is new. Scripts
-    whose runs are remembered do not run again.
+    What takes more than `most_seconds` is recorded once. Scripts whose runs are remembered do not
+    run again.
     """
-    course = _load(options)
+    course, findings = _load(options), Findings(options)
     if course is None:
-        return ()
+        return findings
     scripts = extract_scripts(course, options).runnable
     first_runs = _run_first(course, scripts, options)
-    remarks: list[str] = []
     edits = defaultdict[Source, list[Edit]](list)
     changed_paths = set[str]()
     for extraction in scripts:
         script, script_run = extraction.script, first_runs[extraction.path]
         keys = [*_missing_keys(script, script_run, most_seconds)]
-        cells, cell_edits = _show_failing_cells(script, script_run, course, keys, remarks)
+        cells, cell_edits = _show_failing_cells(script, script_run, course, keys, findings)
         if cell_edits:
             changed_paths.add(script.path)
             edits[script.span.source] += cell_edits
@@ -84,16 +81,16 @@ def prove(options: Options, most_seconds: float) -> tuple[str, ...]:
             keys += _divergence_keys(script, script_run)
             if cells.modules and not script.requires:
                 keys.insert(0, f"requires={','.join(cells.modules)}")
-            edits[script.span.source] += _add_keys(script, keys, remarks)
-        remarks += (f"{script.path}: {name_package(m, options)}" for m in cells.modules)
+            edits[script.span.source] += _add_keys(script, keys, findings)
+        for module in cells.modules:
+            findings.add(Rank.MISSING, f"{script.path}: {name_package(module, options)}")
         if cell_edits or script_run.outcome is Outcome.OK:
             edits[script.span.source] += _record_outputs(
-                script, script_run, course, options, remarks, cells.failures if cell_edits else ()
+                script, script_run, course, options, findings, cells.failures if cell_edits else ()
             )
-    _write(options, edits)
-    _run_again(first_runs, changed_paths, options, remarks)
-    _write_remarks(options, remarks)
-    return tuple(remarks)
+    findings.write(edits)
+    _run_again(first_runs, changed_paths, options, findings)
+    return findings
 
 
 def _run_first(
@@ -118,7 +115,7 @@ def _run_again(
     first_runs: Mapping[str, ScriptRun],
     changed_paths: Collection[str],
     options: Options,
-    remarks: list[str],
+    findings: Findings,
 ) -> None:
     """Run once more what has changed, and what is recorded from its only run; write what differs.
 
@@ -129,7 +126,7 @@ def _run_again(
     scripts = extract_scripts(course, options).runnable
     whole_runs = [run for path, run in first_runs.items() if path not in changed_paths]
     record_runs(scripts, whole_runs, options)
-    remarks += write_figures(course, None, whole_runs, options, dry_run=False)[0]
+    _draw(course, whole_runs, options, findings)
     recordings = defaultdict[str, list[Recording]](list)
     for recording in recorded_outputs(course):
         recordings[recording.script or ""].append(recording)
@@ -145,6 +142,7 @@ def _run_again(
         )
     ]
     if not again:
+        findings.write({})
         return
     store = options.run_store()
     store.begin()
@@ -160,20 +158,27 @@ def _run_again(
             varying = [*_mark_varying(recordings[script.path], course, first, script_run)]
             if varying:
                 changes += varying
-                remarks.append(f"{script.path}: two runs differ, so an output is `volatile`")
-        cells, cell_edits = _show_failing_cells(script, script_run, course, [], remarks)
+                message = f"{script.path}: two runs differ, so an output is `volatile`"
+                findings.add(Rank.CHANGED, message)
+        cells, cell_edits = _show_failing_cells(script, script_run, course, [], findings)
         changes += cell_edits
         if not cell_edits:
             keys = [*_missing_keys(script, script_run, math.inf)]
             keys += _divergence_keys(script, script_run)
-            changes += _add_keys(script, keys, remarks)
+            changes += _add_keys(script, keys, findings)
         if (cell_edits or script_run.outcome is Outcome.OK) and not varying:
             end = min(cells.failures, default=None)
             later = range(end, len(cells.parts)) if end is not None else ()
-            changes += _record_outputs(script, script_run, course, options, remarks, later)
-    _write(options, edits)
+            changes += _record_outputs(script, script_run, course, options, findings, later)
+    findings.write(edits)
     record_runs(again, runs, options)
-    remarks += write_figures(course, None, runs, options, dry_run=False)[0]
+    _draw(course, runs, options, findings)
+    findings.write({})
+
+
+def _draw(course: Course, runs: Sequence[ScriptRun], options: Options, findings: Findings) -> None:
+    for remark in write_figures(course, None, runs, options, dry_run=False)[0]:
+        findings.add(Rank.CHANGED, remark)
 
 
 def _show_failing_cells(
@@ -181,21 +186,23 @@ def _show_failing_cells(
     script_run: ScriptRun,
     course: Course,
     keys: Sequence[str],
-    remarks: list[str],
+    findings: Findings,
 ) -> tuple[Chain, list[Edit]]:
     """Return the cells of a script, and the edits that show those that cannot run."""
     recordings = recorded_outputs(course) if script_run.outcome is Outcome.FAILED else []
     cells = Chain(script, script_run, recordings)
     edits = [*cells.edits(keys)] if script_run.outcome is Outcome.FAILED else []
-    remarks += cells.remarks
+    for rank, message, place in cells.findings:
+        findings.add(rank, message, place)
     return cells, edits
 
 
-def _add_keys(script: model.Script, keys: Sequence[str], remarks: list[str]) -> Iterator[Edit]:
+def _add_keys(script: model.Script, keys: Sequence[str], findings: Findings) -> Iterator[Edit]:
     if keys:
-        end = script.span.first_line().end
+        head = script.span.first_line()
+        end = head.start + len(head.text.partition(" {#")[0].rstrip())
         yield Edit(Span(script.span.source, end, end), f" {' '.join(keys)}")
-        remarks.append(f"{script.path} got `{' '.join(keys)}`")
+        findings.add(Rank.CHANGED, f"{script.path} got `{' '.join(keys)}`")
 
 
 def keep_notebook_outputs(outputs: Sequence[tuple[str, str]], store: Store) -> None:
@@ -206,27 +213,6 @@ def keep_notebook_outputs(outputs: Sequence[tuple[str, str]], store: Store) -> N
 
 def _load(options: Options) -> Course | None:
     return load(options.root, code="run" if options.sandbox is None else "refuse").value
-
-
-def _write(options: Options, edits: Mapping[Source, Sequence[Edit]]) -> None:
-    file_changes = (
-        FileChange(source.path, source.text.encode(), apply_edits(source.text, changes).encode())
-        for source, changes in edits.items()
-    )
-    lessons = [change for change in file_changes if change.new != change.old]
-    change_tried_lessons(options.root, lessons, options.store)
-
-
-def _write_remarks(options: Options, remarks: Sequence[str]) -> None:
-    """Write what is new into the account, in place of what was new before."""
-    old = read_recorded(options.root, "IMPORT.md")
-    if old is None or not remarks:
-        return
-    text = old.decode("utf-8", "replace").partition(_HEADING)[0]
-    new = f"{text}{_HEADING}" + "".join(f"- {remark}\n" for remark in remarks)
-    if new.encode() != old:
-        changes = [FileChange("IMPORT.md", old, new.encode())]
-        change_tried_lessons(options.root, changes, options.store)
 
 
 def _missing_keys(
@@ -269,7 +255,7 @@ def _record_outputs(
     script_run: ScriptRun,
     course: Course,
     options: Options,
-    remarks: list[str],
+    findings: Findings,
     failing_parts: Container[int],
 ) -> Iterator[Edit]:
     """Yield the edits that write what a script printed where nothing or an import's is recorded.
@@ -291,8 +277,10 @@ def _record_outputs(
             yield edit
             keep_notebook_outputs([(script.path, printed)], options.store)
             if text.strip():
-                remarks.append(f"{recording.span.path}: {_describe_changes(changes)}")
-                remarks += _find_old_numbers(recording, changes, printed)
+                message = f": {_describe_changes(changes)}"
+                findings.add(Rank.RECORDED, message, recording.body_span)
+                for place, message in _find_old_numbers(recording, changes, printed):
+                    findings.add(Rank.SAID, message, place)
     for part, block in enumerate(script.parts or (script,)):
         printed = script_run.output_of(part)
         is_recorded = any(recording.part == part for recording in recordings)
@@ -317,7 +305,7 @@ def _describe_changes(changes: Sequence[Change]) -> str:
 
 def _find_old_numbers(
     recording: Recording, changes: Sequence[Change], printed: str
-) -> Iterator[str]:
+) -> Iterator[tuple[Span, str]]:
     """Yield the places of a text that say a number which was recorded, and is printed no more."""
     source, body = recording.span.source, recording.body_span
     for change in changes:
@@ -327,9 +315,9 @@ def _find_old_numbers(
             continue  # no number, or one that stands elsewhere by accident, or is still printed
         for match in re.finditer(pattern, source.text):
             if not body.start <= match.start() < body.end:
-                place = f"{source.path}:{source.position(match.start())[0]}"
                 old, new = change.recorded, change.printed
-                yield f"{place} says `{old}` as was recorded, but `{new}` is printed"
+                message = f" says `{old}` as was recorded, but `{new}` is printed"
+                yield Span(source, *match.span()), message
 
 
 # --- what varies from run to run

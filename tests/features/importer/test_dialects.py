@@ -1,0 +1,190 @@
+"""Constructs that tools have in ways of their own, as they are in the new course."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from support.converted_folder import account_of, convert_files
+
+
+def lesson(folder: Path, name: str, text: str, **files: str) -> str:
+    """Return what becomes of a text in a folder with further files."""
+    course = convert_files(folder, {name: text, **files})
+    return next(
+        data.decode() for path, data in course.files.items() if path.startswith("content/lessons/")
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        (
+            "a.md",
+            "# One\n\n```{prf:theorem} Sum\n:label: th-sum\nIt adds.\n```\n\n"
+            "{prf:ref}`th-sum`, [](#th-sum)\n",
+            "> [!theorem] Sum {#theorem:th-sum}\n> It adds.\n\n"
+            "[](#theorem:th-sum), [](#theorem:th-sum)\n",
+        ),
+        (
+            "a.md",
+            "# One\n\n```{code-block} python\n:name: step\nx = 1\n```\n\n{numref}`step`\n",
+            "```python {#lst:step}\nx = 1\n```\n\n[](#lst:step)\n",
+        ),
+        (
+            "a.qmd",
+            "# One\n\n::: {#thm-a}\n## Name\nText.\n:::\n\nSee @thm-a.\n",
+            "> [!theorem] Name {#thm:a}\n> Text.\n\nSee [](#thm:a).\n",
+        ),
+        (
+            "a.qmd",
+            '# One\n\n```{#lst-a .python lst-cap="Its step"}\nx = 1\n```\n\nSee @lst-a.\n',
+            "**Its step**\n\n```python {#lst:a}\nx = 1\n```\n\nSee [](#lst:a).\n",
+        ),
+        (
+            "a.qmd",
+            "# One\n\n```{python}\n#| lst-label: lst-b\n#| lst-cap: Its step\nx = 1\n```\n\n"
+            "@lst-b\n",
+            "**Its step**\n\n```python file=examples/l1_1_a.py {#lst:b}\nx = 1\n```\n\n"
+            "[](#lst:b)\n",
+        ),
+        (
+            "a.qmd",
+            "# One\n\n::: {#fig-two}\n![A](p.png)\n\nBoth.\n:::\n\nSee @fig-two.\n",
+            '<a id="fig-two"></a>\n\n![A](../files/p.png)\n\nBoth.\n\n'
+            "See [the figure](#fig-two).\n",
+        ),
+    ],
+)
+def test_what_has_a_number_keeps_it(tmp_path: Path, name: str, text: str, expected: str) -> None:
+    assert lesson(tmp_path, name, text, **{"p.png": "\x89PNG"}) == expected
+
+
+@pytest.mark.parametrize(
+    ("head", "reference"),
+    [("(here)=\n# Head", "{ref}`here`"), ("# Head {#sec-here}", "[](a.md#sec-here)")],
+)
+def test_a_reference_to_the_title_of_a_text_has_its_words(
+    tmp_path: Path, head: str, reference: str
+) -> None:
+    course = convert_files(
+        tmp_path, {"a.md": f"{head}\n\nText.\n", "b.md": f"# Two\n\nSee {reference}.\n"}
+    )
+    text = course.files["content/lessons/1.2-b.md"].decode()
+    assert text.startswith("See [Head](lesson:1.1#")
+    assert "which no text sets" not in account_of(course)
+
+
+def test_the_names_of_lists_of_examples_are_their_numbers(tmp_path: Path) -> None:
+    text = "# One\n\n(@)  First\n(@good)  Second\n\n(@)  Third\n\nAs (@good) shows, not (@x).\n"
+    new = lesson(tmp_path, "a.qmd", text)
+    assert new == "1.  First\n2.  Second\n\n3.  Third\n\nAs (2) shows, not (@x).\n"
+
+
+def test_tabs_of_quarto_are_no_headings(tmp_path: Path) -> None:
+    text = (
+        "# One\n\n::: {.panel-tabset}\n## Left\nA.\n\n```\n## code\n```\n\n## Right {.x}\nB.\n:::\n"
+    )
+    new = lesson(tmp_path, "a.qmd", text)
+    assert new == "**Left**\n\nA.\n\n```\n## code\n```\n\n**Right**\n\nB.\n"
+
+
+def test_macros_of_a_book_are_defined_where_formulas_use_them(tmp_path: Path) -> None:
+    settings = {"tex": {"macros": {"vv": r"\mathbf{v}", "dd": [r"\frac{d #1}{d #2}", 2]}}}
+    config = {"title": "C", "sphinx": {"config": {"mathjax3_config": settings}}}
+    new = lesson(
+        tmp_path,
+        "a.md",
+        "# One\n\n$\\vv = \\dd{x}{t}$, $x$\n",
+        **{"_config.yml": json.dumps(config)},
+    )
+    dd = r"\newcommand{\dd}[2]{\frac{d #1}{d #2}}"
+    assert new == rf"$\newcommand{{\vv}}{{\mathbf{{v}}}}{dd}\vv = \dd{{x}}{{t}}$, $x$" + "\n"
+
+
+def test_a_picture_between_tags_of_a_figure_has_its_caption(tmp_path: Path) -> None:
+    text = (
+        '# One\n\n<figure markdown="span">\n  ![A](p.png){ width="3" }\n'
+        "  <figcaption>At rest</figcaption>\n</figure>\n"
+    )
+    assert lesson(tmp_path, "a.md", text, **{"p.png": "\x89PNG"}) == (
+        "Figure: ![A](../files/p.png) At rest\n"
+    )
+
+
+def test_directives_of_tables_pictures_and_terms(tmp_path: Path) -> None:
+    text = (
+        '# One\n\n```{csv-table}\n"a", "b, c"\n```\n\n'
+        "```{figure-md} fig-m\n![M](p.png)\n\nModes.\n```\n\n"
+        "```{glossary}\nstiffness\n: Force per length.\n```\n\n{pep}`8`\n"
+    )
+    assert lesson(tmp_path, "a.md", text, **{"p.png": "\x89PNG"}) == (
+        "| a | b, c |\n| --- | --- |\n\nFigure: ![M](../files/p.png) Modes. {#fig:m}\n\n"
+        "[stiffness]{term}: Force per length.\n\nPEP 8\n"
+    )
+
+
+def test_a_book_of_bookdown(tmp_path: Path) -> None:
+    """Its order, parts, references, theorems and pictures."""
+    course = convert_files(
+        tmp_path,
+        {
+            "_bookdown.yml": "rmd_files: [index.Rmd, z.Rmd, a.Rmd]\n",
+            "index.Rmd": "---\ntitle: Fits\n---\n\n# Preface {-}\n\nText.\n",
+            "z.Rmd": "# (PART) Lines {-}\n\n# A line {#line}\n\n"
+            "See Figure \\@ref(fig:logo), Chapter \\@ref(end) and (\\@ref(eq:y)).\n\n"
+            "\\begin{equation}\ny = x (\\#eq:y)\n\\end{equation}\n\n"
+            '```{theorem, ls, name="Least"}\nBest.\n```\n\nTheorem \\@ref(thm:ls).\n\n'
+            "```{r logo, fig.cap='A logo'}\nknitr::include_graphics(\"p.png\")\n```\n",
+            "a.Rmd": "# The end {#end}\n\nText.\n",
+            "p.png": "\x89PNG",
+        },
+    )
+    course_map = course.files["content/course.toml"].decode()
+    assert 'title = "Fits"' in course_map
+    assert course_map.index('title = "Lines"') < course_map.index('title = "A line"')
+    assert course.files["content/lessons/1.1-z.md"].decode() == (
+        '<a id="line"></a>\n\n\n'
+        "See [](#fig:logo), Chapter [The end](lesson:1.2#end) and [](#eq:y).\n\n"
+        "$$\\begin{equation}\ny = x \n\\end{equation}$$ {#eq:y}\n\n"
+        "> [!theorem] Least {#thm:ls}\n> Best.\n\n[](#thm:ls).\n\n"
+        "Figure: ![A logo](../files/p.png) A logo {#fig:logo}\n"
+    )
+
+
+def test_cells_of_a_language_are_lines_of_one_script(tmp_path: Path) -> None:
+    cells = [
+        {"cell_type": "code", "source": "x <- c(1, 2)", "outputs": []},
+        {
+            "cell_type": "code",
+            "source": "mean(x)",
+            "outputs": [{"output_type": "execute_result", "data": {"text/plain": "[1] 1.5"}}],
+        },
+    ]
+    metadata = {"kernelspec": {"language": "R"}}
+    notebook = json.dumps({"cells": cells, "metadata": metadata, "nbformat": 4})
+    script = "examples/l1_1_a.R"
+    assert lesson(tmp_path, "a.ipynb", notebook) == (
+        f"```r show={script}#L1-L1\nx <- c(1, 2)\n```\n\n"
+        f"```r show={script}#L2-L2\nmean(x)\n```\n\n```text\n[1] 1.5\n```\n\n"
+        f"```r file={script} folded\nx <- c(1, 2)\nmean(x)\n```\n\n```output\n[1] 1.5\n```\n"
+    )
+
+
+def test_code_that_docusaurus_imports_and_colours(tmp_path: Path) -> None:
+    text = (
+        "# One\n\nimport Src from '!!raw-loader!./gas.py';\n\n"
+        '<CodeBlock language="python" title="gas.py">{Src}</CodeBlock>\n\n'
+        "```python\n# highlight-next-line\nx = 1\n```\n"
+    )
+    files = {
+        "docs/gas.py": "print('gas')\n",
+        "docusaurus.config.js": "module.exports = {title: 'Heat', a: {\n title: 'More'}};\n",
+    }
+    course = convert_files(tmp_path, {"docs/a.mdx": text, **files})
+    assert 'title = "Heat"' in course.files["content/course.toml"].decode()
+    assert course.files["content/lessons/1.1-a.md"].decode() == (
+        "**gas.py**\n\n```python\nprint('gas')\n```\n\n```python\nx = 1\n```\n"
+    )
