@@ -15,6 +15,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from coursebuild.api import UsageError
+from coursebuild.features.importer.displays import read_macros
 from coursebuild.features.importer.outlines import (
     find_text,
     flatten,
@@ -94,6 +95,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         language=outline.language if outline is not None else "",
         has_own_titles=True,
         substitutions=_read_substitutions(settings, files),
+        macros="".join(map(read_macros, settings)),
         levels=tuple(levels),
         pages=tuple(pages),
         has_hidden_lines=outline is not None and outline.has_hidden_lines,

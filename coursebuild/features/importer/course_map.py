@@ -292,7 +292,7 @@ def _read_file(
         path = ""  # a title alone: it is planned
     text = replace(text, summary=text.summary or read.summary)
     text = replace(text, segments=read.segments, pictures=read.pictures)
-    text = replace(text, substitutions=read.substitutions)
+    text = replace(text, substitutions=read.substitutions, macros=read.macros)
     return replace(text, id=id or page, slug=slug, title=title, path=path)
 
 

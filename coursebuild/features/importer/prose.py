@@ -53,6 +53,7 @@ _LINE = re.compile(
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     r"|(?P<math>\$\$?[^$\n]+\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
+    r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
     r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]\[(?P<path>[A-Za-z_]\w*(?:\.\w+)+)?\])"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
@@ -67,6 +68,8 @@ _LINE = re.compile(
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
     r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
+    r"|(?P<proof>\{\{(?P<sort>[a-z]+)\}\}(?=[{\[])(?:\{(?P<key>[^{}\n]+)\})?"
+    r"(?:\[(?P<name_of>[^\[\]\n]*)\])?)"
     r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
@@ -98,6 +101,7 @@ _MEANING = re.compile(
 _ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
 _EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
+_EMPTY_HEADING = re.compile(r"[ ]{0,3}#{1,6}[ \t]*$")
 _ENDS = {"<!--": "-->", "$$": "$$"}
 _COMMENT = re.compile(
     r"%%(?P<inner>[^%\n]+)%%|^%%[ \t]*\n(?P<lines>(?:(?!%%)[^\n]*\n)+)%%[ \t]*$"
@@ -130,8 +134,9 @@ _OVER_LINES = re.compile(
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
+    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
 )
-"""A role, a note, a citation or the address of a link that goes on in the next line."""
+"""A role, a note, a citation, the address of a link or a formula that goes on in the next line."""
 _TAG_OVER_LINES = re.compile(r"<(?i:a|img|source|video)[ \t\n](?=[^<>\n]*\n)[^<>]*>")
 _FIGURE = re.compile(
     r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"
@@ -145,12 +150,14 @@ _KINDS = {
     "digits": ("formula", "the digits behind it are in it"),
     "math": ("formula", "without blanks at its ends"),
     "paren": ("formula", "between dollar signs"),
+    "square": ("formula", "between dollar signs"),
     "anchor": ("link", "dropped: it has no text and no address"),
     "object": ("link", "its words: what it leads to is made from code by another tool"),
     "note": ("footnote", "stands at the end of the lesson"),
     "cross": ("cross-reference", "a link"),
     "cite": ("citation", "in the words of BibTeX's keys"),
     "pair": ("pair of tags", "what it holds, without a frame"),
+    "proof": ("theorem of mdBook's `numthm`", "an anchor, its kind and its title"),
     "substitution": ("substitution", "the words that it stands for"),
     "marked": ("marked words", "a tag of HTML"),
     "change": ("suggested change", "as if it had been accepted"),
@@ -222,6 +229,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     for number, line in enumerate(text.split("\n")):
         edge = _EDGE.match(line)
         if edge is None and not mark:
+            line = _EMPTY_HEADING.sub("", line)
             line = _rewrite_line(line, context.line_below(number))
         elif mark in _ENDS:
             mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
@@ -270,6 +278,18 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
     return _LINE.sub(rewrite, line)
 
 
+_SORTS = {"prop": "proposition"}
+"""Kinds of theorems of `numthm` by their labels, where Quarto has others."""
+
+
+def _write_proof(match: re.Match[str], context: LessonContext) -> str:
+    """Return the head of a theorem; a kind that its settings add is not named, its title is."""
+    kind = {**PROOF_LABELS, **_SORTS}.get(match["sort"], "") if match["sort"] != "imp" else ""
+    title = _rewrite_line(match["name_of"] or "", context)
+    words = f"{kind.capitalize()} ({title})" if kind and title else kind.capitalize() or title
+    return (f'<a id="{to_anchor(match["key"])}"></a>' if match["key"] else "") + words
+
+
 def _move_caption(match: re.Match[str]) -> str:
     label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
     return f"Table: {match['caption']}{label}\n\n{match['table']}"
@@ -291,6 +311,7 @@ def find_anchors(text: str) -> set[str]:
     figures |= {to_anchor(label) for label in cells}
     anchors = {to_anchor(match["name"]) for match in _TARGET.finditer(text)}
     anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)", text)}
+    anchors |= {to_anchor(key) for key in re.findall(r"\{\{[a-z]+\}\}\{([^{}\n]+)\}", text)}
     proofs = re.findall(rf"#((?:{'|'.join(PROOF_LABELS)})-[\w-]+)", text)
     anchors |= {to_anchor(name) for name in proofs}
     anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", normalize_formulas(text)))
@@ -345,6 +366,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":
             return f"${match['inner'].strip()}$"
+        case "square":
+            return f"$${match['shown_tex'].strip()}$$"
         case "note":
             context.notes.append(_rewrite_line(match["remark"], context))
             return f"[^note-{len(context.notes)}]"
@@ -376,6 +399,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return f"`{whole}`"
         case "pair":
             return _rewrite_line(match["held"], context)
+        case "proof":
+            return _write_proof(match, context)
         case "substitution":
             return convert_substitution(whole, context)
         case "marked":

@@ -19,13 +19,10 @@ from msgspec import Struct
 from coursebuild.api import Edit, Source, Span, model
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.document import parse_document
+from coursebuild.features.importer.displays import DEFINITION
 from coursebuild.features.importer.prose import GONE
 from coursebuild.features.importer.source_files import title_of_file
 
-_DEFINITION = re.compile(
-    r"\\(?:(?:re)?newcommand\*?[ ]*\{?(\\[A-Za-z]+)\}?(?:\[\d\]){0,2}|def[ ]*(\\[A-Za-z]+)(?:#\d)*)"
-    r"[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
-)
 _GONE = re.compile(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
 _REFERENCE = re.compile(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
 _COMMAND = re.compile(r"\\[A-Za-z]+")
@@ -64,6 +61,7 @@ def complete_texts(
 
 _PASSES = 3
 """How often HTML is dropped: an end whose beginning was dropped is seen the next time."""
+_ANCHOR = re.compile(r'<a id="[^"<>]*">')
 _MEDIA = re.compile(
     r"<(?:(?:img|source)\b[^<>]*>(?:</img>)?"
     r"|(?P<name>video|audio)\b[^<>]*(?:/>|>(?:.*?</(?P=name)\s*>)?))",
@@ -88,6 +86,11 @@ def _read(
         spans = [
             *(part.span for html in _raw_html(document) for part in html.forbidden),
             *(d.span for d in parse.diagnostics if d.rule == "html-unbalanced"),
+            *(
+                d.span
+                for d in parse.diagnostics
+                if d.rule == "anchor-repeated" and _ANCHOR.fullmatch(d.span.text)
+            ),
         ]
         for span in spans:
             whole = _WITH_CONTENT.match(text, span.start)
@@ -214,11 +217,11 @@ def _carry_macros(document: model.Document) -> Iterator[Edit]:
     macros: dict[str, str] = {}
     for _, formula in model.find_formulas(document):
         tex, definitions = formula.tex.text, ""
-        own_macros = {match[1] or match[2]: match[0] for match in _DEFINITION.finditer(tex)}
+        own_macros = {match[1] or match[2]: match[0] for match in DEFINITION.finditer(tex)}
         for name, definition in reversed(macros.items()):
             if name not in own_macros and name in _COMMAND.findall(tex + definitions):
                 definitions = definition + definitions
-        if own_macros and not _DEFINITION.sub("", tex).strip():
+        if own_macros and not DEFINITION.sub("", tex).strip():
             text = document.source.text  # definitions alone: they stand in each formula below
             span = formula.tex.span()
             start, end = text.rfind("$", 0, span.start), text.find("$", span.end)
