@@ -150,6 +150,13 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
             '<a id="a"></a>\n\n\n\n> [!theorem] Of a\n> Text.\n',
         ),
         ("Text.\n\n#\n\nOn.\n", "Text.\n\n\n\nOn.\n"),
+        (
+            ":::{glossary}\n[A](https://example.org/a)\n: One,\non.\n: Also 1.\n\nB\nC\n\n"
+            ": Two.[^n]\n\n[^n]: Or so.\n\nA\n: Three.\n:::\n",
+            "[A]{term} (<https://example.org/a>): One, on. Also 1.\n\n"
+            "[B]{term}, [C]{term}: Two.[^n]\n\n[^n]: Or so.\n\nA: Three.\n",
+        ),
+        (":::{show-index}\n:::\n\nText.\n", "Text.\n"),
     ],
     ids=[
         "script",
@@ -179,6 +186,8 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         "label with the kind of a formula",
         "label before a directive",
         "empty heading",
+        "glossary with colons",
+        "index",
     ],
 )
 def test_a_text_of_another_tool_keeps_all_that_readers_see(
