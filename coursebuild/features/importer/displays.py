@@ -12,18 +12,18 @@ from typing import Any
 from coursebuild.features.importer.context import formula_anchor
 from coursebuild.features.importer.source_files import value_at
 
-_WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
+WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
 """Words in a formula that hold a formula themselves."""
 _DISPLAY = re.compile(
     r"(?P<ticks>`+)(?!`)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
-    rf"|\$\$(?P<tex>(?:{_WORDS}|[^$\\]|\\.)+?)\$\$"
+    rf"|\$\$(?P<tex>(?:{WORDS}|[^$\\]|\\.)+?)\$\$"
     r"(?:[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\}))?"
     r"(?:[ \t]*<br[ ]*/?>)*(?P<behind>[ \t]*(?=[^\s.,;:]|[.,;:][ \t]*\S))?",
     re.DOTALL,
 )
 """A formula between two dollar signs each, or code, in which there is none."""
 _ENVIRONMENT = re.compile(
-    rf"\$\$(?>(?:{_WORDS}|[^$])+)\$\$|^[ \t]*"
+    rf"\$\$(?>(?:{WORDS}|[^$])+)\$\$|^[ \t]*"
     r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
     r"(?>(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*)"
     r"\\end\{(?P=env)(?P=star)\})[ \t]*$",
@@ -48,6 +48,12 @@ DEFINITION = re.compile(
     r"[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
 )
 """A macro of LaTeX."""
+_OPERATOR = re.compile(
+    r"(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)"
+    r"|\\DeclareMathOperator(?P<star>\*?)[ ]*\{?(?P<name>\\[A-Za-z]+)\}?[ ]*\{(?P<word>[^{}]*)\}",
+    re.DOTALL,
+)
+"""An operator that is declared; or code, in which there is none."""
 _MACROS = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
 """Where MyST and Sphinx have macros by their names."""
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
@@ -56,9 +62,19 @@ _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
-    text = _DISPLAY.sub(_drop_empty, text)
+    text = define_operators(_DISPLAY.sub(_drop_empty, text))
     text = _ENVIRONMENT.sub(lambda m: f"$${m['tex']}$$" if m["tex"] else m[0], text)
     return _DISPLAY.sub(_label_formula, text)
+
+
+def define_operators(text: str) -> str:
+    r"""Write as macros what LaTeX's `\DeclareMathOperator` makes operators."""
+
+    def define(match: re.Match[str]) -> str:
+        operator = rf"\operatorname{match['star']}{{{match['word']}}}"
+        return rf"\def{match['name']}{{{operator}}}" if match["name"] else match[0]
+
+    return _OPERATOR.sub(define, text)
 
 
 def display_formula(tex: str, label: str) -> str:
@@ -96,7 +112,9 @@ def _label_formula(match: re.Match[str]) -> str:
 def read_macros(settings: Mapping[str, Any]) -> str:
     """Return the definitions of the macros that settings or front matter have."""
     header = settings.get("header-includes")
-    lines = (str(line) for line in (header if isinstance(header, list) else [header]))
+    lines = (
+        define_operators(str(line)) for line in (header if isinstance(header, list) else [header])
+    )
     return "".join(
         [match[0] for line in lines for match in DEFINITION.finditer(line)]
         + [*_named_macros(settings)]

@@ -16,7 +16,7 @@ from coursebuild.features.importer.context import (
     label_anchor,
     to_anchor,
 )
-from coursebuild.features.importer.displays import normalize_formulas
+from coursebuild.features.importer.displays import WORDS, normalize_formulas
 from coursebuild.features.importer.pandoc_tables import rewrite_tables
 from coursebuild.features.importer.roles import (
     convert_attributes,
@@ -51,7 +51,7 @@ _LINE = re.compile(
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
     rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
-    r"|(?P<math>\$\$?[^$\n]+\$\$?)"
+    rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
     r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
     r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"

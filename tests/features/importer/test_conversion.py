@@ -136,6 +136,10 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
             "$$\n\\begin{aligned}\na &= \\text{for $i \\ne j$}\n\\end{aligned}\n$$\n",
             "$$\n\\begin{aligned}\na &= \\text{for $i \\ne j$}\n\\end{aligned}\n$$\n",
         ),
+        (
+            "So $a \\text{ for $i$}$, $\\DeclareMathOperator*{\\am}{arg\\,max}\\am_x$.\n",
+            "So $a \\text{ for $i$}$, $\\def\\am{\\operatorname*{arg\\,max}}\\am_x$.\n",
+        ),
         ("> So\n> $$\na = b\n$$\n>\n> and on.\n", "> So\n> $$\n> a = b\n> $$\n>\n> and on.\n"),
         ("So \\\\(a =\nb\\\\) and \\\\[c = d\\\\] here.\n", "So $a = b$\n and $$c = d$$ here.\n"),
         (
@@ -180,6 +184,7 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         "lines of a formula",
         "empty formula",
         "formula in words of a formula",
+        "declared operator",
         "lazy lines of a formula",
         "brackets over lines",
         "numbers of mdBook",
