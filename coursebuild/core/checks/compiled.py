@@ -120,7 +120,7 @@ def check_compiled(
         for name in block.models()
     }
     diagnostics: list[Diagnostic] = []
-    paths = {path for result in models.values() if result.facts for path in result.facts.includes}
+    paths = {path for result in models.values() for path in (result.facts or result).includes}
     included = {
         model.name
         for model in course.models

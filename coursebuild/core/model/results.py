@@ -272,6 +272,8 @@ class CompileResult(Struct, frozen=True):
     """Whether there was no time to compile it, which `error` says as the end of a sentence."""
     misspelling: Misspelling | None = None
     """What `error` is about, if it is known what may have been meant."""
+    includes: tuple[str, ...] = ()
+    """Files that a text with an error includes, as `ModelFacts` has those of a right one."""
 
 
 class ModelFacts(Struct, frozen=True):

@@ -156,8 +156,9 @@ class _Compiler(JsonChild):
             return CompileResult(f"takes more than {limit:g} s to compile", timeout=True)
         error, facts, seconds = reply
         self.left -= seconds
+        includes = existing_files(self.root, path, text)
         if facts is not None:
-            facts |= {"includes": existing_files(self.root, path, text)}
+            facts |= {"includes": includes}
             return CompileResult("", facts=msgspec.convert(facts, ModelFacts))
         message = error.strip().replace(f"{self.root}/", "")  # as it would be on any machine
         message = message.replace(f"models/{_TEXT_NAME}", _TEXT_NAME)
@@ -171,7 +172,7 @@ class _Compiler(JsonChild):
         elif _NO_MEMORY.search(message):
             self.stop()  # where memory was refused, MuJoCo may not go on
             return CompileResult(f"{OWN_FAULT}takes more than {self.memory} MiB of memory for it")
-        return CompileResult(message, line)
+        return CompileResult(message, line, includes=includes)
 
     def _no_time_left(self) -> CompileResult:
         message = f"was not compiled: others took the {self.seconds:g} s that all may take"

@@ -8,9 +8,10 @@ has, since each of them reads its lines again.
 
 A `$` opens a formula when something other than white space follows; the next `$` that no backslash
 escapes must close it, with something other than white space before it and no digit after it. So
-"costs $5 and $6" holds no formula. Code spans bind tighter than formulas, formulas tighter than
-emphasis and links. A block of math ends at a `$$` with nothing but a label after it; an empty line
-before that means that it was never closed.
+"costs $5 and $6" holds no formula. Words of a formula may hold others, as LaTeX's `text{for $i$}`.
+Code spans bind tighter than formulas, formulas tighter than emphasis and links. A block of math
+ends at a `$$` with nothing but a label after it; an empty line before that means that it was never
+closed.
 """
 
 from __future__ import annotations
@@ -31,7 +32,13 @@ from coursebuild.core.syntax.attributes import LABEL, SYMBOL
 from coursebuild.core.syntax.spans import BlockState, InlineState, PositionedToken
 from coursebuild.core.text.source import Excerpt
 
-_TEX = re.compile(r"(?>(?:[^\\`$]++|\\[\s\S])*)")
+_PLAIN_TEX = r"(?:[^{}$`]|\{[^{}$`]*\})"
+_WORDS = (
+    r"\\(?:text\w*|[fhm]box|colorbox\{\w+\})"
+    rf"\{{{_PLAIN_TEX}*+(?:\${_PLAIN_TEX}++\${_PLAIN_TEX}*+)+\}}"
+)
+"""Words in a formula that hold formulas themselves, as in `\\text{for all $i$}`."""
+_TEX = re.compile(rf"(?>(?:{_WORDS}|[^\\`$]++|\\[\s\S])*)")
 _BLOCK_TEX = re.compile(r"(?>(?:[^\\$]++|\\[\s\S]|\$(?!\$))*)")
 BACKTICKS = re.compile(r"`+")
 _DOLLARS = re.compile(r"\$+")

@@ -138,6 +138,8 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
         return "it says how many one of them is"
     if _may_hold(sides, relation):
         return "its unit may be that of another part"
+    if _holds_in_base_units(*sides, relation) or _holds_in_base_units(*sides[::-1], relation):
+        return "the number without a unit may be in base units"
     units = (part.text for side in sides for part in side.walk() if part.kind == "unit")
     turns = [{n for u in find_units(t) for n, _ in u.powers} & {"angle", "cycle"} for t in units]
     if {"angle"} in turns and {"cycle"} in turns:
@@ -207,6 +209,17 @@ def _may_hold(sides: tuple[Expression, Expression], relation: str) -> bool:
         return any(_find_mistake(*pair, relation) is None for pair in pairs if pair != sides)
     except NotUnderstood:
         return False
+
+
+def _holds_in_base_units(bare: Expression, other: Expression, relation: str) -> bool:
+    r"""Whether a number is that of a quantity in base units: `2\cdot3000 = 6\,\mathrm{kW}`."""
+    if relation in ORDERS or bare.has("unit") or not other.ends_in_unit():
+        return False
+    numeral = read_numeral(other) if find_units(other.parts[1].text) else None
+    if numeral is None:
+        return False
+    value, of_decimals = evaluate(bare).value, bare.has_decimals()
+    return agrees(numeral, value, relation, of_decimals=of_decimals) is True
 
 
 def _divide_by_unit(expression: Expression) -> Expression:

@@ -50,6 +50,7 @@ def find_anchors(text: str) -> set[str]:
     figures |= {to_anchor(label) for label in cells}
     anchors = {to_anchor(match["name"]) for match in TARGET.finditer(text)}
     anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)", text)}
+    anchors |= {to_anchor(key) for key in re.findall(r"\{\{[a-z]+\}\}\{([^{}\n]+)\}", text)}
     proofs = re.findall(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", text)
     anchors |= {f"{kind}:{to_anchor(name)}" for kind, name in proofs}
     anchors |= {f"lst:{to_anchor(m[1] or m[2])}" for m in _LISTING.finditer(text)}

@@ -289,7 +289,7 @@ def _write_callout(
 def _convert_directive(name: str, argument: str, text: str, context: LessonContext) -> str:
     options, body = split_options(text)
     directive = Directive(
-        name,
+        name.lower(),
         argument,
         options,
         body,

@@ -16,6 +16,7 @@ from typing import Any
 
 from coursebuild.api import UsageError
 from coursebuild.features.importer.bookdown import read_book
+from coursebuild.features.importer.displays import read_macros
 from coursebuild.features.importer.outlines import (
     find_text,
     flatten,
@@ -99,7 +100,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         language=outline.language if outline is not None else "",
         has_own_titles=True,
         substitutions=_read_substitutions(settings, files),
-        macros=dict(_read_macros(settings, files)),
+        macros="".join(map(read_macros, settings)),
         levels=tuple(levels),
         pages=tuple(pages),
         has_hidden_lines=outline is not None and outline.has_hidden_lines,
@@ -118,24 +119,6 @@ def _read_substitutions(
         text = re.search(r"(?ms)^myst_substitutions\s*=\s*(\{.*?\})$", files.read_text(name))
         values.append(read_yaml(text[1]) if text else None)  # a literal is a value of YAML
     return {key: value for mapping in values for key, value in _named_values(mapping)}
-
-
-def _read_macros(
-    settings: Sequence[Mapping[str, Any]], files: SourceFiles
-) -> Iterator[tuple[str, str]]:
-    """Yield the macros of formulas that the settings of Jupyter Book or MyST have, defined."""
-    mathjax = ("sphinx", "config", "mathjax3_config", "tex", "macros")
-    for path in (mathjax, ("project", "math")):
-        for mapping in settings:
-            macros = value_at(mapping, *path)
-            for name, value in macros.items() if isinstance(macros, Mapping) else ():
-                value = value.get("macro") if isinstance(value, Mapping) else value
-                tex, count = (*value, 0)[:2] if isinstance(value, list) else (value, 0)
-                arguments = max([int(count), *map(int, re.findall(r"#(\d)", str(tex)))])
-                command = "\\" + str(name).lstrip("\\")
-                number = f"[{arguments}]" if arguments else ""
-                files.account.changed["macro", "defined in the formulas that use it"] += 1
-                yield command, f"\\newcommand{{{command}}}{number}{{{tex}}}"
 
 
 def _named_values(value: object, name: str = "") -> Iterator[tuple[str, str]]:

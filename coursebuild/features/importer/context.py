@@ -119,6 +119,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         if re.match("(?:inv|xref):", address):
             self.leave("link", f"a link to `{address}`, which its tool finds elsewhere")
             return ""
+        if address.startswith("eq") and (resolved := self.resolve_formula(address)):
+            return resolved
         parts = urlsplit(re.sub("^(?:project|path):", "", address))
         if parts.scheme or parts.netloc or not parts.path:
             return parts.geturl()
@@ -175,6 +177,10 @@ class LessonContext(Struct, frozen=True, kw_only=True):
             return ""
         is_here = target == self.targets.get(stem_of(self.path))
         return f"#{anchor}" if is_here else f"{target}#{anchor}"
+
+    def resolve_formula(self, label: str) -> str:
+        """Return the address of a formula by its label; empty where no text has it."""
+        return self.resolve_anchor(f"eq:{formula_anchor(label)}")
 
     def resolve_path(self, path: str) -> str:
         """Return a path that the lesson names, relative to the folder that is imported."""

@@ -111,14 +111,23 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     return ConvertedCourse(dict(sorted(out.items())), files.account, context.notebook_outputs)
 
 
+_READABLE = re.compile(r"^(?![ ]{0,3}#{1,6}[ \t])[^\n]*\S", re.MULTILINE)
+"""A line that is no heading."""
+
+
 def _plan_empty_lessons(
     course: ImportedCourse, out: dict[str, bytes], files: SourceFiles
 ) -> ImportedCourse:
-    """Return the course with lessons planned of whose texts nothing is left; their files go."""
+    """Return the course with lessons planned of whose texts nothing is left; their files go.
+
+    Those of which only headings are left are drafts.
+    """
 
     def plan(text: ImportedText) -> ImportedText:
-        if not text.path or out[text.path].strip():
+        if not text.path or _READABLE.search(out[text.path].decode()):
             return text
+        if out[text.path].strip():
+            return replace(text, status="draft")
         del out[text.path]
         files.leave(text.file, "a text of which nothing is left: a lesson that is planned", "text")
         return replace(text, path="")
@@ -303,10 +312,14 @@ def _convert_texts(
         camera_is_position=course.camera_is_position,
         substitutions=course.substitutions,
     )
+    # Of R Markdown, all files of a book are one text
+    book_macros = course.macros + "".join(t.macros for t in texts if t.file == "index.Rmd")
     new = {}
     for text in texts:
+        macros = f"{book_macros}{text.macros}"
         try:
-            new[text.link] = text.title, _convert_text(text, context)
+            head = f"$${macros}$$\n\n" if macros else ""
+            new[text.link] = text.title, head + _convert_text(text, context)
         except RecursionError:
             raise UsageError(f"{text.file} is nested too deeply") from None
     files_of = {text.link: text.file for text in texts}
@@ -322,7 +335,7 @@ def _convert_texts(
         files.leave(files_of[link], message, kind)
 
     callouts = frozenset((*CALLOUTS, *context.callouts))
-    completed = complete_texts(new, resolve_label, leave, callouts, course.macros)
+    completed = complete_texts(new, resolve_label, leave, callouts)
     out = {text.path: _encode(new_text) for text, new_text in zip(texts, completed, strict=True)}
     return {**out, **context.copies}, context
 

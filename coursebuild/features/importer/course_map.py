@@ -300,7 +300,7 @@ def _read_file(
         files.leave(text.file, message, "text")
     text = replace(text, summary=text.summary or read.summary)
     text = replace(text, segments=read.segments, pictures=read.pictures)
-    text = replace(text, substitutions=read.substitutions)
+    text = replace(text, substitutions=read.substitutions, macros=read.macros)
     return replace(text, id=id or page, slug=slug, title=title, path=path)
 
 

@@ -76,7 +76,7 @@ _FRAMES = frozenset(
     "card-carousel centered hlist rst-class table-of".split()
 )
 """What only places what it holds."""
-_MAPS = frozenset(("tableofcontents", "toctree", "contents", "bibliography", "genindex"))
+_MAPS = frozenset("tableofcontents toctree contents bibliography genindex show-index".split())
 """Lists that the site makes itself."""
 _CHANGES = {
     "versionadded": "New in",
@@ -277,17 +277,37 @@ def _cell(text: str, context: LessonContext) -> str:
 
 
 def _write_glossary(text: str, context: LessonContext) -> str:
-    """Return the entries of a glossary as paragraphs that mark their terms."""
-    out, terms = [], list[str]()
-    text = re.sub(r"^:[ \t]+", "  ", text, flags=re.MULTILINE)  # as of a list of definitions
+    """Return the entries of a glossary as paragraphs that mark their terms.
+
+    A meaning stands further right than its terms, or, as MyST has it, behind a colon.
+    """
+    text = re.sub(r"\n(?:[ \t]*\n)*:[ \t]+((?:.+\n?)+)", _indent_meaning, text)
+    out, terms, marked = [], list[str](), set[str]()
     for entry in re.split(r"\n(?=\S)", text.strip("\n")):
         term, _, meaning = entry.partition("\n")
-        terms.append(term.strip())
+        if entry.startswith("[^"):  # a footnote
+            out.append(rewrite_prose(entry.strip(), context))
+            continue
+        terms.append(_mark_term(term.strip(), marked))
         if meaning.strip():
             words = rewrite_prose(" ".join(textwrap.dedent(meaning).split()), context)
-            out.append(f"{', '.join(f'[{term}]{{term}}' for term in terms)}: {words}")
+            out.append(f"{', '.join(terms)}: {words}")
             terms = []
     return "\n\n".join(out)
+
+
+def _indent_meaning(meaning: re.Match[str]) -> str:
+    lines = re.sub(r"\n:[ \t]+", "\n", meaning[1].rstrip("\n"))
+    return "\n" + textwrap.indent(lines, "  ") + "\n"
+
+
+def _mark_term(term: str, marked: set[str]) -> str:
+    """Return a term with its mark, the first time; a link of it stands behind the mark."""
+    link = re.fullmatch(r"\[([^\[\]]+)\]\(([^()\s]+)\)", term)
+    words, address = (link[1], f" (<{link[2]}>)") if link is not None else (term, "")
+    mark = "" if words in marked else "{term}"
+    marked.add(words)
+    return (f"[{words}]{mark}" if mark else words) + address
 
 
 @functools.cache

@@ -1,24 +1,29 @@
-"""Displayed formulas of other dialects: LaTeX's environments and brackets, dollars, labels.
+"""Formulas of other dialects: LaTeX's environments and brackets, dollars, labels, macros.
 
-Entry point: `normalize_formulas`.
+Entry points: `normalize_formulas`, `read_macros`.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from coursebuild.features.importer.context import formula_anchor
+from coursebuild.features.importer.source_files import value_at
 
+WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
+"""Words in a formula that hold a formula themselves."""
 _DISPLAY = re.compile(
     r"(?P<ticks>`+)(?!`)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
-    r"|\$\$(?P<tex>(?:[^$\\]|\\.)+?)\$\$"
+    rf"|\$\$(?P<tex>(?:{WORDS}|[^$\\]|\\.)+?)\$\$"
     r"(?:[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\}))?"
     r"(?:[ \t]*<br[ ]*/?>)*(?P<behind>[ \t]*(?=[^\s.,;:]|[.,;:][ \t]*\S))?",
     re.DOTALL,
 )
 """A formula between two dollar signs each, or code, in which there is none."""
 _ENVIRONMENT = re.compile(
-    r"\$\$(?>[^$]+)\$\$|^[ \t]*"
+    rf"\$\$(?>(?:{WORDS}|[^$])+)\$\$|^[ \t]*"
     r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
     r"(?>(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*)"
     r"\\end\{(?P=env)(?P=star)\})[ \t]*$",
@@ -31,23 +36,56 @@ _BRACKETS = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 """A formula between brackets, or below a line that holds nothing but a dollar sign."""
-_LABEL = re.compile(r"\\label\{([^{}]*)\}")
+_LABEL = re.compile(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
+"""A label of LaTeX, or of mdBook's preprocessor `numeq`."""
+_EMPTY = re.compile(r"[ \t]*\n?[ \t]*")
+_QUOTATION = re.compile(r"[ \t]*>[ \t>]*")
 _LEAD = re.compile(r"\n[ \t>]*\Z")
 """What stands before the mark that ends a formula, on a line of its own."""
 _WORDS_BEFORE = re.compile(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
+DEFINITION = re.compile(
+    r"\\(?:(?:re)?newcommand\*?[ ]*\{?(\\[A-Za-z]+)\}?(?:\[\d\]){0,2}|def[ ]*(\\[A-Za-z]+)(?:#\d)*)"
+    r"[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
+)
+"""A macro of LaTeX."""
+_OPERATOR = re.compile(
+    r"(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)"
+    r"|\\DeclareMathOperator(?P<star>\*?)[ ]*\{?(?P<name>\\[A-Za-z]+)\}?[ ]*\{(?P<word>[^{}]*)\}",
+    re.DOTALL,
+)
+"""An operator that is declared; or code, in which there is none."""
+_MACROS = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
+"""Where MyST and Sphinx have macros by their names."""
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 
 
 def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
+    text = define_operators(_DISPLAY.sub(_drop_empty, text))
     text = _ENVIRONMENT.sub(lambda m: f"$${m['tex']}$$" if m["tex"] else m[0], text)
     return _DISPLAY.sub(_label_formula, text)
+
+
+def define_operators(text: str) -> str:
+    r"""Write as macros what LaTeX's `\DeclareMathOperator` makes operators."""
+
+    def define(match: re.Match[str]) -> str:
+        operator = rf"\operatorname{match['star']}{{{match['word']}}}"
+        return rf"\def{match['name']}{{{operator}}}" if match["name"] else match[0]
+
+    return _OPERATOR.sub(define, text)
 
 
 def display_formula(tex: str, label: str) -> str:
     """Return a displayed formula in Markdown."""
     return f"$$\n{tex.strip()}\n$$" + (f" {{#eq:{formula_anchor(label)}}}" if label else "")
+
+
+def _drop_empty(match: re.Match[str]) -> str:
+    """Return nothing for a formula of blanks, by which a text makes room below a line."""
+    is_empty = match["tex"] is not None and _EMPTY.fullmatch(match["tex"])
+    return (match["behind"] or "") if is_empty else match[0]
 
 
 def _label_formula(match: re.Match[str]) -> str:
@@ -65,5 +103,32 @@ def _label_formula(match: re.Match[str]) -> str:
         line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]
         opening = lead[0] if _WORDS_BEFORE.match(line) else ""
         closing = lead[0] if match["behind"] is not None else ""
+        if quotation := _QUOTATION.match(line):  # whose mark the lines that go on may lack
+            tex = re.sub(r"\n(?![ \t]*>)", f"\n{quotation[0]}", tex)
     braces = f" {{#eq:{formula_anchor(label)}}}" if label else ""
     return f"{opening}$${tex}$${braces}{closing}"
+
+
+def read_macros(settings: Mapping[str, Any]) -> str:
+    """Return the definitions of the macros that settings or front matter have."""
+    header = settings.get("header-includes")
+    lines = (
+        define_operators(str(line)) for line in (header if isinstance(header, list) else [header])
+    )
+    return "".join(
+        [match[0] for line in lines for match in DEFINITION.finditer(line)]
+        + [*_named_macros(settings)]
+    )
+
+
+def _named_macros(settings: Mapping[str, Any]) -> Iterator[str]:
+    for path in _MACROS:
+        macros = value_at(settings, *path)
+        for name, value in macros.items() if isinstance(macros, dict) else ():
+            tex = value.get("macro") if isinstance(value, dict) else value
+            tex = str(tex[0] if isinstance(tex, list) and tex else tex)
+            count = max(map(int, re.findall(r"#(\d)", tex)), default=0)
+            arguments = "".join(f"#{number}" for number in range(1, count + 1))
+            definition = f"\\def\\{str(name).lstrip(chr(92))}{arguments}{{{tex}}}"
+            if DEFINITION.fullmatch(definition):
+                yield definition

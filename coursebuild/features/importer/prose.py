@@ -11,7 +11,7 @@ import textwrap
 
 from coursebuild.features.importer.anchors import FIGURE, TARGET
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
-from coursebuild.features.importer.displays import normalize_formulas
+from coursebuild.features.importer.displays import WORDS, normalize_formulas
 from coursebuild.features.importer.pandoc_tables import rewrite_tables
 from coursebuild.features.importer.roles import (
     convert_attributes,
@@ -46,8 +46,9 @@ _LINE = re.compile(
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
     rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
-    r"|(?P<math>\$\$?[^$\n]+\$\$?)"
+    rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
+    r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
     r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]\[(?P<path>[A-Za-z_]\w*(?:\.\w+)+)?\])"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
@@ -62,6 +63,8 @@ _LINE = re.compile(
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
     r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
+    r"|(?P<proof>\{\{(?P<sort>[a-z]+)\}\}(?=[{\[])(?:\{(?P<key>[^{}\n]+)\})?"
+    r"(?:\[(?P<name_of>[^\[\]\n]*)\])?)"
     r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
@@ -90,6 +93,7 @@ _MEANING = re.compile(
 _ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
 _EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
+_EMPTY_HEADING = re.compile(r"[ ]{0,3}#{1,6}[ \t]*$")
 _ENDS = {"<!--": "-->", "$$": "$$"}
 _COMMENT = re.compile(
     r"%%(?P<inner>[^%\n]+)%%|^%%[ \t]*\n(?P<lines>(?:(?!%%)[^\n]*\n)+)%%[ \t]*$"
@@ -122,8 +126,9 @@ _OVER_LINES = re.compile(
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
+    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
 )
-"""A role, a note, a citation or the address of a link that goes on in the next line."""
+"""A role, a note, a citation, the address of a link or a formula that goes on in the next line."""
 _TAG_OVER_LINES = re.compile(r"<(?i:a|img|source|video)[ \t\n](?=[^<>\n]*\n)[^<>]*>")
 _KINDS = {
     "role": ("", "Markdown"),
@@ -133,12 +138,14 @@ _KINDS = {
     "digits": ("formula", "the digits behind it are in it"),
     "math": ("formula", "without blanks at its ends"),
     "paren": ("formula", "between dollar signs"),
+    "square": ("formula", "between dollar signs"),
     "anchor": ("link", "dropped: it has no text and no address"),
     "object": ("link", "its words: what it leads to is made from code by another tool"),
     "note": ("footnote", "stands at the end of the lesson"),
     "cross": ("cross-reference", "a link"),
     "cite": ("citation", "in the words of BibTeX's keys"),
     "pair": ("pair of tags", "what it holds, without a frame"),
+    "proof": ("theorem of mdBook's `numthm`", "an anchor, its kind and its title"),
     "substitution": ("substitution", "the words that it stands for"),
     "marked": ("marked words", "a tag of HTML"),
     "change": ("suggested change", "as if it had been accepted"),
@@ -213,6 +220,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     for number, line in enumerate(text.split("\n")):
         edge = _EDGE.match(line)
         if edge is None and not mark:
+            line = _EMPTY_HEADING.sub("", line)
             line = _rewrite_line(line, context.line_below(number))
         elif mark in _ENDS:
             mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
@@ -276,6 +284,18 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
     return _LINE.sub(rewrite, line)
 
 
+_SORTS = {"prop": "proposition"}
+"""Kinds of theorems of `numthm` by their labels, where Quarto has others."""
+
+
+def _write_proof(match: re.Match[str], context: LessonContext) -> str:
+    """Return the head of a theorem; a kind that its settings add is not named, its title is."""
+    kind = {**PROOF_LABELS, **_SORTS}.get(match["sort"], "") if match["sort"] != "imp" else ""
+    title = _rewrite_line(match["name_of"] or "", context)
+    words = f"{kind.capitalize()} ({title})" if kind and title else kind.capitalize() or title
+    return (f'<a id="{to_anchor(match["key"])}"></a>' if match["key"] else "") + words
+
+
 def _move_caption(match: re.Match[str]) -> str:
     label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
     return f"Table: {match['caption']}{label}\n\n{match['table']}"
@@ -323,6 +343,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":
             return f"${match['inner'].strip()}$"
+        case "square":
+            return f"$${match['shown_tex'].strip()}$$"
         case "note":
             context.notes.append(_rewrite_line(match["remark"], context))
             return f"[^note-{len(context.notes)}]"
@@ -354,6 +376,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return f"`{whole}`"
         case "pair":
             return _rewrite_line(match["held"], context)
+        case "proof":
+            return _write_proof(match, context)
         case "substitution":
             return convert_substitution(whole, context)
         case "marked":

@@ -19,13 +19,10 @@ from msgspec import Struct
 from coursebuild.api import Edit, Source, Span, model
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.document import parse_document
+from coursebuild.features.importer.displays import DEFINITION
 from coursebuild.features.importer.prose import GONE
 from coursebuild.features.importer.source_files import title_of_file
 
-_DEFINITION = re.compile(
-    r"\\(?:(?:re)?newcommand\*?[ ]*\{?(\\[A-Za-z]+)\}?(?:\[\d\]){0,2}|def[ ]*(\\[A-Za-z]+)(?:#\d)*)"
-    r"[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
-)
 _GONE = re.compile(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
 _REFERENCE = re.compile(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
 _COMMAND = re.compile(r"\\[A-Za-z]+")
@@ -47,25 +44,24 @@ def complete_texts(
     resolve_label: Callable[[str, str], str],
     leave: Callable[[str, str, str], None],
     callouts: frozenset[str],
-    macros: Mapping[str, str],
 ) -> Iterator[str]:
     """Yield the new texts of lessons and pages, each by its link and with its title, completed.
 
     `resolve_label` gives the address of an anchor for a link in a text; empty if no text sets it.
     `leave` is told of what a page cannot hold, and is changed: the link, the kind, a message.
-    `macros` are the definitions of those that hold in all texts, by their names.
     """
     read = {
         link: _read(link, title, text, leave, callouts) for link, (title, text) in texts.items()
     }
     for link, text in read.items():
         edits = {edit.span.start: edit for edit in _edit_links(link, read, resolve_label)}
-        edits |= {edit.span.start: edit for edit in _carry_macros(text.document, macros)}
+        edits |= {edit.span.start: edit for edit in _carry_macros(text.document)}
         yield _GONE.sub("", apply_edits(text.document.source.text, edits.values())).lstrip("\n")
 
 
 _PASSES = 3
 """How often HTML is dropped: an end whose beginning was dropped is seen the next time."""
+_ANCHOR = re.compile(r'<a id="[^"<>]*">')
 _MEDIA = re.compile(
     r"<(?:(?:img|source)\b[^<>]*>(?:</img>)?"
     r"|(?P<name>video|audio)\b[^<>]*(?:/>|>(?:.*?</(?P=name)\s*>)?))",
@@ -90,6 +86,11 @@ def _read(
         spans = [
             *(part.span for html in _raw_html(document) for part in html.forbidden),
             *(d.span for d in parse.diagnostics if d.rule == "html-unbalanced"),
+            *(
+                d.span
+                for d in parse.diagnostics
+                if d.rule == "anchor-repeated" and _ANCHOR.fullmatch(d.span.text)
+            ),
         ]
         for span in spans:
             whole = _WITH_CONTENT.match(text, span.start)
@@ -211,16 +212,16 @@ def _edit_links(
                 yield Edit(Span(inline.span.source, at, at), words)
 
 
-def _carry_macros(document: model.Document, course_macros: Mapping[str, str]) -> Iterator[Edit]:
+def _carry_macros(document: model.Document) -> Iterator[Edit]:
     """Define macros anew in each formula below that uses them: here they hold in one."""
-    macros = dict(course_macros)
+    macros: dict[str, str] = {}
     for _, formula in model.find_formulas(document):
         tex, definitions = formula.tex.text, ""
-        own_macros = {match[1] or match[2]: match[0] for match in _DEFINITION.finditer(tex)}
+        own_macros = {match[1] or match[2]: match[0] for match in DEFINITION.finditer(tex)}
         for name, definition in reversed(macros.items()):
             if name not in own_macros and name in _COMMAND.findall(tex + definitions):
                 definitions = definition + definitions
-        if own_macros and not _DEFINITION.sub("", tex).strip():
+        if own_macros and not DEFINITION.sub("", tex).strip():
             text = document.source.text  # definitions alone: they stand in each formula below
             span = formula.tex.span()
             start, end = text.rfind("$", 0, span.start), text.find("$", span.end)

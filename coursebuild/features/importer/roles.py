@@ -11,7 +11,6 @@ import re
 from coursebuild.features.importer.context import (
     PROOF_LABELS,
     LessonContext,
-    formula_anchor,
     label_anchor,
     to_anchor,
 )
@@ -31,7 +30,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case "math":
             return f"${body}$"
         case "eq":
-            return write_link(words, context.resolve_anchor(f"eq:{formula_anchor(target)}"))
+            return write_link(words, context.resolve_formula(target))
         case "doc":
             return write_link(words or title_of_file(target), context.resolve_link(f"{target}.md"))
         case "ref" | "numref" | "prf:ref" | "any":
@@ -105,7 +104,7 @@ def convert_code(whole: str, context: LessonContext) -> str:
 def convert_cross_reference(whole: str, kind: str, label: str, context: LessonContext) -> str:
     """Return a reference of Quarto, as `@fig-label`, as a link."""
     if kind == "eq":
-        return write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
+        return write_link("", context.resolve_formula(label))
     words = {"sec": "section", "fig": "figure", "tbl": "table", "lst": "listing", **PROOF_LABELS}
     name = to_anchor(label)
     numbered = context.resolve_anchor(f"{kind.replace('tbl', 'tab')}:{name}")
@@ -123,6 +122,11 @@ _FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split
 def convert_substitution(whole: str, context: LessonContext) -> str:
     """Return what stands for a name between braces; or the whole as code, which is left."""
     title = re.search(r"(?:title|caption)=\"([^\"]*)\"", whole)
+    if number := re.fullmatch(r"\{\{(?:eq|t)?ref:[ ]*([^{}\s]+)[ ]*\}\}", whole):
+        if address := context.resolve_formula(number[1]):
+            return write_link("", address)
+        if address := context.resolve_anchor(to_anchor(number[1])):
+            return write_link(title_of_file(number[1].rpartition(":")[2]), address)
     name, *arguments = whole.strip("{}<> %").split() or [""]
     address = "".join(arguments[:1])
     if name in ("tab", "code") and title:
@@ -147,9 +151,12 @@ def convert_wiki_link(whole: str, page: str, part: str, words: str, context: Les
     if whole[0] == "!" and (address := page and context.resolve_picture(page)):
         size = re.fullmatch(r"\s*\d+(?:x\d+)?\s*", words)
         return f"![{title_of_file(page) if size or not words else words}]({address})"
-    if page and context.resolve_path(f"{page}.md") not in context.files:
+    # In a wiki of GitHub, the blanks of a title are hyphens of its file
+    paths = (f"{name}.md" for name in (page, page.replace(" ", "-")))
+    path = next((path for path in paths if context.resolve_path(path) in context.files), "")
+    if page and not path:
         return whole
-    address = context.resolve_link(f"{page}.md{part}" if page else part)
+    address = context.resolve_link(f"{path}{part}" if page else part)
     return write_link(words or page or part.lstrip("#"), address)
 
 

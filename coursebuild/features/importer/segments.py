@@ -18,6 +18,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import UsageError
+from coursebuild.features.importer.displays import read_macros
 from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
 _MARK = re.compile(r" {0,3}(:{3,}|/{3,})[ \t]*(.*?)[ \t]*\n?")
@@ -53,6 +54,8 @@ _NEEDLESS = (
     "myst",
     "substitutions",
     "colab",
+    "header-includes",
+    "math",
 )
 """Further keys of which nothing is lost."""
 
@@ -69,6 +72,8 @@ class ReadText(Struct, frozen=True):
     """What its front matter, or a notebook's metadata, hold that has no counterpart, by key."""
     substitutions: Mapping[str, str]
     """What names between braces stand for in it."""
+    macros: str
+    """The definitions of its macros."""
 
 
 def read_segments(text: str, name: str) -> ReadText:
@@ -130,6 +135,7 @@ def read_segments(text: str, name: str) -> ReadText:
             if value and key not in (*_NEEDLESS, *summaries)
         },
         {str(key): str(v) for key, v in words.items() if isinstance(v, str | int | float)},
+        read_macros(metadata),
     )
 
 

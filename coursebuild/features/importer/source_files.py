@@ -79,6 +79,8 @@ class ImportedText(Struct, frozen=True, kw_only=True):
     """Pictures that its file contains, by name."""
     substitutions: Mapping[str, str] = {}
     """What names between braces stand for in it, as its metadata say."""
+    macros: str = ""
+    """The definitions of macros in its metadata."""
 
     @property
     def link(self) -> str:
@@ -108,8 +110,8 @@ class ImportedCourse(Struct, frozen=True, kw_only=True):
     """Whether the title that a text has itself goes before that of the map, which is short."""
     substitutions: Mapping[str, str] = {}
     """What names between braces stand for in its texts."""
-    macros: Mapping[str, str] = {}
-    """Definitions of the macros that all its formulas have, by their names."""
+    macros: str = ""
+    """The definitions of macros in its settings."""
     has_hidden_lines: bool = False
     """Whether lines of Rust that begin with `# ` are hidden from readers."""
     camera_is_position: bool = False

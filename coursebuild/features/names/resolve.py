@@ -37,7 +37,7 @@ _MANUAL_ID = "coursebuild-manual"
 """The id of the manual, in docs/content/course.toml."""
 _ROOTS = {"model": "MjModel", "data": "MjData", "opt": "MjOption", "spec": "MjSpec"}
 """The classes of variables by their usual names, for links."""
-_FUNCTION = re.compile(r"mj[ud]?_[A-Za-z]\w*(?<!_)")
+_FUNCTION = re.compile(r"mj[ud]?_[A-Za-z][A-Za-z0-9]*")
 """How the names of functions begin that only MuJoCo has."""
 _BRACKETS = re.compile(r"[()\[\]]+")
 _resolvers: list[Resolver] = []

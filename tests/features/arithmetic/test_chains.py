@@ -157,6 +157,7 @@ def test_what_is_too_large_or_no_whole_number_is_not_understood() -> None:
 
 
 def test_what_can_be_meant_otherwise_is_not_judged() -> None:
+    base_units = "the number without a unit may be in base units"
     reasons = {
         "(123) = (13)(12)": "two numbers stand side by side",
         "(1)(23) = (12)(3)": "two numbers stand side by side",
@@ -165,6 +166,8 @@ def test_what_can_be_meant_otherwise_is_not_judged() -> None:
         r"T = 1/50\,\mathrm{Hz} = 20\,\mathrm{ms}": "its unit may be that of another part",
         r"2\cdot45 = 90^\circ": "its unit may be that of another part",
         r"\tfrac34\cdot100 = 75\,\%": "its unit may be that of another part",
+        r"2\cdot3000 = 6\,\mathrm{km/s}": base_units,
+        r"1/(4\cdot10^{-4}) \approx 2.5\,\mathrm{kHz}": base_units,
         r"1.6\mathrm e{-19} = 1.6\times10^{-19}": "it may be a power of ten",
     }
     for tex, reason in reasons.items():
@@ -173,7 +176,12 @@ def test_what_can_be_meant_otherwise_is_not_judged() -> None:
     for tex in ("3950/988 = 4", r"\frac{7}{2} = 3", "1 + 0 = 0", r"2\cdot(13) = 36", "0.5 = 0.6"):
         (comparison,) = check_arithmetic(tex)
         assert comparison.kind == "wrong", tex
-    for tex in (r"1/50\,\mathrm{Hz} = 30\,\mathrm{ms}", r"0.35 = 0.35\,\%", r"\pi/2 = 1.57^\circ"):
+    for tex in (
+        r"1/50\,\mathrm{Hz} = 30\,\mathrm{ms}",
+        r"0.35 = 0.35\,\%",
+        r"\pi/2 = 1.57^\circ",
+        r"2\cdot3000 = 7\,\mathrm{km/s}",
+    ):
         (comparison,) = check_arithmetic(tex)
         assert comparison.kind == "wrong", tex
 

@@ -128,6 +128,39 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
             "Between `$` or `$$`:\n\n$$\na = 0\n$$\n\nand `$$`.\n",
         ),
         ("$$\n\\text{In}\\text{: }x \\\\\ny\n$$\n", "$$\n\\text{In}\\text{: }x \\\\\ny\n$$\n"),
+        (
+            "$$ $$\\begin{align}\na &= b\n\\end{align}\n$$ $$\n\nText. $$ $$\n",
+            "$$\\begin{align}\na &= b\n\\end{align}$$\n\n\nText. \n",
+        ),
+        (
+            "$$\n\\begin{aligned}\na &= \\text{for $i \\ne j$}\n\\end{aligned}\n$$\n",
+            "$$\n\\begin{aligned}\na &= \\text{for $i \\ne j$}\n\\end{aligned}\n$$\n",
+        ),
+        (
+            "So $a \\text{ for $i$}$, $\\DeclareMathOperator*{\\am}{arg\\,max}\\am_x$.\n",
+            "So $a \\text{ for $i$}$, $\\def\\am{\\operatorname*{arg\\,max}}\\am_x$.\n",
+        ),
+        ("> So\n> $$\na = b\n$$\n>\n> and on.\n", "> So\n> $$\n> a = b\n> $$\n>\n> and on.\n"),
+        ("So \\\\(a =\nb\\\\) and \\\\[c = d\\\\] here.\n", "So $a = b$\n and $$c = d$$ here.\n"),
+        (
+            "$$\n{{numeq}}{eq:a_b}\na = b\n$$\n\n**{{thm}}{thm:c}[Of $c$]** As {{eqref: eq:a_b}}\n"
+            "and {{ref: thm:c}} say.\n",
+            '$$\na = b\n$$ {#eq:a-b}\n\n**<a id="thm-c"></a>Theorem (Of $c$)** As [](#eq:a-b)\n'
+            "and [C](#thm-c) say.\n",
+        ),
+        ("$$\na = b\n$$ (eq:c)\n\nBy [](eq:c).\n", "$$\na = b\n$$ {#eq:c}\n\nBy [](#eq:c).\n"),
+        (
+            "(a)=\n```{prf:Theorem} Of a\n:label: a\n\nText.\n```\n",
+            '<a id="a"></a>\n\n\n\n> [!theorem] Of a\n> Text.\n',
+        ),
+        ("Text.\n\n#\n\nOn.\n", "Text.\n\n\n\nOn.\n"),
+        (
+            ":::{glossary}\n[A](https://example.org/a)\n: One,\non.\n: Also 1.\n\nB\nC\n\n"
+            ": Two.[^n]\n\n[^n]: Or so.\n\nA\n: Three.\n:::\n",
+            "[A]{term} (<https://example.org/a>): One, on. Also 1.\n\n"
+            "[B]{term}, [C]{term}: Two.[^n]\n\n[^n]: Or so.\n\nA: Three.\n",
+        ),
+        (":::{show-index}\n:::\n\nText.\n", "Text.\n"),
     ],
     ids=[
         "script",
@@ -149,6 +182,17 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         "formula behind a text",
         "dollars in code",
         "lines of a formula",
+        "empty formula",
+        "formula in words of a formula",
+        "declared operator",
+        "lazy lines of a formula",
+        "brackets over lines",
+        "numbers of mdBook",
+        "label with the kind of a formula",
+        "label before a directive",
+        "empty heading",
+        "glossary with colons",
+        "index",
     ],
 )
 def test_a_text_of_another_tool_keeps_all_that_readers_see(
@@ -285,3 +329,37 @@ def test_a_picture_whose_tag_goes_over_lines_is_taken_along(tmp_path: Path) -> N
     assert course.files["content/files/p.png"] == b""
     lesson = course.files["content/lessons/1.1-one.md"].decode()
     assert '<img src="../files/p.png"\n    alt="A box">' in lesson
+
+
+def test_macros_of_settings_hold_in_the_formulas_that_use_them(tmp_path: Path) -> None:
+    book = {
+        "index.Rmd": "---\nheader-includes:\n- \\usepackage{a}\n- \\def\\bx{\\mathbf x}\n---\n\n"
+        "# One\n\n$\\bx$.\n",
+        "two.Rmd": "# Two\n\nSo $y = \\bx$ and $z$.\n",
+    }
+    course = convert_files(tmp_path / "book", book)
+    assert course.files["content/lessons/1.1-two.md"].decode() == (
+        "So $\\def\\bx{\\mathbf x}y = \\bx$ and $z$.\n"
+    )
+    myst = {
+        "myst.yml": "project:\n  math:\n    '\\of': '#1(#2)'\n    '\\R': '\\mathbb{R}'\n",
+        "one.md": "---\nmath:\n  '\\R': {macro: 'R'}\n---\n\n# One\n\n$\\of{f}{x} \\in \\R$\n",
+        "two.md": "# Two\n\nThe set $\\R$.\n",
+    }
+    course = convert_files(tmp_path / "myst", myst)
+    one, two = (course.files[f"content/lessons/1.{n}.md"].decode() for n in ("1-one", "2-two"))
+    assert one == "$\\def\\of#1#2{#1(#2)}\\def\\R{R}\\of{f}{x} \\in \\R$\n"
+    assert two == "The set $\\def\\R{\\mathbb{R}}\\R$.\n"
+
+
+def test_links_of_a_wiki_lead_to_the_pages_of_their_titles(tmp_path: Path) -> None:
+    texts = {"Home.md": "See [[The first page]] and [[none]].\n", "The-first-page.md": "Text.\n"}
+    course = convert_files(tmp_path, texts)
+    lesson = course.files["content/lessons/1.1-home.md"].decode()
+    assert lesson == "See [The first page](lesson:1.2) and [[none]].\n"
+
+
+def test_a_text_of_headings_alone_is_a_draft(tmp_path: Path) -> None:
+    course = convert_files(tmp_path, {"one.md": "# One\n\nText.\n", "two.md": "# Two\n\n## Aims\n"})
+    lessons = tomllib.loads(course.files["content/course.toml"].decode())["level"][0]["lesson"]
+    assert [lesson["status"] for lesson in lessons] == ["complete", "draft"]
