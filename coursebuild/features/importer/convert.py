@@ -318,7 +318,10 @@ def _convert_texts(
     for text in texts:
         macros = f"{book_macros}{text.macros}"
         try:
-            head = f"$${macros}$$\n\n" if macros else ""
+            head = ""
+            if macros:
+                head = f"$${macros}$$\n\n"
+                files.account.changed["macros", "defined in the formulas that use them"] += 1
             new[text.link] = text.title, head + _convert_text(text, context)
         except RecursionError:
             raise UsageError(f"{text.file} is nested too deeply") from None

@@ -151,7 +151,7 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
         ("$$\na = b\n$$ (eq:c)\n\nBy [](eq:c).\n", "$$\na = b\n$$ {#eq:c}\n\nBy [](#eq:c).\n"),
         (
             "(a)=\n```{prf:Theorem} Of a\n:label: a\n\nText.\n```\n",
-            '<a id="a"></a>\n\n\n\n> [!theorem] Of a\n> Text.\n',
+            '<a id="a"></a>\n\n> [!theorem] Of a {#theorem:a}\n> Text.\n',
         ),
         ("Text.\n\n#\n\nOn.\n", "Text.\n\n\n\nOn.\n"),
         (

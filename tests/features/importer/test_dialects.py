@@ -100,8 +100,8 @@ def test_macros_of_a_book_are_defined_where_formulas_use_them(tmp_path: Path) ->
         "# One\n\n$\\vv = \\dd{x}{t}$, $x$\n",
         **{"_config.yml": json.dumps(config)},
     )
-    dd = r"\newcommand{\dd}[2]{\frac{d #1}{d #2}}"
-    assert new == rf"$\newcommand{{\vv}}{{\mathbf{{v}}}}{dd}\vv = \dd{{x}}{{t}}$, $x$" + "\n"
+    definitions = r"\def\vv{\mathbf{v}}\def\dd#1#2{\frac{d #1}{d #2}}"
+    assert new == rf"${definitions}\vv = \dd{{x}}{{t}}$, $x$" + "\n"
 
 
 def test_a_picture_between_tags_of_a_figure_has_its_caption(tmp_path: Path) -> None:
