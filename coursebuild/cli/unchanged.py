@@ -23,7 +23,13 @@ import time
 from collections.abc import Iterator
 
 from coursebuild.core.files import trust
-from coursebuild.core.files.course_root import DECISIVE, FOLDERS, find_course_root, is_dropping
+from coursebuild.core.files.course_root import (
+    DECISIVE,
+    FOLDERS,
+    find_course_root,
+    is_dropping,
+    read_regular,
+)
 from coursebuild.output import terminal_style
 
 _NO_CACHE = "--no-cache"
@@ -147,8 +153,8 @@ def unchanged(root: str, command: tuple[str, ...]) -> str | None:
         store, reason = trust.find_store(root)
         if reason and reason != trust.FOREIGN:
             return None
-        with open(os.path.join(store, name), "rb") as file:
-            body = trust.unseal(name, file.read(), trust.store_key(root)) or b""
+        sealed = read_regular(os.path.join(store, name))
+        body = trust.unseal(name, sealed, trust.store_key(root)) or b""
         head, _, message = body.decode("utf-8", "surrogateescape").partition("\n\n")
         header, *lines = head.split("\n")
         if header != _HEADER:

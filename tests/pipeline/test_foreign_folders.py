@@ -233,6 +233,25 @@ def test_folder_that_is_opened_in_an_editor_runs_nothing_until_it_is_saved(
 
 
 @pytest.mark.site
+def test_pipes_and_holes_in_ones_own_store_are_not_read(make: Make) -> None:
+    """As an archive may hold them, with the mark of a store that its user once gave away."""
+    course = make(GOOD)
+    assert course.main("check").status == 0
+    for spoil in (os.mkfifo, make_holes):
+        for folder, _, names in os.walk(course.root / ".coursebuild"):
+            for path in (Path(folder, name) for name in names if name != "owner"):
+                path.unlink()
+                spoil(path)
+        assert course.main("check").status == 0
+
+
+def make_holes(path: Path) -> None:
+    """Make a file that is larger than all memory, and takes no room."""
+    with path.open("wb") as file:
+        file.truncate(1 << 40)
+
+
+@pytest.mark.site
 def test_published_site_is_the_one_of_a_course_without_a_store(make: Make, home: Path) -> None:
     """Not one byte of what another machine has made is published."""
     foreign, root = make(GOOD), home / "course"

@@ -28,6 +28,7 @@ from markupsafe import Markup
 
 from coursebuild.core.engine.shared_place import SharedPlace, in_words
 from coursebuild.core.files import trust
+from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import reason
 from coursebuild.core.values import DAMAGE
 
@@ -132,9 +133,8 @@ class Store:
         name = f"{kind}/{key}"
         path = f"{self.folder}/{name}"
         try:
-            with open(path, "rb", buffering=0) as file:  # noqa: PTH123 - there are many
-                modified = os.fstat(file.fileno()).st_mtime
-                entry = file.read()
+            entry = read_regular(path)
+            modified = os.stat(path).st_mtime  # noqa: PTH116 - there are many
         except OSError:
             return None
         value = _value(trust.unseal(name, entry, self._key), read)
