@@ -100,9 +100,9 @@ for tau in (10, 4, 3):
     assert folder.main("update").status == 0
     folder.replace(folder.lesson(), "step = 2", "step = 5")
     assert folder.main("update").status == 0
-    found, lines = "It is `20`{out} um.", folder.text(folder.lesson()).split("\n")
-    assert found in lines
-    explain = folder.main("explain", f"{folder.lesson()}:{lines.index(found) + 1}")
+    sentence, lines = "It is `20`{out} um.", folder.text(folder.lesson()).split("\n")
+    assert sentence in lines
+    explain = folder.main("explain", f"{folder.lesson()}:{lines.index(sentence) + 1}")
     line = "`tau # ms # um`, where it begins with 4 below `depths at a timestep of # ms:`"
     assert f"number 2 of {line}" in explain.out
 

@@ -428,23 +428,18 @@ class Course(Struct, frozen=True):
 
     @property
     def documents(self) -> tuple[Document, ...]:
-        """Every parsed document: lessons, then pages."""
         return tuple(document for _, document in self.owned_documents)
 
     @property
     def shown_texts(self) -> tuple[tuple[str, Document], ...]:
         """Every text that shows what scripts print, with the id of its lesson or page."""
         texts = [(owner.id, document) for owner, document in self.owned_documents]
-        if self.bound_numbers:
-            numbers = tuple(replace(n, comma=self._has_comma(n)) for n in self.bound_numbers)
+        if numbers := self.bound_numbers:
+            groups = [[o for o in self.owners if o.span.contains(n.span)] for n in numbers]
+            commas = ["," in self.words_of(next(iter(g), None)).decimal for g in groups]
+            numbers = tuple(map(lambda n, c: replace(n, comma=c), numbers, commas))
             texts.append(("", Document(self.map, (Paragraph(self.map.span(), numbers),), ())))
         return tuple(texts)
-
-    def _has_comma(self, number: NumberBinding) -> bool:
-        """Whether a number of the map has the decimal comma: what is said of a lesson has its."""
-        at = number.span.start
-        owner = next((o for o in self.owners if o.span.start <= at < o.span.end), None)
-        return "," in self.words_of(owner).decimal
 
     @property
     def sources(self) -> tuple[Source, ...]:

@@ -307,7 +307,7 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     outputs = bound.groups[-1]
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
     with_point = BoundText.of(pointed)
-    joined = join_thousands(binding.text)
+    thousands = join_thousands(binding.text)
     bare, stray, label = bound_text.bare, bound_text.stray, ""
     message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"
     if not bound_text.numbers:
@@ -323,9 +323,9 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     elif pointed != binding.text and with_point.numbers and with_point.is_in(outputs):
         message = f"`{binding.text}` has a comma where outputs have a decimal point"
         help = Fix(f"write `{pointed}`", pointed)
-    elif joined != binding.text and BoundText.of(joined, binding.comma).is_in(outputs):
+    elif thousands != binding.text and BoundText.of(thousands, binding.comma).is_in(outputs):
         message = f"`{binding.text}` has a space that may part two numbers"
-        help = Fix("write a no-break space between its digits", joined)
+        help = Fix("write a no-break space between its digits", thousands)
     else:
         label, help = _nearest(bound_text, outputs), ""
     return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)

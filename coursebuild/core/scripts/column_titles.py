@@ -116,21 +116,21 @@ def misnamed_columns(
     """
     columns: list[int] = []
     for column, place in places.items():
-        title, shown = titles[column], numbers[place]
-        named = [
+        title, own_names = titles[column], numbers[place]
+        candidates = [
             at
             for at, number in enumerate(numbers)
-            if (shown.above and title.is_printed_as(number.above))
-            or (title.words <= _words(number.label) and _has_unit_alone(title, number, shown))
+            if (own_names.above and title.is_printed_as(number.above))
+            or (title.words <= _words(number.label) and _has_unit_alone(title, number, own_names))
         ]
-        is_told = len(named) == 1 and named[0] not in places.values()
-        if is_told and title.words and not title.words & _words(shown.label):
+        is_told = len(candidates) == 1 and candidates[0] not in places.values()
+        if is_told and title.words and not title.words & _words(own_names.label):
             columns.append(column)
     return columns
 
 
-def _has_unit_alone(title: ColumnTitle, number: PrintedNames, shown: PrintedNames) -> bool:
-    return is_same_unit(title.unit, number.unit) and not is_same_unit(title.unit, shown.unit)
+def _has_unit_alone(title: ColumnTitle, number: PrintedNames, sibling: PrintedNames) -> bool:
+    return is_same_unit(title.unit, number.unit) and not is_same_unit(title.unit, sibling.unit)
 
 
 def _returns(target: Mapping[int, int], start: int) -> bool:

@@ -38,8 +38,8 @@ from coursebuild.core.scripts.lines import (
     same_number,
 )
 from coursebuild.core.scripts.module_code import DEFINITIONS, first_line
-from coursebuild.core.scripts.table_cells import table_rows
-from coursebuild.core.scripts.tables import RowAddresses, TableMatcher, number_text
+from coursebuild.core.scripts.table_cells import number_text, table_rows
+from coursebuild.core.scripts.tables import RowAddresses, TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import point_decimals, write_comma
 from coursebuild.core.text.source import Excerpt, Source, Span

@@ -329,9 +329,9 @@ class PrintedText:
         return words or (self._words_among(rivals, place) if rivals else "")
 
     def _words_among(self, places: Iterable[PrintedPlace], place: PrintedPlace) -> str:
-        own = self, place.at, place.first
+        address = self, place.at, place.first
         rivals = [(p.output, p.at, p.first) for p in places]
-        contexts = [c for o, *at in rivals if (o, *at) != own for c in o._contexts(*at)]
+        contexts = [c for o, *at in rivals if (o, *at) != address for c in o._contexts(*at)]
         in_heading = len(_split(self.heading(place.at)))
         choices: list[tuple[bool, bool, int, str]] = []
         for context in self._contexts(place.at, place.first):
@@ -350,8 +350,8 @@ class PrintedText:
                         break
                     if not any(_ends_with(rival, sought) for rival in contexts):
                         is_result = words is row_words  # a number may be another tomorrow
-                        chosen = " ".join(words[start:])
-                        choices.append((is_result, "#" in chosen, len(words) - start, chosen))
+                        text = " ".join(words[start:])
+                        choices.append((is_result, "#" in text, len(words) - start, text))
                         break
         return min(choices, key=lambda choice: choice[:3])[3] if choices else ""
 
@@ -382,8 +382,8 @@ def masked(text: str) -> str:
 def describe_line(address: Address) -> str:
     """The printed line of an address in words, with the numbers that name it."""
     numbers = iter(address.name.split())
-    outer, slash, own = address.heading.rpartition(" / ")
-    heading = outer + slash + re.sub("#", lambda match: next(numbers, match[0]), own)
+    outer, slash, heading = address.heading.rpartition(" / ")
+    heading = outer + slash + re.sub("#", lambda match: next(numbers, match[0]), heading)
     first = " ".join(numbers)
     begins = f", where it begins with {first}" if first else ""
     line = _PER_UNIT.sub("1", address.line)

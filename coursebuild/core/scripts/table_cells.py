@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 from msgspec import Struct
 
@@ -15,12 +16,32 @@ from coursebuild.core.scripts.lines import (
     apply_filters,
     canonicalize,
     numbers_fit,
+    same_number,
 )
-from coursebuild.core.text.numbers import Number, point_decimals
+from coursebuild.core.text.numbers import Number, only_number, point_decimals, round_like
 from coursebuild.core.text.source import Span
 
 _RUN = re.compile(r"\s{2,}|[^\S ]")
 _ENDS = re.compile(r"\A\s+|\s+\Z")
+
+
+class LineLayout(NamedTuple):
+    """What is left of a line without the cells of a row."""
+
+    heading: str
+    parts: tuple[str, ...]
+    """Before, between and after the cells."""
+    columns: tuple[int, ...]
+
+
+class Fit(NamedTuple):
+    """A way to find a row in a line: where its cells begin there."""
+
+    line: int
+    places: tuple[int, ...]
+    layout: LineLayout
+    is_right: bool
+    """Whether its numbers match, too."""
 
 
 class RowCell(Struct, frozen=True):
@@ -106,6 +127,21 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
     mapped = apply_filters(MappedText.join(stretches), filters)
     folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
     return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)
+
+
+def cell_matches(recorded: Number, printed: Number, comparison: model.Comparison) -> bool:
+    """Whether a number in a cell is the printed one: also a `2` for `2.0`."""
+    is_exact = comparison.mode is model.Mode.EXACT or recorded.is_padded or printed.is_padded
+    is_equal = not is_exact and recorded.value == printed.value
+    return is_equal or same_number(recorded, printed, comparison)
+
+
+def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
+    """A printed number as it replaces a recorded one."""
+    has_more = new.place < old.place or only_number(old.text) is None  # `3.9 × 10⁻¹¹`
+    if comparison.mode is model.Mode.DIGITS and old.is_inexact and has_more:
+        return round_like(old, new.value) or new.text
+    return new.text
 
 
 def _is_word(character: str) -> bool:

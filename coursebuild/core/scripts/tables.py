@@ -18,7 +18,6 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache, partial
 from itertools import islice
-from typing import NamedTuple
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -40,17 +39,20 @@ from coursebuild.core.scripts.lines import (
     always_match,
     canonicalize,
     plain_text,
-    same_number,
 )
 from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import (
+    Fit,
+    LineLayout,
     RowCell,
+    cell_matches,
     elides_rows,
     find_rows,
+    number_text,
     row_text,
     table_rows,
 )
-from coursebuild.core.text.numbers import Number, only_number, relative_error, round_like
+from coursebuild.core.text.numbers import Number, relative_error
 from coursebuild.core.text.quantities import NO_UNIT, UnitText, are_different
 from coursebuild.core.text.source import Span
 
@@ -59,25 +61,6 @@ _PLACES = 200
 """The most ways to find a row in a line that are looked at."""
 RowAddresses = tuple[tuple[Address, ...], ...]
 """For each row of a table the addresses of its numbers; none where they are not known."""
-
-
-class LineLayout(NamedTuple):
-    """What is left of a line without the cells of a row."""
-
-    heading: str
-    parts: tuple[str, ...]
-    """Before, between and after the cells."""
-    columns: tuple[int, ...]
-
-
-class Fit(NamedTuple):
-    """A way to find a row in a line: where its cells begin there."""
-
-    line: int
-    places: tuple[int, ...]
-    layout: LineLayout
-    is_right: bool
-    """Whether its numbers match, too."""
 
 
 class RowMatch(Struct, frozen=True):
@@ -121,7 +104,7 @@ def compare_table(
             first, last = row.row[0].cell.span, row.row[-1].cell.span
             changes.append(Change(DriftKind.MISSING, first.to(last), row_text(row.row), ""))
         for cell, old, new in row.pairs:
-            if not _is_same(old, new, comparison):
+            if not cell_matches(old, new, comparison):
                 span = cell.span(old)
                 changes.append(number_change(span, span.text, new.text, (old, new)))
     changes += [] if changes else matcher.header_changes(match)
@@ -162,7 +145,7 @@ class TableMatcher:
         self.rows = table_rows(table, comparison.filters)
         self.titles = [ColumnTitle.of(cell) for cell in table.header]
         self._addresses = addresses if len(addresses) == len(self.rows) else [()] * len(self.rows)
-        self._numbers_match = partial(_is_same, comparison=comparison)
+        self._numbers_match = partial(cell_matches, comparison=comparison)
         printed_lines = Side.of(stdout, comparison.filters).lines
         self.lines = list(map(plain_text, printed_lines))
         self.text = PrintedText(map(PrintedLine, self.lines))
@@ -437,26 +420,11 @@ class TableMatcher:
         return units
 
 
-def _is_same(recorded: Number, printed: Number, comparison: model.Comparison) -> bool:
-    """Whether a number in a cell is the printed one: also a `2` for `2.0`."""
-    is_exact = comparison.mode is model.Mode.EXACT or recorded.is_padded or printed.is_padded
-    is_equal = not is_exact and recorded.value == printed.value
-    return is_equal or same_number(recorded, printed, comparison)
-
-
-def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
-    """A printed number as it replaces a recorded one."""
-    has_more = new.place < old.place or only_number(old.text) is None  # `3.9 × 10⁻¹¹`
-    if comparison.mode is model.Mode.DIGITS and old.is_inexact and has_more:
-        return round_like(old, new.value) or new.text
-    return new.text
-
-
 def updated_row(match: RowMatch, comparison: model.Comparison) -> tuple[RowCell, ...]:
     """A row with the numbers that are printed now."""
     places: dict[int, list[tuple[int, int, str]]] = {cell.column: [] for cell in match.row}
     for cell, old, new in match.pairs:
-        if not _is_same(old, new, comparison):
+        if not cell_matches(old, new, comparison):
             text = number_text(old, new, comparison)
             places[cell.column].append((old.start, old.end, text))
     return tuple(

@@ -45,6 +45,8 @@ _SPREAD = re.compile(rf"[ \t]?(?:±|\+/?-|–|\.\.+|to)[ \t]*{_NUMBER}(?=[ \t)\]
 
 Not so `0.5 ± 0.8 %`, which may be relative.
 """
+_SPREAD_BEFORE = re.compile(rf"[=:)\]\s]\s*{_NUMBER}[ \t]?(?:±|\+/?-)[ \t]*\Z")
+"""What stands between the label of a number and its uncertainty: `v (m/s): 83.4 ± `."""
 _REST_OF_LIST = re.compile(rf"(?:[,; \t]++{_NUMBER})*[ \t]*[)\]]")
 _BEGIN_OF_LIST = frozenset("([ \t,;+-−.eE0123456789")
 """What may stand in a list before a number of it."""
@@ -149,7 +151,10 @@ def printed_unit(line: str, start: int, end: int) -> UnitText:
     bracket = max(line.rfind(sign, 0, start) for sign in "([")
     if rest_of_list is not None and bracket >= 0 and {*line[bracket:start]} <= _BEGIN_OF_LIST:
         end = rest_of_list.end()  # `(83.4, 85.0) m`
-    return unit_behind(line, end, has_names=line[:1].isalpha()) or unit_of_label(line[:start])
+    unit = unit_behind(line, end, has_names=line[:1].isalpha())
+    label = line[max(0, start - _REACH) : start]
+    spread = _SPREAD_BEFORE.search(label)
+    return unit or unit_of_label(line[:start] if spread is None else label[: spread.start() + 1])
 
 
 def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
