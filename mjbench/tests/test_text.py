@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from msgspec.structs import replace
 
 from mjbench.derive import derive_case, derive_charts, derive_scenario
@@ -111,7 +113,7 @@ def test_the_diet_names_what_shows_a_saving_and_folds_what_saves_little() -> Non
 
 def test_an_engine_has_what_a_step_costs_by_number_of_worlds() -> None:
     costs = (BatchCost(1, Interval(2e-6, 2e-6, 2e-6)), BatchCost(64, remark="no memory"))
-    lost = {"position": None, "attitude": None, "velocity": None}
+    lost: dict[str, Any] = {"position": None, "attitude": None, "velocity": None}
     engine = EngineRow(
         **lost, engine="mjx", title="MJX", versions=(), status="ok", bits=32, costs=costs
     )
