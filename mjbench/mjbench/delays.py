@@ -53,5 +53,6 @@ def loop_note(model: Any, pilot: Pilot, reference: EngineStates) -> str:
         )
     return (
         f"with {Path(loop.path).name} every {loop.period:.3g} s it stays bounded {bounds[0]}, and "
-        f"near the motion of small steps {bounds[1]}, at the scene's own setting"
+        f"near the motion of small steps {bounds[1]}, at the scene's own setting, for the "
+        f"{scene.scenario.duration:.3g} s of the scenario: what grows slowly takes longer to show"
     )

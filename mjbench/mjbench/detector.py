@@ -247,8 +247,8 @@ class Passages:
             names = pair_names(self.model, pair)
             sentences.setdefault(pair, f"{names} stay inside each other at the end")
         texts = [text for pair, text in sentences.items() if pair not in self.setup.passing]
-        more = "another pair" if len(texts) == 2 else f"{len(texts) - 1} more pairs"
-        return (texts[0], f"and {more}") if texts[1:] else tuple(texts)
+        rest = "another pair" if len(texts) == 2 else f"{len(texts) - 1} more pairs"
+        return (texts[0], f"and {rest}") if texts[1:] else tuple(texts)
 
 
 _DIPPING = 0.25

@@ -38,7 +38,6 @@ from mjbench.reports.scene_report import (
     WorkPrecisionRow,
 )
 from mjbench.reports.shown_errors import (
-    COST_SLACK,
     ERROR_SLACK,
     FrontPoint,
     Quantity,
@@ -226,12 +225,9 @@ def _gain_text(starts: Sequence[Mapping[Column, float]], figure: str) -> str:
 def _price(row: WorkPrecisionRow) -> str:
     """What a setting costs beside the scene's own, as far as timing can tell."""
     cost = row.cost
-    share = "1" if cost is None else number_text(cost.value)
-    if cost is None or cost.low <= 1 <= cost.high or share == "1":
+    if cost is None or cost.low <= 1 <= cost.high or abs(cost.value - 1) < 0.05:  # two digits: 1
         return "takes about as long"
-    if abs(cost.value - 1) <= COST_SLACK:
-        return "takes about as long"
-    return f"takes {share} of the time" if cost.value < 1 else f"takes {share} times as long"
+    return f"takes {number_text(cost.value)} {'of the time' if cost.value < 1 else 'times as long'}"
 
 
 def _is_cheap(row: WorkPrecisionRow) -> bool:
@@ -369,17 +365,14 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
         missing.insert(0, "the scene's own setting was not measured")
         return (f"not known: {'; '.join(missing)}",)
     quantity = quantity_of(report)
-    speed = f"{setting_text(row.setting)}: "
-    speed += (
-        "not timed" if row.realtime is None else f"{rounded_text(row.realtime, 3)} times real time"
-    )
+    pace = None if row.realtime is None else f"{rounded_text(row.realtime, 3)} times real time"
+    speed = f"{setting_text(row.setting)}: {pace or 'not timed'}"
     if report.overlaps:
         speed += f"; it begins with one inside the other: {report.overlaps}"
     error = "its error is not known" if row.parted is None else ""  # chaos is told by the verdict
-    value = quantity.value_of(row)
     if row.status != "ok":
         error = "it is lost"
-    elif value == 0:
+    elif (value := quantity.value_of(row)) == 0:
         error = "it makes no error"
     elif value is not None:
         is_known = value > quantity.least * (1 + 1e-9)
@@ -387,8 +380,8 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
         error += f" in {quantity.label}"
         if quantity.name == "step_error" and row.seen is not None and row.seen > value:
             error += f", and by {rounded_text(row.seen, 2)} with the model of contacts"
+        error += parts_text(report.parts)
     better, *_ = report.verdict.text.split("; the scene's own error")
-    error += parts_text(report.parts) if value else ""
     lines = [speed, error, better, stability_text(report)]
     if report.horizon < report.duration * (1 - 1e-9):
         missing.append(f"the motion beyond {seconds_text(report.horizon, 3)}")

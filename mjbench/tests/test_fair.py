@@ -61,11 +61,13 @@ def test_what_would_not_move_gets_velocities_and_what_cannot_has_no_scenario() -
         (scenario,) = fair_declarations(model, "arm.xml", quick=True).scenarios
         assert scenario.title is not None and "random velocities" in scenario.title
         assert scenario.qvel and scenario.qvel[0] != 0
-    held = mujoco.MjModel.from_xml_string(weightless.replace("</mujoco>", f"{MOTORS}</mujoco>"))
+    still_arm = mujoco.MjModel.from_xml_string(
+        weightless.replace("</mujoco>", f"{MOTORS}</mujoco>")
+    )
     for command, is_moving in ((0.0, False), (1.0, True)):
         code = compile(f"def control(m, d): return [{command}, 0]", "hold.py", "exec")
         loop = Loop("hold.py", code, 0.02)
-        (scenario,) = fair_declarations(held, "arm.xml", quick=True, loop=loop).scenarios
+        (scenario,) = fair_declarations(still_arm, "arm.xml", quick=True, loop=loop).scenarios
         assert scenario.name == "loop" and scenario.title is not None
         assert ", under the controller hold.py" in scenario.title
         assert bool(scenario.qvel) is not is_moving

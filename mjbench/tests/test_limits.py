@@ -53,12 +53,14 @@ def test_the_sentence_tells_which_starts_it_speaks_of() -> None:
         )
         return stability_text(report)
 
-    every, near = "every step tried, to 1000 s", "near the motion of small steps"
-    assert sentence(largest="all", bracket=None) == f"RK4 stays bounded and {near} at {every}"
-    text = f"RK4 stays bounded from every start at steps to 19 s; {near} from its own at {every}"
+    all_steps, near = "every step tried, to 1000 s", "near the motion of small steps"
+    assert sentence(largest="all", bracket=None) == f"RK4 stays bounded and {near} at {all_steps}"
+    text = (
+        f"RK4 stays bounded from every start at steps to 19 s; {near} from its own at {all_steps}"
+    )
     assert sentence(largest="all", bracket=(19.0, HIGH)) == text
     text = f"RK4 stays bounded from every start at no step from 1 s on; {near} from its own at "
-    assert sentence(largest="all", bracket=(0.0, HIGH)) == f"{text}{every}"
+    assert sentence(largest="all", bracket=(0.0, HIGH)) == f"{text}{all_steps}"
 
 
 def test_all_and_none_are_values_of_their_own() -> None:

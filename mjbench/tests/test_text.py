@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from msgspec.structs import replace
 
 from mjbench.derive import derive_case, derive_charts, derive_scenario
@@ -17,12 +19,13 @@ from mjbench.reports.diet_report import (
     TextEdit,
 )
 from mjbench.reports.diet_text import diet_text
+from mjbench.reports.engine_report import BatchCost, EngineReport, EngineRow, EngineScenario
 from mjbench.reports.page import scene_page
 from mjbench.reports.scene_report import WorkPrecisionRow
 from mjbench.reports.terminal import Style
-from mjbench.text import case_text, scene_text
+from mjbench.text import case_text, engines_text, scene_text
 from samples.cases import case
-from samples.reports import MACHINE, awkward, row, scenario, scene, swing
+from samples.reports import MACHINE, awkward, row, scenario, scene, setting, swing
 
 
 def test_the_verdict_comes_first_then_the_table_then_the_plot() -> None:
@@ -106,6 +109,19 @@ def test_the_diet_names_what_shows_a_saving_and_folds_what_saves_little() -> Non
     assert "1 finding not explained, 1 of them for `mjbench diet arm.xml --fix`" in text
     assert '[[keep]] finding = "energy-flag energy-flag", reason = …' in text
     assert not report.ok and diet(*report.findings[1:]).ok
+
+
+def test_an_engine_has_what_a_step_costs_by_number_of_worlds() -> None:
+    costs = (BatchCost(1, Interval(2e-6, 2e-6, 2e-6)), BatchCost(64, remark="no memory"))
+    lost: dict[str, Any] = {"position": None, "attitude": None, "velocity": None}
+    engine = EngineRow(
+        **lost, engine="mjx", title="MJX", versions=(), status="ok", bits=32, costs=costs
+    )
+    run = EngineScenario("a", "A", 1.0, 1.0, "ode", "theory", 0.0, 0.0, setting(), (engine,))
+    text = engines_text(
+        EngineReport("arm", "", quick=True, machine=MACHINE, load=0.0, scenarios=(run,))
+    )
+    assert "MJX, 32 bits" in text and "1: 2 µs; 64: no memory\n" in text
 
 
 def test_costs_that_are_uncertain_say_so() -> None:

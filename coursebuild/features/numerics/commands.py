@@ -20,7 +20,6 @@ from msgspec.structs import replace
 
 from coursebuild.api import Options, UsageError
 from coursebuild.core.files.errors import require
-from coursebuild.core.files.read import read_folder
 from coursebuild.core.model.measurements import CaseReport, SceneReport
 from coursebuild.core.model.report_files import STABILITY, ReportFailure
 from coursebuild.core.model.scenarios import exact_file
@@ -223,8 +222,7 @@ def _select_problems(
     for name in names:
         matches = {p for p in problem_names if p == name or p.startswith(f"{name}-")}
         if not matches:
-            sources = read_folder(options.root, "models", ".xml").value
-            models = (s.path.removeprefix("models/").removesuffix(".xml") for s in sources)
+            models = [path.stem for path in (options.root / "models").glob("*.xml")]
             suggestion = nearest(name, (*problem_names, *models))
             all_of_them = "known: " + ", ".join(problem_names)
             help = all_of_them if suggestion is None else f"did you mean `{suggestion}`?"

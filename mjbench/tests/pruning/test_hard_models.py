@@ -223,9 +223,10 @@ def test_muscles_filters_and_delays() -> None:
   <keyframe><key name="go" qpos=".1 .2 900 0 1 1 0 0 0" act="0 .5 .1" ctrl="0 1 .2 0 0"/></keyframe>
 </mujoco>
 """
-    _, left = whole(text)
-    assert 'act="0 .5 .1" ctrl="0 1 .2"/>' in left
-    assert 'name="idle"' not in left and 'name="f"' in left and 'name="v"' in left
+    survey, left = whole(text)
+    finding = findings_by_kind(survey)["actuator-idle"]
+    assert names(finding) == ["d", "idle"] and 'name="idle"' in left
+    assert "0 1 .2" in {edit.new for edit in finding.edits}, "of the keyframe"
 
 
 def test_nothing_is_proved_where_delays_keep_states_from_being_brought_over() -> None:
