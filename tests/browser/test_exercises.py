@@ -78,15 +78,13 @@ def test_the_start_is_seen_before_anything_runs(
 ) -> None:
     with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
         page, _ = watch_page(context)
-        asked: list[str] = []
-        page.on("request", lambda request: asked.append(request.url))
+        addresses: list[str] = []
+        page.on("request", lambda request: addresses.append(request.url))
         page.goto(sites["exercises"].url(ADDRESS))
         titles = ("A bar that balances", "Hold it", "A push")
         for element, _ in (exercise(page, title) for title in titles):
-            until_shown = "img => img.complete && img.naturalWidth === 640"
-            poster = element.locator(".lab-view img")
-            wait_for_condition(page, lambda: bool(poster.evaluate(until_shown)))
-        assert not any(address.endswith(".wasm") for address in asked)
+            expect(element.locator(".lab-view img")).to_have_js_property("naturalWidth", 640)
+        assert not any(address.endswith(".wasm") for address in addresses)
         bar, _ = exercise(page, titles[0])
         press(bar, "Play")
         expect(bar.locator(".lab-view img")).to_have_count(0)
