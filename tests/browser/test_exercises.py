@@ -78,15 +78,13 @@ def test_the_start_is_seen_before_anything_runs(
 ) -> None:
     with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
         page, _ = watch_page(context)
-        asked: list[str] = []
-        page.on("request", lambda request: asked.append(request.url))
+        addresses: list[str] = []
+        page.on("request", lambda request: addresses.append(request.url))
         page.goto(sites["exercises"].url(ADDRESS))
         titles = ("A bar that balances", "Hold it", "A push")
         for element, _ in (exercise(page, title) for title in titles):
-            until_shown = "img => img.complete && img.naturalWidth === 640"
-            poster = element.locator(".lab-view img")
-            wait_for_condition(page, lambda: bool(poster.evaluate(until_shown)))
-        assert not any(address.endswith(".wasm") for address in asked)
+            expect(element.locator(".lab-view img")).to_have_js_property("naturalWidth", 640)
+        assert not any(address.endswith(".wasm") for address in addresses)
         bar, _ = exercise(page, titles[0])
         press(bar, "Play")
         expect(bar.locator(".lab-view img")).to_have_count(0)
@@ -199,7 +197,7 @@ def test_a_formula_is_written_as_on_paper(page: Page) -> None:
 
 
 @pytest.mark.parametrize("width", [390, 820, 1440])
-def test_an_exercise_comes_alive_in_the_room_that_was_kept_for_it(
+def test_an_exercise_and_a_first_lab_come_alive_in_the_room_that_was_kept_for_them(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site], width: int
 ) -> None:
     late: list[Route] = []
@@ -207,18 +205,23 @@ def test_an_exercise_comes_alive_in_the_room_that_was_kept_for_it(
     options |= {"has_touch": width < 1000, "service_workers": "block"}
     with browsers["plain"].new_context(**options) as context:
         page = context.new_page()
-        page.route("**/labs/lab.*.js", lambda route: late.append(route))
-        page.goto(sites["exercises"].url(ADDRESS))
-        elements = page.locator(".exercise").all()
-        heights = [element.evaluate("e => e.offsetHeight") for element in elements]
-        wait_for_condition(page, lambda: late != [])
-        for route in late:
-            route.continue_()
-        for element, height in zip(elements, heights, strict=True):
-            element.scroll_into_view_if_needed()
-            expect(element).to_have_class(re.compile("lab-on"))
-            expect(element.get_by_role("textbox")).to_be_visible()
-            assert element.evaluate("e => e.offsetHeight") == height
+        for address, count in ((ADDRESS, 3), ("", 1)):
+            page.route("**/labs/lab.*.js", lambda route: late.append(route))
+            page.goto(sites["exercises"].url(address))
+            elements = page.locator(".lab:has(.lab-room)").all()
+            assert len(elements) == count
+            names = [element.get_attribute("data-lab") for element in elements]
+            heights = [element.evaluate("e => e.offsetHeight") for element in elements]
+            wait_for_condition(page, lambda: late != [])
+            while late:
+                late.pop().continue_()
+            page.unroute_all()
+            for name, height in zip(names, heights, strict=True):
+                element = page.locator(f'[data-lab="{name}"]')
+                element.scroll_into_view_if_needed()
+                expect(element).to_have_class(re.compile("lab-on"))
+                expect(element.get_by_role("button", name="Play")).to_be_visible()
+                assert element.evaluate("e => e.offsetHeight") == height
 
 
 def test_an_exercise_is_read_without_scripts(

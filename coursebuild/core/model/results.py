@@ -286,11 +286,9 @@ class ModelFacts(Struct, frozen=True):
     nq: int
     nv: int
     nu: int
-    timestep: float
-    """s."""
+    timestep: float  # s
     integrator: str
-    total_mass: float
-    """kg."""
+    total_mass: float  # kg
     keyframes: tuple[str, ...]
     """Names; an unnamed one is empty."""
     sites: tuple[str, ...]

@@ -39,18 +39,19 @@ def start(context: TrialContext) -> TrialRun:
 
 
 def publish(results: Results, assets: Assets) -> PublishedTrials:
-    """Publish files in Python and pictures; in the page an exercise runs on the files of its lab."""
+    """Publish files in Python and pictures; a page runs an exercise on the files of its lab."""
     values: dict[str, PublishedExercise] = {}
     files: list[OutputFile] = []
     for trial in results.trials:
         if isinstance(trial.output, ExerciseOutput):
             name, text = trial.output.script or ("", "")
-            made = {name: text.encode(), f"{trial.line.name}.png": trial.output.picture}
-            paths = {
-                file: hashed_name(f"assets/labs/{file}", data) for file, data in made.items() if data
-            }
-            files += [OutputFile(path, made[file]) for file, path in paths.items()]
-            path, picture = (paths.get(file, "") for file in made)
+            contents = {name: text.encode(), f"{trial.line.name}.png": trial.output.picture}
+            path, picture = (
+                hashed_name(f"assets/labs/{file}", data) if data else ""
+                for file, data in contents.items()
+            )
+            pairs = zip((path, picture), contents.values(), strict=True)
+            files += [OutputFile(path, data) for path, data in pairs if data]
             values[trial.line.name] = PublishedExercise(name, path, picture)
     return PublishedTrials(values, tuple(files))
 

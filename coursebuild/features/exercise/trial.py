@@ -196,7 +196,7 @@ class ExerciseTrials:
         if begin := reply.pop("begin", None):
             from coursebuild.features.lab.picture.static import draw_picture
 
-            picture = draw_picture(exercise.lab, begin["scene"], begin["frame"])
+            picture = draw_picture(exercise.lab, begin)
         return msgspec.convert({**reply, "picture": picture}, Judgement)
 
 

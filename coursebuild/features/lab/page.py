@@ -95,6 +95,7 @@ class LabView(Struct, frozen=True):
 def draw_lab(page: PageContext, block: Lab) -> Markup:
     """Draw a lab in its static form."""
     view, words, address = page_view(page, block), page.renderer.words, ""
+    opens_page = page.document.blocks[:1] == (block,)
     if view.key and page.inputs.address:  # leads from paper to the lab
         address = f"{page.inputs.address}#{quote(view.key)}"
     if block.kind != MJCF or block.xml is None:
@@ -105,8 +106,11 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
     return page.template(
         "lab/lab.html",
         lab=view,
+        fields=block.fields,
+        arrows=0 if view.recorded is None else view.recorded.record.arrows,
         docked=block.fields.dock,
-        opens_page=page.document.blocks[:1] == (block,),
+        opens_page=opens_page,
+        keeps_room=opens_page and view.config and not view.controls,
         address=address,
         code=qr_svg(address, words("lab.code")) if address else "",
         goal=page.inlines(block.goal),
@@ -305,6 +309,7 @@ def draw_model(renderer: Renderer, view: LabView) -> Markup:
         lab=view,
         docked=False,
         opens_page=True,
+        keeps_room=False,
         address="",
         source="",
         note="",

@@ -169,6 +169,11 @@ class TrialReply(Struct, frozen=True):
     timestamp: Moment = msgspec.field(name="made", default=0)
     steps_per_second: Count | None = msgspec.field(name="stepsPerSecond", default=None)
 
+    @property
+    def reach(self) -> list[tuple[Number, Number] | None]:
+        """The least and the greatest value of each trace after Play; none where a run diverges."""
+        return [] if self.main is None or self.main["diverged"] else self.main.get("reach", [])
+
 
 def read_reply(data: bytes) -> TrialReply:
     """Read a reply from the bytes in which it is stored.
@@ -216,10 +221,10 @@ class LabRecord(Struct, frozen=True):
     end: float
     """Simulated time of the readouts and of the end of the plots, s."""
     plots: tuple[Markup, ...]
-    arrows: int = 0
-    """How many buttons draw arrows in the live lab."""
     place: str = ""
     """Where on the axis the readouts were taken, for a lab without an engine."""
+    arrows: int = 0
+    """How many buttons draw arrows in the live lab."""
 
 
 class LabOutput(Struct, frozen=True):

@@ -188,7 +188,7 @@ class LabTrials:
             seconds=reply.seconds,
             tried=reply.tried,
             parity=_in_english(*reply.describe(lab.kind)),
-            clipped=tuple(verdict.clipped_curves(lab.fields.plots, reply.reach)),
+            clipped=verdict.clipped_curves(lab, reply.reach),
             cached=kept_reply is not None,
         )
         output = LabOutput("", {"id": trial.name} | config, parity=reply.describe(lab.kind))
@@ -329,13 +329,8 @@ class _LabTrial(Struct, frozen=True):
             parity=_in_english(*comparison),
             fill=None if reply.main is None else reply.main["fill"],
             play=verdict.play_text(share, lab.fields.still),
-            fallen=tuple(
-                f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
-                for body in ([] if reply.main is None else reply.main.get("fallen", []))
-            ),
-            clipped=()
-            if reply.main is None or reply.main["diverged"]
-            else tuple(verdict.clipped_curves(lab.fields.plots, reply.main.get("reach", []))),
+            fallen=verdict.fallen_bodies(reply),
+            clipped=verdict.clipped_curves(lab, reply.reach),
             cached=cached_evaluation is not None,
             unexported=export.reason,
         )
@@ -386,8 +381,7 @@ class _LabTrial(Struct, frozen=True):
 
             picture_key = key_of(key, str(self.lab.fields.height), lab_digest("picture"))
             keep = self.context.run_store.store.get_or_make
-            start = main["scene"], main["pictures"][0]["frame"]
-            picture = keep("pictures", picture_key, lambda: draw_picture(self.lab, *start))
+            picture = keep("pictures", picture_key, lambda: draw_picture(self.lab, main))
             film = b""
             if main["film"]:
                 film = keep("films", picture_key, lambda: draw_film(self.lab, main))

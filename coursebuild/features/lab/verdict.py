@@ -179,23 +179,32 @@ def play_text(share: float | None, still: str) -> str:
     return "Play alone moves nothing, and neither `start` nor `still` says more"
 
 
-def clipped_curves(
-    plots: Sequence[Any], reach: Sequence[tuple[float, float] | None]
-) -> Iterator[str]:
+def fallen_bodies(trial: TrialReply) -> tuple[str, ...]:
+    """Name what has fallen out of the scene, and to where."""
+    bodies = [] if trial.main is None else trial.main.get("fallen", [])
+    return tuple(
+        f"`{body['name']}`, to z = {body['height']:.3g} m at t = {body['time']:.3g} s"
+        for body in bodies
+    )
+
+
+def clipped_curves(lab: Lab, reach: Sequence[tuple[float, float] | None]) -> tuple[str, ...]:
     """Name the curves that leave what `ymin` and `ymax` show, and how far they go.
 
     `reach` is the least and the greatest value of each trace of all plots in turn. What leaves by
     less than shows in the numbers named is no more than the width of a line.
     """
-    traces = [(plot, trace) for plot in plots for trace in plot.traces]
+    texts: list[str] = []
+    traces = [(plot, trace) for plot in lab.fields.plots for trace in plot.traces]
     for (plot, trace), ends in zip(traces, reach, strict=False):
         if ends is None:
             continue
         low, high = (float(f"{end:.3g}") for end in ends)
         if plot.ymin is not None and low < plot.ymin:
-            yield f"`{trace.label}`, down to {low:g} (`ymin` is {plot.ymin:g})"
+            texts.append(f"`{trace.label}`, down to {low:g} (`ymin` is {plot.ymin:g})")
         if plot.ymax is not None and high > plot.ymax:
-            yield f"`{trace.label}`, up to {high:g} (`ymax` is {plot.ymax:g})"
+            texts.append(f"`{trace.label}`, up to {high:g} (`ymax` is {plot.ymax:g})")
+    return tuple(texts)
 
 
 def _is_claimed(lab: Lab, failure: TrialFailure) -> bool:

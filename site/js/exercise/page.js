@@ -23,7 +23,6 @@ export class Exercise extends Instrument {
   }
 
   build() {
-    this.element.querySelector('.exercise-room')?.remove()
     super.build()
     const { words, config } = this
     const { exercise } = config

@@ -148,7 +148,7 @@ def test_an_orthographic_camera(bench: Bench) -> None:
     lab, main = main_of(
         bench, xml=xml, camera={"azimuth": 90, "elevation": 0, "target": [0, 0, 0]}, height=480
     )
-    pixels = read_png(draw_picture(lab, main["scene"], main["pictures"][0]["frame"]))
+    pixels = read_png(draw_picture(lab, main))
     rows = np.nonzero(pixels[..., 3].any(axis=1))[0]
     # A box of 1 m in a view that is 2 m high.
     assert rows.max() - rows.min() + 1 == pytest.approx(pixels.shape[0] / 2, abs=2)
@@ -195,6 +195,7 @@ def test_record_has_values_as_text_and_a_picture_whose_size_follows_the_lab() ->
         "plots": {"times": [], "plots": []},
         "pictures": [{"time": 0, "readouts": [value for value, _, _ in VALUES]}],
         "scene": {"camera": {**eye, "orthographic": False}},
+        "arrows": None,
     }
     readouts = [{"label": "r", "expr": "1", "digits": digits} for _, digits, _ in VALUES]
     heights = (80, 260, 480, 2000, 300)

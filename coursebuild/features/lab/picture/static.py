@@ -42,9 +42,10 @@ _LARGE = 1e9
 """From here on numbers are written with powers of ten, as in the live lab."""
 
 
-def draw_picture(lab: Lab, scene: dict[str, Any], frame: Any) -> bytes:
-    """Draw a frame of a lab's trial, as PNG."""
-    return png(_draw_frame(lab, unpack_arrays(scene), unpack_arrays(frame), _size(lab)))
+def draw_picture(lab: Lab, main: MainRun) -> bytes:
+    """Draw the start of the main run of a lab's trial, as PNG."""
+    frame = unpack_arrays(main["pictures"][0]["frame"])
+    return png(_draw_frame(lab, unpack_arrays(main["scene"]), frame, _size(lab)))
 
 
 def draw_film(lab: Lab, main: MainRun) -> bytes:

@@ -2,13 +2,15 @@
  * Calls the pieces of a lab's code, so that a failure is reported with its entry in the lesson.
  */
 
+const LONGEST = 300 // characters of a message, which code may make as long as it likes
+
 /**
  * A piece of lab code failed. `entry` is the way to it in the lab's JSON: ['controls', 2, 'set'].
  * `kind`: 'throws' | 'type' | 'nan' | 'engine' (the engine ended and will not work any more).
  */
 export class LabError extends Error {
   constructor(kind, entry, message) {
-    super(message)
+    super(message.length > LONGEST ? `${message.slice(0, LONGEST)}…` : message)
     this.name = 'LabError'
     this.kind = kind
     this.entry = entry

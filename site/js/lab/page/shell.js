@@ -59,6 +59,7 @@ export class Shell {
   put(body, see) {
     const still = this.element.querySelector('.lab-static')
     this.body = body
+    this.element.querySelector('.lab-room')?.remove()
     if (still !== null) still.before(body)
     else this.element.append(body)
     this.unwatch = watchSight(body, see)

@@ -71,7 +71,7 @@ export class Motion {
 
 /**
  * What a reader sees who plays what an exercise begins with, in a camera that shows all of it: `moved`, the part of the picture, or null if
- * the lab cannot run; and `begin`, the `scene` and the `frame` of the start, or null if there is none.
+ * the lab cannot run; and `begin`, the `scene` and the `pictures` of the start, as in a trial's main run, or null if there is none.
  *
  * @param {() => import('../core/lab.js').Lab} open
  */
@@ -84,7 +84,7 @@ export function played(open) {
     const { start, controls, camera: placed } = lab.config
     const scene = withSmallTextures(lab.scene())
     const { camera } = scene
-    seen.begin = { scene, frame: lab.frame(null).slice() }
+    seen.begin = { scene, pictures: [{ frame: lab.frame(null).slice() }] }
     const framing = new Framing(lab, camera)
     const motion = new Motion(lab)
     framing.begin()
