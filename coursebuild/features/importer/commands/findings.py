@@ -41,6 +41,8 @@ class Rank(enum.IntEnum):
     """A cell cannot run without a module."""
     CHANGED = 5
     """Something was written."""
+    DRAWN = 6
+    """A figure was; only the report says so."""
 
 
 class _Finding(Struct):
@@ -96,8 +98,9 @@ class Findings:
         changes = [change for change in (*changes, *account) if change.new != change.old]
         change_tried_lessons(self.options.root, changes, self.options.store)
 
-    def _lines(self) -> Iterator[str]:
-        for item in sorted(self._items, key=lambda item: item.rank):
+    def _lines(self, last: Rank = Rank.DRAWN) -> Iterator[str]:
+        items = (item for item in self._items if item.rank <= last)
+        for item in sorted(items, key=lambda item: item.rank):
             place = ""
             if item.path:
                 place = f"{item.path}:{self._texts[item.path].count(chr(10), 0, item.at) + 1}"
@@ -112,7 +115,7 @@ class Findings:
         errors = [f"- {d.span.path}:{d.span.line}: {d.message}\n" for d in wrong if d.is_error]
         if errors:
             new += _WRONG + "".join(errors)
-        lines = [f"- {line}" for line in self._lines()]
+        lines = [f"- {line}" for line in self._lines(Rank.CHANGED)]
         known = {*map(_without_lines, lines)}
         lines += (line for line in self._old_lines if _without_lines(line) not in known)
         if lines:
