@@ -108,9 +108,9 @@ def convert_cross_reference(whole: str, kind: str, label: str, context: LessonCo
         return write_link("", context.resolve_anchor(f"eq:{formula_anchor(label)}"))
     words = {"sec": "section", "fig": "figure", "tbl": "table", "lst": "listing", **PROOF_LABELS}
     name = to_anchor(label)
-    numbered = context.resolve_anchor(f"{kind.replace('tbl', 'tab')}:{name}")
-    if address := numbered or context.resolve_anchor(f"{kind}-{name}"):
-        return write_link("" if numbered or kind == "sec" else f"the {words[kind]}", address)
+    number_address = context.resolve_anchor(f"{kind.replace('tbl', 'tab')}:{name}")
+    if address := number_address or context.resolve_anchor(f"{kind}-{name}"):
+        return write_link("" if number_address or kind == "sec" else f"the {words[kind]}", address)
     message = f"the reference `{whole}` to what no text labels: write what is meant"
     context.leave("cross-reference", message)
     return f"the {words[kind]}"
