@@ -77,7 +77,7 @@ def _target(path: str, place: PrintedPlace, places: Sequence[PrintedPlace]) -> s
     words = ""
     if len(places) > 1 and len(quantities) > 1:
         words = place.output.words_before(place, places)
-        if not words:
+        if not words or "`" in words:  # which would begin code
             return ""
     value = " ".join((*([path] if path else []), *([f'"{words}"'] if words else [])))
     return f"{{out={value}}}" if value else "{out}"
