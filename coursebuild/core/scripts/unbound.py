@@ -60,22 +60,24 @@ def find_printed(
             help = f"`{script}` printed it: `{plain_text(place.line.text)}`"
             edits = (Edit(span, f"`{span.text}`{target}"),)
             return replace(diagnostic, help=f"{help}; write `` {edits[0].text} ``", edits=edits)
-    every = [outputs.text(verdict) for verdict in verdicts]
-    others = [p for text in every for p in text.places(1) if _contradicts(p, bound, before, after)]
-    lines = dict.fromkeys(plain_text(place.line.text) for place in others)
+    printed_texts = [outputs.text(verdict) for verdict in verdicts]
+    rivals = [
+        p for text in printed_texts for p in text.places(1) if _contradicts(p, bound, before, after)
+    ]
+    lines = dict.fromkeys(plain_text(place.line.text) for place in rivals)
     if len(lines) != 1:
         return diagnostic
-    note = Note(f"a script of this lesson printed `{next(iter(lines))}`", others[0].span)
+    note = Note(f"a script of this lesson printed `{next(iter(lines))}`", rivals[0].span)
     return replace(diagnostic, notes=(*diagnostic.notes, note))
 
 
 def _target(path: str, place: PrintedPlace, places: Sequence[PrintedPlace]) -> str:
     """The attribute that binds a number to a printed one; empty where none tells it from others."""
-    quantities = {other.quantity() for other in places}
+    quantities = {rival.quantity() for rival in places}
     words = ""
     if len(places) > 1 and len(quantities) > 1:
         words = place.output.words_before(place, places)
-        if not words:
+        if not words or "`" in words:  # which would begin code
             return ""
     value = " ".join((*([path] if path else []), *([f'"{words}"'] if words else [])))
     return f"{{out={value}}}" if value else "{out}"

@@ -123,7 +123,7 @@ def _bold_headings(text: str) -> str:
     pattern = rf"^{first[1]}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
     parts = re.split(r"(^(?P<mark>`{3,}|~{3,}).*?^(?P=mark)[ \t]*$)", text, flags=re.M | re.S)
     for at in range(0, len(parts), 3):  # what lies between blocks of code, which have two groups
-        parts[at] = re.sub(pattern, r"**\1**\n", parts[at], flags=re.MULTILINE)
+        parts[at] = re.sub(pattern, r"\n**\1**\n", parts[at], flags=re.MULTILINE)
         parts[at + 2 : at + 3] = [""]
     return "".join(parts)
 

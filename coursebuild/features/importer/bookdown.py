@@ -99,13 +99,13 @@ def read_book(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
         return
     settings = read_yaml(files.read_text(name))
     files.account.changed["map", "content/course.toml"] += 1
-    chosen = value_at(settings, "rmd_files")
-    if isinstance(chosen, Mapping):  # by the form of the book
-        chosen = chosen.get("html") or chosen.get("latex")
-    found = [p for p in files if p.endswith(".Rmd") and "/" not in p and not p.startswith("_")]
-    found.sort(key=lambda path: (path != "index.Rmd", path))
+    choice = value_at(settings, "rmd_files")
+    if isinstance(choice, Mapping):  # by the form of the book
+        choice = choice.get("html") or choice.get("latex")
+    names = [p for p in files if p.endswith(".Rmd") and "/" not in p and not p.startswith("_")]
+    names.sort(key=lambda path: (path != "index.Rmd", path))
     paths = []
-    for path in map(str, chosen if isinstance(chosen, list) else found):
+    for path in map(str, choice if isinstance(choice, list) else names):
         if path in files:
             paths.append(path)
         else:

@@ -79,8 +79,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """The files that it draws."""
     notebook_outputs: list[tuple[str, str]] = field(default_factory=list)
     """The outputs that are recorded in notebooks, each with the path of its script."""
-    sources: frozenset[str] = frozenset()
-    """The keys of the BibTeX files in the folder."""
+    sources: Mapping[str, str] = {}
+    """The authors of the works in the BibTeX files of the folder, by their keys."""
     cited: set[str] = field(default_factory=set)
     """The sources that a text cites."""
     notes: list[str] = field(default_factory=list)
@@ -138,10 +138,15 @@ class LessonContext(Struct, frozen=True, kw_only=True):
 
     def are_sources(self, keys: Sequence[str]) -> bool:
         """Whether all these are keys of sources; they are cited then."""
-        if not self.sources.issuperset(keys):
+        if not self.sources.keys() >= {*keys}:
             return False
         self.cited.update(keys)
         return True
+
+    def cite_in_words(self, key: str, place: str = "") -> str:
+        """Return a source of the list as a part of a sentence: its authors, and the source."""
+        self.cited.add(key)
+        return f"{self.sources[key]} [@{key}{place and f', {place}'}]".lstrip()
 
     def resolve_file(self, address: str) -> str:
         """Return the new address of a file that HTML names; empty where the folder lacks it."""

@@ -225,6 +225,22 @@ def _works(files: SourceFiles) -> Iterator[tuple[str, str]]:
                 yield key, text[work.start() : end].strip()
 
 
+_AUTHOR = re.compile(r"\bauthor\s*=\s*(?:\{((?:[^{}]|\{[^{}]*\})*)\}|\"([^\"]*)\")", re.IGNORECASE)
+
+
+def _authors(work: str) -> str:
+    """Return the surnames of the authors of a work, as a sentence has them; empty for none."""
+    authors = _AUTHOR.search(work)
+    if authors is None or "\\" in authors[0]:  # accents of LaTeX
+        return ""
+    names = re.split(r"\s+and\s+", " ".join((authors[1] or authors[2] or "").split()))
+    surnames = [
+        n.partition(",")[0] if "," in n or "{" in n else n.rpartition(" ")[2] for n in names
+    ]
+    words = f"{surnames[0]} et al." if len(names) > 2 else " and ".join(surnames)
+    return words.replace("{", "").replace("}", "")
+
+
 def _cited_works(files: SourceFiles, cited: Set[str]) -> str:
     """Return the BibTeX of the sources that texts cite."""
     works, selection = [*_works(files)], dict[str, str]()
@@ -308,7 +324,7 @@ def _convert_texts(
         },
         files=files,
         models=models,
-        sources=frozenset(key for key, _ in _works(files)),
+        sources={key: _authors(work) for key, work in _works(files) if key},
         camera_is_position=course.camera_is_position,
         substitutions=course.substitutions,
     )

@@ -112,8 +112,8 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
         case "figure-md":  # its argument is its label, its first paragraph the picture
             picture, _, caption = text.strip("\n").partition("\n\n")
             patterns = (r"\]\(([^()\s]+)|src=[\"']([^\"']+)", r"!\[([^\]]*)\]|alt=[\"']([^\"']*)")
-            found = (re.search(pattern, picture) for pattern in patterns)
-            source, alt = ((match[1] or match[2] or "") if match else "" for match in found)
+            matches = (re.search(pattern, picture) for pattern in patterns)
+            source, alt = ((match[1] or match[2] or "") if match else "" for match in matches)
             new = {**options, "alt": alt, "name": argument}
             figure = replace(directive, name="figure", argument=source, options=new, text=caption)
             return _write_figure(figure, context)

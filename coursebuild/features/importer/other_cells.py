@@ -96,10 +96,10 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     word = how_shown(replace(cell, text="\n".join(f"#| {n}: {v}" for n, v in options.items())))
     if not (language in _SHELLS or language in context.single_languages):
         context.files.account.changed[kind, "lines of one script, which ends the text"] += 1
-        joined = context.joined.setdefault(language, JoinedCells(_new_path(language, context)))
-        lines = joined.add(code, cell.printed + (cell.value if language in _PRINTING else ""))
-        shown = marks.fence(f"{language} show={joined.path}#{lines}", code)
-        head += [shown] if word != " hidden" else []
+        cells = context.joined.setdefault(language, JoinedCells(_new_path(language, context)))
+        lines = cells.add(code, cell.printed + (cell.value if language in _PRINTING else ""))
+        block = marks.fence(f"{language} show={cells.path}#{lines}", code)
+        head += [block] if word != " hidden" else []
         return "\n\n".join((*head, *write_outputs(cell, context)))
     message = f"a {kind} is a script, which runs when `[runners]` of the map says how"
     context.leave(kind, message)
@@ -110,13 +110,13 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
 
 def write_joined_cells(context: LessonContext) -> Iterator[str]:
     """Yield the scripts that the cells of a text make together, with what they print."""
-    for language, joined in context.joined.items():
+    for language, script in context.joined.items():
         message = f"the cells of `{language}` are one script, which runs when `[runners]` says how"
         context.leave(f"script of `{language}`", message)
-        yield marks.fence(f"{language} file={joined.path} folded", "\n".join(joined.lines))
-        if output := plain_output(joined.printed):
+        yield marks.fence(f"{language} file={script.path} folded", "\n".join(script.lines))
+        if output := plain_output(script.printed):
             context.files.account.taken["output that is recorded"] += 1
-            context.notebook_outputs.append((joined.path, output))
+            context.notebook_outputs.append((script.path, output))
             yield marks.fence("output", output)
 
 

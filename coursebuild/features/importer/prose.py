@@ -61,6 +61,7 @@ _LINE = re.compile(
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
     r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{[^{}\n]*\})"
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
+    rf"|(?P<told>(?<![\w@.\\/])@(?P<work>{_KEY})(?:[ ]\[(?P<cited>[^\[\]\n@]+)\](?!\())?)"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
     r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
     r"|(?P<proof>\{\{(?P<sort>[a-z]+)\}\}(?=[{\[])(?:\{(?P<key>[^{}\n]+)\})?"
@@ -144,6 +145,7 @@ _KINDS = {
     "note": ("footnote", "stands at the end of the lesson"),
     "cross": ("cross-reference", "a link"),
     "cite": ("citation", "in the words of BibTeX's keys"),
+    "told": ("citation", "its authors, and the source"),
     "pair": ("pair of tags", "what it holds, without a frame"),
     "proof": ("theorem of mdBook's `numthm`", "an anchor, its kind and its title"),
     "substitution": ("substitution", "the words that it stands for"),
@@ -374,6 +376,11 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             message = f"`{whole}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave("citation", message)
             return f"`{whole}`"
+        case "told":
+            is_source = match["work"] in context.sources
+            return (
+                context.cite_in_words(match["work"], match["cited"] or "") if is_source else whole
+            )
         case "pair":
             return _rewrite_line(match["held"], context)
         case "proof":

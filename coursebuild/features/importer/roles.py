@@ -49,7 +49,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             keys = [key.strip() for key in body.split(",")]
             if context.are_sources(keys):
                 if name.partition(":")[2] == "t" or name == "citet":
-                    return " and ".join(f"@{key}" for key in keys)
+                    return " and ".join(map(context.cite_in_words, keys))
                 return f"[{'; '.join(f'@{key}' for key in keys)}]"
             message = f"`{body}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave(f"role `{{{name}}}`", message)
@@ -107,9 +107,9 @@ def convert_cross_reference(whole: str, kind: str, label: str, context: LessonCo
         return write_link("", context.resolve_formula(label))
     words = {"sec": "section", "fig": "figure", "tbl": "table", "lst": "listing", **PROOF_LABELS}
     name = to_anchor(label)
-    numbered = context.resolve_anchor(f"{kind.replace('tbl', 'tab')}:{name}")
-    if address := numbered or context.resolve_anchor(f"{kind}-{name}"):
-        return write_link("" if numbered or kind == "sec" else f"the {words[kind]}", address)
+    number_address = context.resolve_anchor(f"{kind.replace('tbl', 'tab')}:{name}")
+    if address := number_address or context.resolve_anchor(f"{kind}-{name}"):
+        return write_link("" if number_address or kind == "sec" else f"the {words[kind]}", address)
     message = f"the reference `{whole}` to what no text labels: write what is meant"
     context.leave("cross-reference", message)
     return f"the {words[kind]}"

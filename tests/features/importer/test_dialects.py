@@ -83,12 +83,29 @@ def test_the_names_of_lists_of_examples_are_their_numbers(tmp_path: Path) -> Non
     assert new == "1.  First\n2.  Second\n\n3.  Third\n\nAs (2) shows, not (@x).\n"
 
 
-def test_tabs_of_quarto_are_no_headings(tmp_path: Path) -> None:
-    text = (
-        "# One\n\n::: {.panel-tabset}\n## Left\nA.\n\n```\n## code\n```\n\n## Right {.x}\nB.\n:::\n"
+def test_a_source_in_a_sentence_is_called_by_its_authors(tmp_path: Path) -> None:
+    works = (
+        "@book{a, author = {Huygens, Christiaan}, title={H}}\n"
+        "@book{b, author={Ada Lovelace and {The Team}}, title={L}}\n@misc{c, title={T}}\n"
     )
+    text = "# One\n\nAs @a found, @b [p. 3] and @c; not @d, me@a.org or [@a].\n"
+    course = convert_files(
+        tmp_path, {"a.qmd": text, "b.md": "# B\n\n{cite:t}`a,b`\n", "r.bib": works}
+    )
+    assert course.files["content/lessons/1.1-a.md"].decode() == (
+        "As Huygens [@a] found, Lovelace and The Team [@b, p. 3] and [@c]; not @d, me@a.org "
+        "or [@a].\n"
+    )
+    assert course.files["content/lessons/1.2-b.md"].decode() == (
+        "Huygens [@a] and Lovelace and The Team [@b]\n"
+    )
+
+
+def test_tabs_of_quarto_are_no_headings(tmp_path: Path) -> None:
+    tabs = "## Left\nA.\n\n```\n## code\n```\nC.\n## Right {.x}\nB."
+    text = f"# One\n\n::: {{.panel-tabset}}\n{tabs}\n:::\n"
     new = lesson(tmp_path, "a.qmd", text)
-    assert new == "**Left**\n\nA.\n\n```\n## code\n```\n\n**Right**\n\nB.\n"
+    assert new == "**Left**\n\nA.\n\n```\n## code\n```\n\nC.\n\n**Right**\n\nB.\n"
 
 
 def test_macros_of_a_book_are_defined_where_formulas_use_them(tmp_path: Path) -> None:

@@ -307,8 +307,8 @@ def test_the_account_says_first_what_contradicts_the_course_each_with_its_place(
 
     def place(*words: str) -> str:
         pairs = zip(*(lines[n:] for n in range(len(words))), strict=False)
-        found = (all(map(str.__contains__, pair, words)) for pair in pairs)
-        return f"{path}:{[*found].index(True) + 1}"
+        matches = (all(map(str.__contains__, pair, words)) for pair in pairs)
+        return f"{path}:{[*matches].index(True) + 1}"
 
     account = (folder / "new/IMPORT.md").read_text()
     assert account.partition("## What does not hold\n\n")[2].splitlines()[:8] == [

@@ -41,6 +41,8 @@ class Rank(enum.IntEnum):
     """A cell cannot run without a module."""
     CHANGED = 5
     """Something was written."""
+    DRAWN = 6
+    """A figure was; only the report says so."""
 
 
 class _Finding(Struct):
@@ -79,48 +81,49 @@ class Findings:
             yield f"{len(rest)} more, which are in {ACCOUNT}"
 
     def write(
-        self, edits: Mapping[Source, Sequence[Edit]], wrong: Iterable[Diagnostic] = ()
+        self, edits: Mapping[Source, Sequence[Edit]], errors: Iterable[Diagnostic] = ()
     ) -> None:
         """Make edits of lessons, and bring the account up to date, all or nothing.
 
-        `wrong` is what a check finds after that.
+        `errors` are what a check finds after that.
         """
         changes = []
         for source, own_edits in edits.items():
             new = apply_edits(source.text, own_edits)
             changes.append(FileChange(source.path, source.text.encode(), new.encode()))
             for item in self._items:
-                item.at = _moved(item.at, own_edits) if item.path == source.path else item.at
+                item.at = _place_after(item.at, own_edits) if item.path == source.path else item.at
             self._texts[source.path] = new
-        account = self._account(wrong)
+        account = self._account(errors)
         changes = [change for change in (*changes, *account) if change.new != change.old]
         change_tried_lessons(self.options.root, changes, self.options.store)
 
-    def _lines(self) -> Iterator[str]:
-        for item in sorted(self._items, key=lambda item: item.rank):
+    def _lines(self, last: Rank = Rank.DRAWN) -> Iterator[str]:
+        items = (item for item in self._items if item.rank <= last)
+        for item in sorted(items, key=lambda item: item.rank):
             place = ""
             if item.path:
                 place = f"{item.path}:{self._texts[item.path].count(chr(10), 0, item.at) + 1}"
             yield f"{place}{item.message}"
 
-    def _account(self, wrong: Iterable[Diagnostic]) -> Iterator[FileChange]:
+    def _account(self, errors: Iterable[Diagnostic]) -> Iterator[FileChange]:
         old = read_recorded(self.options.root, ACCOUNT)
         if old is None:
             return
         text = old.decode("utf-8", "replace")
         new = min(text.partition(_SHOWN)[0], text.partition(_WRONG)[0], key=len)
-        errors = [f"- {d.span.path}:{d.span.line}: {d.message}\n" for d in wrong if d.is_error]
-        if errors:
-            new += _WRONG + "".join(errors)
-        lines = [f"- {line}" for line in self._lines()]
-        known = {*map(_without_lines, lines)}
-        lines += (line for line in self._old_lines if _without_lines(line) not in known)
+        lines = [f"- {d.span.path}:{d.span.line}: {d.message}\n" for d in errors if d.is_error]
+        if lines:
+            new += _WRONG + "".join(lines)
+        lines = [f"- {line}" for line in self._lines(Rank.CHANGED)]
+        known_lines = {*map(_without_lines, lines)}
+        lines += (line for line in self._old_lines if _without_lines(line) not in known_lines)
         if lines:
             new += _SHOWN + "".join(f"{line}\n" for line in lines)
         yield FileChange(ACCOUNT, old, new.encode())
 
 
-def _moved(at: int, edits: Iterable[Edit]) -> int:
+def _place_after(at: int, edits: Iterable[Edit]) -> int:
     """Return where a place of a text is after edits; one that is replaced begins anew."""
     shift = 0
     for edit in sorted(edits, key=lambda edit: edit.span.start):

@@ -116,15 +116,15 @@ def run(arguments: argparse.Namespace) -> int:
 def _prove(options: Options, remarks: tuple[str, ...], most_seconds: float) -> Report:
     findings = prove(options, most_seconds)
     report = check(options, truth=True)
-    listed = [d for d in report.diagnostics if d.rule in _LISTED]
+    claims = [d for d in report.diagnostics if d.rule in _LISTED]
     report = replace(
         report, diagnostics=tuple(d for d in report.diagnostics if d.rule not in _LISTED)
     )
-    for diagnostic in listed:
+    for diagnostic in claims:
         for note in diagnostic.notes:
             message = f" says `{diagnostic.span.text}`, and {note.message}"
             findings.add(Rank.LIKELY, message, diagnostic.span)
-    if count := sum(bool(diagnostic.edits) for diagnostic in listed):
+    if count := sum(bool(diagnostic.edits) for diagnostic in claims):
         numbers = f"{plural(count, 'number')} of texts, which scripts print, can be bound"
         findings.add(Rank.CHANGED, f"{numbers}: `coursebuild check --propose --truth`")
     findings.write({}, report.diagnostics)

@@ -178,7 +178,7 @@ def _run_again(
 
 def _draw(course: Course, runs: Sequence[ScriptRun], options: Options, findings: Findings) -> None:
     for remark in write_figures(course, None, runs, options, dry_run=False)[0]:
-        findings.add(Rank.CHANGED, remark)
+        findings.add(Rank.DRAWN, remark)
 
 
 def _show_failing_cells(
