@@ -66,6 +66,7 @@ _LINE = re.compile(
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
     r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{[^{}\n]*\})"
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
+    rf"|(?P<author>(?<![\w@.\\/])@(?P<source_key>{_KEY})(?:[ ]\[(?P<where>[^\[\]\n@]+)\](?!\())?)"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
     r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
     r"|(?P<proof>\{\{(?P<sort>[a-z]+)\}\}(?=[{\[])(?:\{(?P<key>[^{}\n]+)\})?"
@@ -156,6 +157,7 @@ _KINDS = {
     "note": ("footnote", "stands at the end of the lesson"),
     "cross": ("cross-reference", "a link"),
     "cite": ("citation", "in the words of BibTeX's keys"),
+    "author": ("citation", "in brackets, also where it is a part of the sentence"),
     "pair": ("pair of tags", "what it holds, without a frame"),
     "proof": ("theorem of mdBook's `numthm`", "an anchor, its kind and its title"),
     "substitution": ("substitution", "the words that it stands for"),
@@ -397,6 +399,13 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             message = f"`{whole}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave("citation", message)
             return f"`{whole}`"
+        case "author":
+            where = f", {match['where']}" if match["where"] else ""
+            return (
+                f"[@{match['source_key']}{where}]"
+                if context.are_sources([match["source_key"]])
+                else whole
+            )
         case "pair":
             return _rewrite_line(match["held"], context)
         case "proof":

@@ -48,7 +48,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             keys = [key.strip() for key in body.split(",")]
             if context.are_sources(keys):
                 if name.partition(":")[2] == "t" or name == "citet":
-                    return " and ".join(f"@{key}" for key in keys)
+                    return " and ".join(f"[@{key}]" for key in keys)
                 return f"[{'; '.join(f'@{key}' for key in keys)}]"
             message = f"`{body}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave(f"role `{{{name}}}`", message)
