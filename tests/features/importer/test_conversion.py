@@ -234,6 +234,7 @@ def test_sources_of_quarto_are_cited_whatever_separates_them(tmp_path: Path) -> 
 
 As in [@Hertz+:1894;
 @Lanczos:1949] and in [@Hertz+:1894, -@Lanczos:1949].
+So says @Hertz+:1894 [p. 3], and @Lanczos:1949[, p. 4], and @nobody.
 
 | sign    | meaning |
 | ------- | ------- |
@@ -244,6 +245,8 @@ As in [@Hertz+:1894;
     course = convert_files(tmp_path, texts)
     cited = text.replace("[@Hertz+:1894;\n@Lanczos:1949]", "[@Hertz+:1894; @Lanczos:1949]\n")
     cited = cited.replace(", -@Lanczos", "; @Lanczos").removeprefix("# One\n\n")
+    cited = cited.replace("@Hertz+:1894 [p. 3]", "[@Hertz+:1894, p. 3]")
+    cited = cited.replace("@Lanczos:1949[, p. 4]", "[@Lanczos:1949, p. 4]")
     assert course.files["content/lessons/1.1-one.md"].decode() == cited
     bibliography = course.files["content/references.bib"].decode()
     assert "{Hertz+:1894," in bibliography and "{Lanczos:1949," in bibliography
