@@ -286,9 +286,11 @@ class ModelFacts(Struct, frozen=True):
     nq: int
     nv: int
     nu: int
-    timestep: float  # s
+    timestep: float
+    """s."""
     integrator: str
-    total_mass: float  # kg
+    total_mass: float
+    """kg."""
     keyframes: tuple[str, ...]
     """Names; an unnamed one is empty."""
     sites: tuple[str, ...]
@@ -307,11 +309,9 @@ class TrialLine(Struct, frozen=True):
     name: str
     """Unique in the course: `4.2-lab-1`."""
     title: str
-    lesson: str
-    """Id of its lesson or page."""
+    lesson: str  # id of its lesson or page
     status: str  # `ok`, `failed` or `untried`
-    seconds: float = 0.0
-    """Wall time."""
+    seconds: float = 0.0  # wall time
     steps_per_second: int | None = None
     """Of a simulation that ran to its end; else `None`."""
     tried: int = 0
