@@ -306,8 +306,7 @@ class ModelFacts(Struct, frozen=True):
 class TrialLine(Struct, frozen=True):
     """The result of a trial as a report lists it."""
 
-    name: str
-    """Unique in the course: `4.2-lab-1`."""
+    name: str  # unique in the course: `4.2-lab-1`
     title: str
     lesson: str  # id of its lesson or page
     status: str  # `ok`, `failed` or `untried`
@@ -328,8 +327,7 @@ class TrialLine(Struct, frozen=True):
     """What has fallen out of the scene, and to where."""
     clipped: tuple[str, ...] = ()
     """Which curves leave the part of a plot that its author has fixed, and how far."""
-    untried: str = ""
-    """Why it was not tried; empty if it was."""
+    untried: str = ""  # why it was not tried; empty if it was
 
 
 class TrialResult(Struct, frozen=True):

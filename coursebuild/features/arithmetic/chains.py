@@ -211,11 +211,11 @@ def _may_hold(sides: tuple[Expression, Expression], relation: str) -> bool:
         return False
 
 
-def _holds_in_base_units(bare: Expression, other: Expression, relation: str) -> bool:
+def _holds_in_base_units(bare: Expression, quantity: Expression, relation: str) -> bool:
     r"""Whether a number is that of a quantity in base units: `2\cdot3000 = 6\,\mathrm{kW}`."""
-    if relation in ORDERS or bare.has("unit") or not other.ends_in_unit():
+    if relation in ORDERS or bare.has("unit") or not quantity.ends_in_unit():
         return False
-    numeral = read_numeral(other) if find_units(other.parts[1].text) else None
+    numeral = read_numeral(quantity) if find_units(quantity.parts[1].text) else None
     if numeral is None:
         return False
     value, of_decimals = evaluate(bare).value, bare.has_decimals()

@@ -410,8 +410,8 @@ class _Git:
         contents = io.BytesIO(self.ask("cat-file", "--batch", stdin=names) or b"")
         try:
             for is_link, path, _ in files:
-                *known, size = contents.readline().split() or [b""]
-                if len(known) != 2:
+                *fields, size = contents.readline().split() or [b""]
+                if len(fields) != 2:
                     raise partial
                 data = contents.read(int(size) + 1)[:-1]
                 target = folder / path

@@ -282,13 +282,13 @@ def _write_glossary(text: str, context: LessonContext) -> str:
     A meaning stands further right than its terms, or, as MyST has it, behind a colon.
     """
     text = re.sub(r"\n(?:[ \t]*\n)*:[ \t]+((?:.+\n?)+)", _indent_meaning, text)
-    out, terms, marked = [], list[str](), set[str]()
+    out, terms, marked_terms = [], list[str](), set[str]()
     for entry in re.split(r"\n(?=\S)", text.strip("\n")):
         term, _, meaning = entry.partition("\n")
         if entry.startswith("[^"):  # a footnote
             out.append(rewrite_prose(entry.strip(), context))
             continue
-        terms.append(_mark_term(term.strip(), marked))
+        terms.append(_mark_term(term.strip(), marked_terms))
         if meaning.strip():
             words = rewrite_prose(" ".join(textwrap.dedent(meaning).split()), context)
             out.append(f"{', '.join(terms)}: {words}")
@@ -301,12 +301,12 @@ def _indent_meaning(meaning: re.Match[str]) -> str:
     return "\n" + textwrap.indent(lines, "  ") + "\n"
 
 
-def _mark_term(term: str, marked: set[str]) -> str:
+def _mark_term(term: str, marked_terms: set[str]) -> str:
     """Return a term with its mark, the first time; a link of it stands behind the mark."""
     link = re.fullmatch(r"\[([^\[\]]+)\]\(([^()\s]+)\)", term)
     words, address = (link[1], f" (<{link[2]}>)") if link is not None else (term, "")
-    mark = "" if words in marked else "{term}"
-    marked.add(words)
+    mark = "" if words in marked_terms else "{term}"
+    marked_terms.add(words)
     return (f"[{words}]{mark}" if mark else words) + address
 
 

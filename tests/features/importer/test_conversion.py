@@ -350,9 +350,9 @@ def test_macros_of_settings_hold_in_the_formulas_that_use_them(tmp_path: Path) -
         "two.md": "# Two\n\nThe set $\\R$.\n",
     }
     course = convert_files(tmp_path / "myst", myst)
-    one, two = (course.files[f"content/lessons/1.{n}.md"].decode() for n in ("1-one", "2-two"))
-    assert one == "$\\def\\of#1#2{#1(#2)}\\def\\R{R}\\of{f}{x} \\in \\R$\n"
-    assert two == "The set $\\def\\R{\\mathbb{R}}\\R$.\n"
+    first, second = (course.files[f"content/lessons/1.{n}.md"].decode() for n in ("1-one", "2-two"))
+    assert first == "$\\def\\of#1#2{#1(#2)}\\def\\R{R}\\of{f}{x} \\in \\R$\n"
+    assert second == "The set $\\def\\R{\\mathbb{R}}\\R$.\n"
 
 
 def test_links_of_a_wiki_lead_to_the_pages_of_their_titles(tmp_path: Path) -> None:

@@ -85,14 +85,14 @@ def run(arguments: argparse.Namespace) -> int:
         "fonts and templates": _fonts,
         "the folder": _folder,
     }
-    others = {
+    optional = {
         "kept results": _store,
         "locks": _locks,
         "the disk": _disk,
         "offscreen rendering": _rendering,
         "`--sandbox`": _sandbox,
     }
-    for subject, make_probes in {**required, **others}.items():
+    for subject, make_probes in {**required, **optional}.items():
         for probe in _finish(subject, make_probes(folder)):
             word, colour = ("broken", RED) if subject in required else ("-", YELLOW)
             if probe.ok:
@@ -157,10 +157,10 @@ def _folder(folder: Path) -> Iterator[Probe]:
 def _store(folder: Path) -> Iterator[Probe]:
     place, reason = find_store(str(folder))
     if not reason:
-        there = next(path for path in (Path(place), *Path(place).parents) if path.exists())
-        ok = os.access(there, os.W_OK)
-        kept = f"kept in {place}"
-        yield Probe(f"results are {kept}" if ok else f"results cannot be {kept}", ok, _PERMIT)
+        folder = next(path for path in (Path(place), *Path(place).parents) if path.exists())
+        ok = os.access(folder, os.W_OK)
+        verb = "are" if ok else "cannot be"
+        yield Probe(f"results {verb} kept in {place}", ok, _PERMIT)
     elif not store_key(str(folder)):
         cure = "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY"
         yield Probe("nothing is kept: there is no place for your key", False, cure)
