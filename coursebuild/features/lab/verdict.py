@@ -191,19 +191,22 @@ def fallen_bodies(trial: TrialReply) -> tuple[str, ...]:
 def clipped_curves(lab: Lab, reach: Sequence[tuple[float, float] | None]) -> tuple[str, ...]:
     """Name the curves that leave what `ymin` and `ymax` show, and how far they go.
 
-    `reach` is the least and the greatest value of each trace of all plots in turn. What leaves by
-    less than shows in the numbers named is no more than the width of a line.
+    `reach` is the least and the greatest value of each trace of all plots in turn. By less than a
+    line is wide, a hundredth of what is shown, none leaves.
     """
     texts: list[str] = []
     traces = [(plot, trace) for plot in lab.fields.plots for trace in plot.traces]
     for (plot, trace), ends in zip(traces, reach, strict=False):
         if ends is None:
             continue
-        low, high = (float(f"{end:.3g}") for end in ends)
-        if plot.ymin is not None and low < plot.ymin:
-            texts.append(f"`{trace.label}`, down to {low:g} (`ymin` is {plot.ymin:g})")
-        if plot.ymax is not None and high > plot.ymax:
-            texts.append(f"`{trace.label}`, up to {high:g} (`ymax` is {plot.ymax:g})")
+        low, high = ends
+        bottom = low if plot.ymin is None else plot.ymin
+        top = high if plot.ymax is None else plot.ymax
+        width = (top - bottom) / 100
+        if low < bottom - width:
+            texts.append(f"`{trace.label}`, down to {low:.3g} (`ymin` is {bottom:g})")
+        if high > top + width:
+            texts.append(f"`{trace.label}`, up to {high:.3g} (`ymax` is {top:g})")
     return tuple(texts)
 
 
