@@ -65,7 +65,7 @@ _REASONS = {
     r"\vec": "it is a vector",
     r"\lVert": "it is a norm",
     r"\begin": "it is an array",
-    r"\log": "the base of `\\log` is not said",
+    r"\log": "`\\log` has no one base: only `\\ln` is computed",
     r"\bmod": "it is a remainder",
     **dict.fromkeys(r"\dots \ldots \cdots \dotsc \dotsb".split(), "something is left out"),
 }
