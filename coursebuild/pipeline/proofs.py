@@ -15,12 +15,15 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Literal, TypeAlias
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.engine.store import Store, value_reader
 from coursebuild.core.model import (
     Course,
     Document,
+    FeatureBlock,
     Link,
+    Mjcf,
     Recording,
     Table,
     UrlTarget,
@@ -34,13 +37,18 @@ from coursebuild.core.text.source import Source, Span
 from coursebuild.core.values import fingerprint
 from coursebuild.report.values import plural
 
-Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "link"]
+Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "block", "link"]
 KIND = "proofs"
 """That of entries of the store: what was proved of a document, by the hash of its path."""
 
 
 _OPAQUE = re.compile(r"[A-Za-z][\w+.-]*:(?!//)")
 """An address that nothing looks up, as `mailto:` and a misspelt `lesson:`."""
+
+
+_FENCE = re.compile(r"(?:`{3,}|~{3,})[ ]*(?P<word>[\w-]+)")
+_TRIED = frozenset(("lab", "exercise"))
+"""Blocks that are proved by a trial."""
 
 
 class Proof(Struct, frozen=True):
@@ -59,6 +67,8 @@ class Proof(Struct, frozen=True):
     """What readers see of a link, in its brackets: it stays where its address is misspelt."""
     labels: int = 0
     """How often the label stood in the document."""
+    fence: str = ""
+    """The word that says what a block is: `quiz`."""
 
     def describe(self) -> str:
         """What it is called in a report."""
@@ -69,6 +79,8 @@ class Proof(Struct, frozen=True):
                 return f"the figure `{self.text}`"
             case "lab":
                 return "the lab"
+            case "block":
+                return f"the block `{self.fence}`"
             case "link":
                 return f"the link to `{self.text}`"
             case "output" | "table":
@@ -125,7 +137,7 @@ def proved_texts(course: Course, documents: Iterable[Document]) -> dict[str, lis
     for _, trial in feature_trials(course).values():
         span = trial.block.span
         if span.path in texts:  # not in a model's file
-            texts[span.path].append((_proof("lab", _longest_line(span.text), span), span, None))
+            texts[span.path].append((_proof("lab", _fenced_line(span), span), span, None))
     return texts
 
 
@@ -163,6 +175,11 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
             yield _proof("value", binding.text, binding.span), binding.span, binding_script
     for figure in recorded_figures(document):
         yield _proof("figure", figure.name, figure.span, figure.script), figure.span, figure.script
+    for block in (*find_blocks(document, FeatureBlock), *find_blocks(document, Mjcf)):
+        fence = _FENCE.match(block.span.text)
+        if fence is not None and fence["word"] not in _TRIED:
+            proof = _proof("block", _fenced_line(block.span), block.span)
+            yield replace(proof, fence=fence["word"]), block.span, None
     for link in find_inlines(document, Link):
         text = link.target_span.text
         is_opaque = isinstance(link.target, UrlTarget) and _OPAQUE.match(text)
@@ -176,6 +193,11 @@ def _proof(kind: Kind, text: str, span: Span, script: str = "") -> Proof:
     place = next(filter(span.contains, places), span)
     labels = [*_places(span.source, label)] if label else []
     return Proof(kind, text, script, len(places), place.line, label, len(labels))
+
+
+def _fenced_line(span: Span) -> str:
+    """The longest line of a fenced block, of the first one what stands behind its word."""
+    return _longest_line(_FENCE.sub("", span.text))
 
 
 def _longest_line(text: str) -> str:

@@ -105,3 +105,26 @@ def test_a_link_that_became_text_is_told(make: Make, old: str, new: str, remark:
     out = folder.main("check").out
     assert remark in out
     assert ("is not now" in out) is bool(remark)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "remark"),
+    [
+        ("```quiz", "```qiuz", "1.1: the block `quiz` in line 5 was proved before"),
+        ("```mjcf", "```mcjf", "1.1: the block `mjcf` in line 9 was proved before"),
+        ('{"id": "1.1-q"', '{"id": "1.1-r"', ""),
+        ("```mjcf\n<mujoco/>\n```\n", "", ""),
+    ],
+)
+def test_a_block_whose_word_is_misspelt_is_told(
+    make: Make, old: str, new: str, remark: str
+) -> None:
+    question = '{"kind": "numeric", "id": "a", "q": "One and one?", "answer": 2, "tol": 0.1}'
+    quiz = f'```quiz\n{{"id": "1.1-q", "title": "Q", "questions": [\n{question}]}}\n```\n\n'
+    lesson = f"## Sums\n\n{quiz}```mjcf\n<mujoco/>\n```\n"
+    folder = make(lesson)
+    assert folder.main("check").status == 0, folder.main("check").out
+    folder.write(folder.lesson(1), lesson.replace(old, new))
+    out = folder.main("check").out
+    assert remark in out
+    assert ("is not now" in out) is bool(remark)
