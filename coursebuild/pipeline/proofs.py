@@ -40,12 +40,8 @@ from coursebuild.report.values import plural
 Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "block", "link"]
 KIND = "proofs"
 """That of entries of the store: what was proved of a document, by the hash of its path."""
-
-
 _OPAQUE = re.compile(r"[A-Za-z][\w+.-]*:(?!//)")
 """An address that nothing looks up, as `mailto:` and a misspelt `lesson:`."""
-
-
 _FENCE = re.compile(r"(?:`{3,}|~{3,})[ ]*(?P<word>[\w-]+)")
 _TRIED = frozenset(("lab", "exercise"))
 """Blocks that are proved by a trial."""

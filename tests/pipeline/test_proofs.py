@@ -17,6 +17,18 @@ LESSON = (
 """An output and two values."""
 
 
+def assert_told(make: Make, lesson: str, old: str, new: str, remark: str) -> None:
+    """Check a right lesson, change it, and check that a remark comes of it; if empty, none."""
+    folder = make(lesson)
+    result = folder.main("check")
+    assert result.status == 0, result.out
+    assert "is not now" not in result.out
+    folder.write(folder.lesson(1), lesson.replace(old, new))
+    out = folder.main("check").out
+    assert remark in out
+    assert ("is not now" in out) is bool(remark)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "remark"),
     [
@@ -36,13 +48,7 @@ LESSON = (
 def test_a_value_that_is_bound_no_longer_is_told(
     make: Make, old: str, new: str, remark: str
 ) -> None:
-    folder = make(LESSON)
-    assert "is not now" not in folder.main("check").out
-    folder.write(folder.lesson(1), LESSON.replace(old, new))
-    result = folder.main("check")
-    assert result.status == 0, result.out
-    assert remark in result.out
-    assert ("is not now" in result.out) is bool(remark)
+    assert_told(make, LESSON, old, new, remark)
 
 
 def test_an_output_that_became_an_illustration_is_told_once(make: Make) -> None:
@@ -99,12 +105,7 @@ def test_a_table_without_its_caption_is_told(make: Make) -> None:
 )
 def test_a_link_that_became_text_is_told(make: Make, old: str, new: str, remark: str) -> None:
     lesson = "## Fall\n\nAs [there](#fall).\n"
-    folder = make(lesson)
-    assert folder.main("check").status == 0
-    folder.write(folder.lesson(1), lesson.replace(old, new))
-    out = folder.main("check").out
-    assert remark in out
-    assert ("is not now" in out) is bool(remark)
+    assert_told(make, lesson, old, new, remark)
 
 
 @pytest.mark.parametrize(
@@ -122,9 +123,4 @@ def test_a_block_whose_word_is_misspelt_is_told(
     question = '{"kind": "numeric", "id": "a", "q": "One and one?", "answer": 2, "tol": 0.1}'
     quiz = f'```quiz\n{{"id": "1.1-q", "title": "Q", "questions": [\n{question}]}}\n```\n\n'
     lesson = f"## Sums\n\n{quiz}```mjcf\n<mujoco/>\n```\n"
-    folder = make(lesson)
-    assert folder.main("check").status == 0, folder.main("check").out
-    folder.write(folder.lesson(1), lesson.replace(old, new))
-    out = folder.main("check").out
-    assert remark in out
-    assert ("is not now" in out) is bool(remark)
+    assert_told(make, lesson, old, new, remark)
