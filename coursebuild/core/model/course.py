@@ -346,8 +346,7 @@ class Course(Struct, frozen=True):
     names: tuple[str, ...] = ()
     """Inline code that names nothing which is known; `*` and `?` stand for anything."""
     references: Mapping[str, Struct] = {}
-    """What features read of the environment of the scripts (`Feature.reference`), by their names.
-    """
+    """What features read of the scripts' environment (`Feature.reference`), by their names."""
     id: str = ""
     """A name for the course that stays when its title changes; see `key`."""
     width: int = 0
@@ -374,22 +373,20 @@ class Course(Struct, frozen=True):
     def key(self) -> str:
         """The key of progress in readers' browsers: the id, or a text made from the title."""
         words = re.findall(r"[a-z0-9]+", self.title.lower())
-        digest = key_of(self.title)[:8]
-        return self.id or "-".join((*words, digest))
+        return self.id or "-".join((*words, key_of(self.title)[:8]))
 
     def comparison_of(self, recording: Recording) -> Comparison:
         """How a recorded output is compared."""
         comparison = recording.comparison or self.comparison
         return replace(comparison, course_filters=self.filters)
 
-    def language_of(self, owner: Owner) -> str:
-        """The language of a lesson or page."""
-        return owner.language or self.language
+    def language_of(self, owner: Owner | None) -> str:
+        """The language of a lesson or page, or of the course's own texts."""
+        return (owner.language if owner is not None else "") or self.language
 
     def words_of(self, owner: Owner | None) -> Words:
         """The words by which a text is read; one that the map does not name is as the course."""
-        language = self.language if owner is None else self.language_of(owner)
-        return self.words.get(language, ENGLISH)
+        return self.words.get(self.language_of(owner), ENGLISH)
 
     @property
     def callout_names(self) -> frozenset[str]:
@@ -428,18 +425,21 @@ class Course(Struct, frozen=True):
 
     @property
     def documents(self) -> tuple[Document, ...]:
+        """Every parsed document: lessons, then pages."""
         return tuple(document for _, document in self.owned_documents)
 
     @property
     def shown_texts(self) -> tuple[tuple[str, Document], ...]:
         """Every text that shows what scripts print, with the id of its lesson or page."""
         texts = [(owner.id, document) for owner, document in self.owned_documents]
-        if numbers := self.bound_numbers:
-            groups = [[o for o in self.owners if o.span.contains(n.span)] for n in numbers]
-            commas = ["," in self.words_of(next(iter(g), None)).decimal for g in groups]
-            numbers = tuple(map(lambda n, c: replace(n, comma=c), numbers, commas))
+        if numbers := tuple(map(self._in_its_language, self.bound_numbers)):
             texts.append(("", Document(self.map, (Paragraph(self.map.span(), numbers),), ())))
         return tuple(texts)
+
+    def _in_its_language(self, number: NumberBinding) -> NumberBinding:
+        """A number of the map, with the decimal sign of the lesson of which it is said."""
+        owner = next((o for o in self.owners if o.span.contains(number.span)), None)
+        return replace(number, comma="," in self.words_of(owner).decimal)
 
     @property
     def sources(self) -> tuple[Source, ...]:
