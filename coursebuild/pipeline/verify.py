@@ -94,14 +94,13 @@ def verify(
 
     `static`: with the static forms of labs, which only a build needs. `repeat`: what is recorded
     from a script's only run must be borne out by another, now. `addresses`: where shown values
-    held before, besides what is remembered; it gets where they hold now. A preview has
+    held before, besides what is remembered. A preview has
     `known_runs`, by path, that are known to hold, and `other_runs` of the same scripts, and repeats
     nothing here. `imports`: the modules that scripts import, by path, as far as they are known.
     """
     options.store.listen(options.progress.say)
     options = options.for_course(course)
-    addresses = {} if addresses is None else addresses
-    addresses |= known_addresses(course.records) | addresses
+    addresses = known_addresses(course.records) | (addresses or {})
     is_preview = known_runs is not None
     # A preview holds the lock for no longer, so that other commands need not wait for its scripts.
     with project_lock(options.root) if is_preview else contextlib.nullcontext():

@@ -10,7 +10,7 @@ import base64
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from operator import attrgetter
 from typing import Any
 
@@ -27,7 +27,7 @@ from coursebuild.core.model import (
     output_numbers,
 )
 from coursebuild.core.model.addresses import recorded_figures
-from coursebuild.core.model.lesson_record import LessonRecord
+from coursebuild.core.model.lesson_record import Addresses, LessonRecord
 from coursebuild.core.model.results import ScriptRun, Verdict
 from coursebuild.core.pages.library import Library
 from coursebuild.core.scripts.bindings import check_bindings, update_outputs
@@ -141,13 +141,16 @@ def changes_of(
     ]
     changes += drawings
     with session.condition:
-        reworded = _reword_addresses(session, edits)
-        return [*changes, *_change_records(session, changes, reworded)]
+        addresses = dict(session.runs.addresses)
+        reworded = _reword_addresses(session, edits, addresses)
+        changes += _change_records(session, changes, reworded, addresses)
+        session.runs.addresses = addresses
+    return changes
 
 
-def _reword_addresses(session: Session, edits: Iterable[Edit]) -> set[str]:
-    """The lessons with addresses that the outputs which these edits record call otherwise."""
-    library, addresses = session.library, session.runs.addresses
+def _reword_addresses(session: Session, edits: Iterable[Edit], addresses: Addresses) -> set[str]:
+    """Change addresses that the outputs which these edits record call otherwise; return lessons."""
+    library = session.library
     if library is None:
         return set()
     results = library.results
@@ -165,10 +168,13 @@ def _reword_addresses(session: Session, edits: Iterable[Edit]) -> set[str]:
 
 
 def _change_records(
-    session: Session, changes: Sequence[FileChange], reworded: Collection[str]
+    session: Session,
+    changes: Iterable[FileChange],
+    reworded: Collection[str],
+    addresses: Addresses,
 ) -> Iterator[FileChange]:
     """Change the records of lessons in which these changes record something, and of `reworded`."""
-    library, addresses = session.library, session.runs.addresses
+    library = session.library
     new_files = {change.path: change.new for change in changes}
     for owner, document in () if library is None else library.course.owned_documents:
         figures = {figure.path for figure in recorded_figures(document)}

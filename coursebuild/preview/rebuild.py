@@ -23,6 +23,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
+from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.run.script_server import RunAll, RunStoppedError, ScriptServer
 from coursebuild.core.scripts.extract import extract
 from coursebuild.core.scripts.noise_warnings import noise_warnings
@@ -184,6 +185,9 @@ class BackgroundRebuild:
         with session.condition:
             is_all_due, session.runs.is_all_due = session.runs.is_all_due, False
             known_runs = {} if is_all_due else session.runs.known_runs(course)
+            # What is accepted while scripts run may be called otherwise from then on.
+            addresses = known_addresses(course.records) | session.runs.addresses
+            session.runs.addresses = addresses
             if is_all_due:  # what else was printed may have been so for another reason
                 session.runs.repeats.clear()
         keys = script_keys(course)
@@ -198,7 +202,7 @@ class BackgroundRebuild:
                 course,
                 options,
                 static=True,
-                addresses=session.runs.addresses,
+                addresses=addresses,
                 known_runs=known_runs,
                 other_runs=session.runs.other_runs(),
             )
@@ -208,7 +212,7 @@ class BackgroundRebuild:
         finally:
             session.runs.running.clear()
         self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once
-        session.take_results(course, verification)
+        session.take_results(course, verification, addresses)
         with contextlib.suppress(RunStoppedError):  # they would have to run anew
             self._find_noise(course, _refuse_runs)
 

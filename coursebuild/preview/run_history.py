@@ -51,7 +51,8 @@ class RunHistory:
         self.noise: tuple[Diagnostic, ...] = ()
         """Recorded digits that do not hold, of scripts whose initial states were moved."""
         self.addresses: Addresses = {}
-        """Where shown values held last, also before an output was accepted."""
+        """Where shown values held last, also before an output was accepted; replaced, not changed,
+        since a verification begins with them and goes on meanwhile."""
         self.running: dict[str, tuple[float, float | None]] = {}
         """The scripts that run now, by path: when each began, in seconds since 1970, and how long
         it took the last time."""
@@ -62,8 +63,20 @@ class RunHistory:
         runs = tuple(run for path, (key, run) in self._runs.items() if keys.get(path) == key)
         return replace(self.last_results, runs=runs, verdicts=compare(course, runs, self.addresses))
 
-    def take(self, course: Course, verification: Verification, trials: PublishedTrials) -> None:
-        """Take the results of verifying a course."""
+    def take(
+        self,
+        course: Course,
+        verification: Verification,
+        trials: PublishedTrials,
+        known_addresses: Addresses,
+    ) -> None:
+        """Take the results of verifying a course, which began with these addresses.
+
+        An output may have been accepted since, with other words: these stay.
+        """
+        is_accepted_since = self.addresses is not known_addresses
+        newer = self.addresses if is_accepted_since else {}
+        self.addresses = verification.addresses | newer
         self.course, self.diagnostics = course, verification.diagnostics
         self.script_lines, self.trial_lines = verification.scripts, verification.labs
         self.last_results, self.trials = verification.results, trials

@@ -20,6 +20,7 @@ from coursebuild.core.checks.links import LinkTargets, link_targets
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.resources import Bundle, prepared_folder, template_texts
 from coursebuild.core.model import Course, Document, Lesson, Owner, Page
+from coursebuild.core.model.lesson_record import Addresses
 from coursebuild.core.model.results import Reports, ScriptRun
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
@@ -305,13 +306,15 @@ class Session:
 
     # --- the results of background work
 
-    def take_results(self, course: Course, verification: Verification) -> None:
-        """Take the results of verifying a course."""
+    def take_results(
+        self, course: Course, verification: Verification, known_addresses: Addresses
+    ) -> None:
+        """Take the results of verifying a course; see `RunHistory.take`."""
         results, trials = verification.results, self.runs.trials
         if results.trials != self.runs.last_results.trials:
             trials = publish_trials(results, self._assets)
         with self.condition:
-            self.runs.take(course, verification, trials)
+            self.runs.take(course, verification, trials, known_addresses)
             if self.course is not None:
                 self._show(self.course)
             self.notify()

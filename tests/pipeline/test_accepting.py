@@ -192,7 +192,24 @@ def test_one_click_accepts_an_output_and_all_numbers_at_their_addresses(make: Ma
     assert folder.text(folder.lesson(2)) == again
 
 
-def test_other_words_around_the_same_numbers_keep_every_address(make: Make) -> None:
+HESITANT = """
+import sys, threading, time
+from coursebuild.cli import main
+from coursebuild.core.scripts import bindings
+check = bindings._check
+def check_late(bound):
+    result = check(bound)
+    if threading.current_thread() is threading.main_thread():
+        time.sleep(0.3)
+    return result
+bindings._check = check_late
+sys.exit(main(sys.argv[1:]))
+"""
+"""The command with a pause between looking a value up and remembering where it is printed."""
+
+
+@pytest.mark.parametrize("command", ["", HESITANT], ids=["", "while judged"])
+def test_other_words_around_the_same_numbers_keep_every_address(make: Make, command: str) -> None:
     """Accepted in one lesson, of whose script another shows a number; then updated."""
     code = "print('period', 2.95, 's')\nprint('half', 2.95, 's')"
     prose = '`2.950 s`{out="period"} and `2.950`{out="half"}\n'
@@ -204,7 +221,7 @@ def test_other_words_around_the_same_numbers_keep_every_address(make: Make) -> N
     folder.write(folder.lesson(2), plain)  # the words are known from now on by the record
     folder.replace(folder.lesson(), prose, re.sub('="[a-z]+"', "", prose))
     folder.replace(folder.lesson(), "'period'", "'whole'")
-    with serve_preview(folder) as preview, preview.events() as events:
+    with serve_preview(folder, code=command) as preview, preview.events() as events:
         events.until(lambda page: any(o.get("offer") for o in page.news["outputs"]))
         assert preview.accept_offer(events.news["outputs"][0]["offer"]) == (200, {"message": ""})
         events.wait_until_settled()
