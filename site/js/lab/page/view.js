@@ -31,7 +31,10 @@ export class View {
     this.still = h('canvas', { class: 'lab-still', role: 'img', 'aria-label': label })
     this.element = h('div', { class: 'lab-view', tabIndex: 0, role: 'group', 'aria-label': name }, this.still)
     this.poster = poster === null ? null : h('img', { class: 'lab-poster', src: poster.src, alt: '' })
-    if (this.poster !== null) this.element.append(this.poster)
+    if (this.poster !== null) {
+      this.poster.style.setProperty('--ratio', Number(poster.getAttribute('width')) / Number(poster.getAttribute('height')))
+      this.element.append(this.poster)
+    }
     this.scale = new ScaleBar(words)
     this.element.style.setProperty('--height', height)
     this.lens = new PerspectiveCamera()
