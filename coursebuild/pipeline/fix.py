@@ -29,7 +29,7 @@ from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge, list_unproven, read_and_verify
 from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
-from coursebuild.pipeline.outputs import changed_text
+from coursebuild.pipeline.outputs import DOUBTFUL, changed_text
 from coursebuild.pipeline.reader import Reader
 from coursebuild.report import Report
 from coursebuild.report.text import location
@@ -37,8 +37,6 @@ from coursebuild.report.values import plural
 
 _ROUNDS = 20
 """How often fixes may lead to further ones."""
-_DOUBTFUL = ("file-encoding", "merge-conflict")
-"""Rules of files whose text is not what they hold, or not one text."""
 _HIDING = frozenset(
     """
     map-syntax json-syntax toml-syntax fence-unclosed fence-info fence-key-unknown
@@ -242,7 +240,7 @@ class _Fixer:
 
     def _candidates(self, diagnostics: Collection[Diagnostic]) -> list[Diagnostic]:
         """The diagnostics with edits that may be made and were not tried."""
-        doubtful = {d.span.path for d in diagnostics if d.rule in _DOUBTFUL}
+        doubtful = {d.span.path for d in diagnostics if d.rule in DOUBTFUL}
         return [
             d
             for d in diagnostics

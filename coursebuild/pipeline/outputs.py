@@ -61,6 +61,8 @@ from coursebuild.pipeline.scripts import (
 )
 from coursebuild.report import UNASKED, Report, ScriptLine
 
+DOUBTFUL = ("file-encoding", "merge-conflict")
+"""Rules of files whose text is not what they hold, or not one text."""
 _DRIFTS = ("output-drift", "figure-drift")
 
 
@@ -193,8 +195,7 @@ class _Updater:
         root, verb = self.options.root, "would update" if self.dry_run else "updated"
         remarks: list[str] = []
         failures: list[Diagnostic] = []
-        doubtful = ("file-encoding", "merge-conflict")
-        doubtful_paths = {d.span.path for d in self.diagnostics if d.rule in doubtful}
+        doubtful_paths = {d.span.path for d in self.diagnostics if d.rule in DOUBTFUL}
         parts = [d for d in self.diagnostics if d.rule == "source-part"]
         stale = [d for d in parts if self.documents is None or d.span.path in self.documents]
         all_edits = [*edits, *(edit for d in stale for edit in d.edits)]

@@ -190,15 +190,9 @@ def write_figures(
 ) -> tuple[list[str], list[Diagnostic]]:
     """Write the drawings that differ from the recorded ones; a remark for each, and failures."""
     by_path = {run.path: run for run in runs if run.outcome is Outcome.OK}
-    owner_records = [
-        (figure, course.records.get(document.source.path, LessonRecord()))
-        for document in course.documents
-        if documents is None or document.source.path in documents
-        for figure in recorded_figures(document)
-    ]
     remarks: list[str] = []
     failures: list[Diagnostic] = []
-    for figure, record in owner_records:
+    for figure in find_figures(course, documents):
         run = by_path.get(figure.script)
         data = dict(run.figures).get(figure.name) if run is not None else None
         drawing = prepare_figure(figure.name, data) if data is not None else ""
@@ -206,7 +200,8 @@ def write_figures(
         if run is None or isinstance(drawing, str):
             continue
         if recorded is not None:
-            _, wording = figure_difference(figure, run, recorded, drawing, record)
+            lesson_record = course.records.get(figure.span.path, LessonRecord())
+            _, wording = figure_difference(figure, run, recorded, drawing, lesson_record)
             lacks_data = read_figure_data(recorded) is None
             if not wording and not (lacks_data and read_figure_data(drawing) is not None):
                 continue

@@ -17,7 +17,7 @@ from coursebuild.core.files.errors import OutsideProjectError
 from coursebuild.core.files.examples import BlockedFile, ExamplesReport, Obstacle, write_examples
 from coursebuild.core.files.write import remove_leftovers
 from coursebuild.core.model import Course, Mode, Recording, Table, find_blocks
-from coursebuild.core.model.addresses import RecordedFigure, recorded_figures
+from coursebuild.core.model.addresses import RecordedFigure
 from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdict
 from coursebuild.core.run.dependencies import Inputs
@@ -188,10 +188,9 @@ class _Records:
         for recording in recorded_outputs(course):
             self._outputs.setdefault(recording.script or "", []).append(recording)
         self._figures: dict[str, list[tuple[RecordedFigure, LessonRecord]]] = {}
-        for document in course.documents:
-            record = course.records.get(document.source.path, LessonRecord())
-            for figure in recorded_figures(document):
-                self._figures.setdefault(figure.script, []).append((figure, record))
+        for figure in find_figures(course, None):
+            record = course.records.get(figure.span.path, LessonRecord())
+            self._figures.setdefault(figure.script, []).append((figure, record))
 
     def is_blank(self, path: str) -> bool:
         """Whether there is a place for what a script gives, and nothing in any such place."""

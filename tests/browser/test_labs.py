@@ -294,21 +294,26 @@ def test_pointer_on_a_curve_sets_the_time_and_curves_are_downloaded(
     expect(swing.get_by_role("button", name="Keep this run")).to_be_visible()
 
 
+def _places(view: Locator) -> tuple[tuple[float, float], ...]:
+    """Where the rod's end is drawn, at 2.5 rad from below, where it would hang, and a corner."""
+    view.scroll_into_view_if_needed()
+    box = view.bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    scale = box["height"] / (2 * 2.5 * np.tan(np.pi / 8))
+    end = (x - 0.4 * np.sin(2.5) * scale, y + 0.4 * np.cos(2.5) * scale)
+    return end, (x, y + 0.45 * scale), (box["x"] + 20, box["y"] + 20)
+
+
 def test_body_is_pulled_by_a_spring(lesson: Lesson, swing: Locator) -> None:
     page = lesson.page
     swing.get_by_label("gravity").fill("0")
     view = swing.locator(".lab-view")
-    view.scroll_into_view_if_needed()
-    box = view.bounding_box()
-    assert box is not None
-    # The rod at 2.5 rad from below: its end is up and to one side of the middle of the picture.
-    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    scale = box["height"] / (2 * 2.5 * np.tan(np.pi / 8))
-    end = (middle[0] - 0.4 * np.sin(2.5) * scale, middle[1] + 0.4 * np.cos(2.5) * scale)
+    end, below, _ = _places(view)
     page.mouse.move(*end)
     page.keyboard.down("Control")
     page.mouse.down()
-    page.mouse.move(middle[0], middle[1] + 0.45 * scale, steps=5)
+    page.mouse.move(*below, steps=5)
     page.keyboard.up("Control")
     view.press(" ")
 
@@ -330,26 +335,21 @@ def test_body_is_pulled_by_a_spring(lesson: Lesson, swing: Locator) -> None:
 def test_body_of_a_paused_lab_is_moved_by_the_hand_alone(lesson: Lesson, swing: Locator) -> None:
     page = lesson.page
     view = swing.locator(".lab-view")
-    view.scroll_into_view_if_needed()
-    box = view.bounding_box()
-    assert box is not None
-    middle = (box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    scale = box["height"] / (2 * 2.5 * np.tan(np.pi / 8))
-    end = (middle[0] - 0.4 * np.sin(2.5) * scale, middle[1] + 0.4 * np.cos(2.5) * scale)
+    end, below, corner = _places(view)
     hand = swing.get_by_role("button", name="Grab bodies")
     hand.click()
     expect(hand).to_have_attribute("aria-pressed", "true")
     page.mouse.move(*end)
     page.mouse.down()
-    page.mouse.move(middle[0], middle[1] + 0.45 * scale, steps=3)
+    page.mouse.move(*below, steps=3)
     page.mouse.up()
     wait_for_condition(page, lambda: abs(float(readout(swing, "angle"))) < 0.1)
     expect(swing.locator(".lab-time")).to_have_text(re.compile(r"^0\.00"))
     expect(swing).to_have_attribute("data-state", "paused")
     before = wait_until_still(page, view)
-    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.mouse.move(*corner)
     page.mouse.down()
-    page.mouse.move(box["x"] + 60, box["y"] + 20)
+    page.mouse.move(corner[0] + 40, corner[1])
     page.mouse.up()
     wait_for_change(page, view, before)  # where nothing is, the hand turns the view
     view.press("0")

@@ -21,11 +21,7 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Limits
 from coursebuild.core.run import gate
 from coursebuild.core.run.sandbox import Sandbox
-from coursebuild.core.run.script_environment import (
-    Interpreter,
-    clean_environment,
-    conditions,
-)
+from coursebuild.core.run.script_environment import Interpreter, clean_environment, conditions
 from coursebuild.core.values import fingerprint
 
 _PROGRAM = Path(__file__).with_name("alone_main.py")
@@ -125,9 +121,8 @@ class Runner(Struct, frozen=True):
         except TimeoutError as error:
             return AloneRun(str(error), "")
         output = completed.output.decode("utf-8", "backslashreplace").replace("\r\n", "\n")
-        printed, *rest = output.split(
-            mark
-        )  # each copy of the process that comes to its end has one
+        # Each copy of the process that comes to its end writes the mark.
+        printed, *rest = output.split(mark)
         kept_back = "".join(rest)
         failure = ""
         if completed.status:

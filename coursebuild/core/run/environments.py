@@ -294,22 +294,9 @@ def _install(new: Path, environment: Environment, requirements: Sequence[str]) -
         if status:
             raise _install_error(environment.engine, output)
         with contextlib.suppress(FileNotFoundError):
-            for item in msgspec.json.decode(report.read_bytes(), type=_PipReport).install:
-                info = item.download_info
-                yield f"{info.url} {info.archive_info.get('hash', '')}".strip()
-
-
-class _Download(Struct):
-    url: str
-    archive_info: dict[str, object] = {}
-
-
-class _Installed(Struct):
-    download_info: _Download
-
-
-class _PipReport(Struct):
-    install: list[_Installed]
+            for item in msgspec.json.decode(report.read_bytes())["install"]:
+                info = item["download_info"]
+                yield f"{info['url']} {info.get('archive_info', {}).get('hash', '')}".strip()
 
 
 def _install_error(engine: str, output: str) -> EffectError:

@@ -186,16 +186,14 @@ def _build_script(
         message = f"the arguments cannot be split: {str(error).lower()}"
         place = keys.place("args") or fence.head
         diagnostics.append(diagnose("fence-key-value", place, message))
-    record = keys.get("record")
-    if record is not None and record.value != "once":
-        message = f"`{record.value}` is not a way to record"
-        help = Fix("write `record=once`", "once")
-        diagnostics.append(diagnose("fence-key-value", record.value_span, message, help=help))
-    download = keys.get("download")
-    if download is not None and download.value != "zip":
-        message = f"`{download.value}` is not a way to hand a script over"
-        help = Fix("write `download=zip`, or nothing for one file", "zip")
-        diagnostics.append(diagnose("fence-key-value", download.value_span, message, help=help))
+    for key, only_value, use, help in (
+        ("record", "once", "record", "write `record=once`"),
+        ("download", "zip", "hand a script over", "write `download=zip`, or nothing for one file"),
+    ):
+        word = keys.get(key)
+        if word is not None and word.value != only_value:
+            message, fix = f"`{word.value}` is not a way to {use}", Fix(help, only_value)
+            diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=fix))
     figures = _read_list("figure", keys, diagnostics)
     show = _read_show(keys, diagnostics)
     if not has_path:
@@ -214,10 +212,10 @@ def _build_script(
         keys.get("diverges") is not None,
         keys.get("deep") is not None,
         tuple(writes),
-        once=record is not None,
+        once=keys.get("record") is not None,
         figures=tuple(FigureName(name.text, name.span()) for name in figures),
         show=show,
-        archive=download is not None,
+        archive=keys.get("download") is not None,
         language=fence.kind,
     )
 

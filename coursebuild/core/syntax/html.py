@@ -242,7 +242,7 @@ _STYLES = frozenset(
 )
 """Attributes whose value is CSS, or is read as such."""
 _STYLE = re.compile(r"(?>(?:(?!url|position)[^\\\"'@{}<>]|url\(#[\w-]+\))*)", re.IGNORECASE)
-_ADDRESSES = frozenset("cite href poster src srcset xlink:href".split())
+_ADDRESSES = _LINK_ATTRIBUTES | {"srcset"}
 """Attributes whose schemes and files are checked in every course."""
 
 _STRICT_ATTRIBUTE = r"""\s+([A-Za-z][A-Za-z0-9:_-]*)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?"""

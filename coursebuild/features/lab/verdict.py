@@ -299,11 +299,16 @@ class NameReference(Struct, frozen=True):
     """The place of all of it, brackets included."""
 
 
+def _written_pieces(lab: Lab) -> Iterator[tuple[LabCode, Excerpt]]:
+    """The pieces of code that the text of a lab holds, each with its place there."""
+    code = dict(lab.code)
+    return ((piece, code[piece.entry]) for piece in pieces(lab) if piece.entry in code)
+
+
 def references(lab: Lab) -> list[NameReference]:
     """List the names that the pieces of a lab use and do not declare themselves."""
-    code = dict(lab.code)
     names: list[NameReference] = []
-    for text in (code[piece.entry] for piece in pieces(lab) if piece.entry in code):
+    for _, text in _written_pieces(lab):
         nodes = list(walk(parse(text.text)))
         declared_names = _declared_names(nodes)
         for node in nodes:
@@ -332,9 +337,8 @@ def assignment_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
 
     Assigned to on purpose, a condition has parentheses of its own, as is the custom.
     """
-    code = dict(lab.code)
-    for piece in pieces(lab):
-        if piece.entry not in code or not _ASSIGNS.search(piece.code):
+    for piece, text in _written_pieces(lab):
+        if not _ASSIGNS.search(piece.code):
             continue
         nodes = list(walk(parse(piece.code)))
         declared_names = _declared_names(nodes)
@@ -358,7 +362,7 @@ def assignment_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
             name = "a condition" if is_condition else _entry_name(lab, piece.entry)
             message = f"{name} changes `{text_of(target)}`"
             operator = next((sign for sign in node.children if sign.type == "="), None)
-            place, help = _place_in(code[piece.entry], operator or node), "an expression only reads"
+            place, help = _place_in(text, operator or node), "an expression only reads"
             if operator is not None:
                 help = Fix("to compare, write `===`", "===")
             yield diagnose("lab-code", place, message, help=help)
@@ -367,9 +371,8 @@ def assignment_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
 def parameter_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
     """Report what is read from `ctx` though nothing sets it; nothing if `ctx` is used whole."""
     names = {getattr(control, "param", None) or "" for control in lab.fields.controls}
-    code, reads = dict(lab.code), list[tuple[Excerpt, Node]]()
-    for piece in (piece for piece in pieces(lab) if piece.entry in code):
-        text = code[piece.entry]
+    reads = list[tuple[Excerpt, Node]]()
+    for piece, text in _written_pieces(lab):
         for node in walk(parse(text.text)):
             if node.type != "identifier" or text_of(node) != "ctx":
                 continue

@@ -19,7 +19,6 @@ import msgspec
 from msgspec.structs import replace
 
 from coursebuild.api import Options, UsageError
-from coursebuild.core.files.errors import require
 from coursebuild.core.model.measurements import CaseReport, SceneReport
 from coursebuild.core.model.report_files import STABILITY, ReportFailure
 from coursebuild.core.model.scenarios import exact_file
@@ -69,26 +68,20 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, or check by measuring again."""
-    require("mjbench", "measure", "`coursebuild stability`")
     names = tuple(arguments.problems)
 
-    def measure(options: Options) -> Measurement[Any]:
-        with Mjbench(options.root, "`coursebuild stability`") as mjbench:
-            if arguments.check:
-                return check_stability(options, mjbench, names)
-            measurement = stability(options, mjbench, names, record=arguments.record)
-            return in_words(arguments, mjbench, "cases", measurement)
+    def measure(options: Options, mjbench: Mjbench) -> Measurement[Any]:
+        if arguments.check:
+            return check_stability(options, mjbench, names)
+        measurement = stability(options, mjbench, names, record=arguments.record)
+        return in_words(arguments, mjbench, "cases", measurement)
 
     def as_json(measurement: Measurement[Any]) -> str:
         if measurement.ok and not (arguments.record or arguments.check):
             return json_text(measurement.values)
         return measurement_json({"cases": measurement.values}, measurement)
 
-    return run_measurement(
-        arguments,
-        measure,
-        as_json,
-    )
+    return run_measurement(arguments, "stability", measure, as_json)
 
 
 def stability(
@@ -100,7 +93,7 @@ def stability(
     if built_in or not own_models:
         run = _CaseRun(options, mjbench)
         problems = _select_problems(options, run.facts.problems, built_in)
-        measurement = run.measure_each(problems, run.measure)
+        measurement = run.measure_each(problems)
         if record and not measurement.failures:
             measurement = _record(options, mjbench, run.facts.problems, measurement, names)
     if not own_models:
@@ -169,7 +162,7 @@ def check_stability(
         if isinstance(recorded, ReportFailure):
             measurement = Measurement((), failures=(recorded,))
         else:
-            measurement = run.measure_each(problems, run.measure)
+            measurement = run.measure_each(problems)
             new = {case.name for case in measurement.reports}
             old = [case for case in recorded if not built_in or case.name in new]
             engine = engine_version()
@@ -194,15 +187,12 @@ def check_stability(
 class _CaseRun(MeasuringRun[CaseReport]):
     """Measures hard cases one after the other."""
 
-    report_type = CaseReport
+    report_type, kind = CaseReport, "stability"
 
     def measure(self, name: str) -> bytes | None:
         """Report on a case; `None` where its references disagree."""
         return self.load_or_measure(
-            name,
-            "stability",
-            self._parts(name),
-            lambda: self.do_job("case", None, name=name),
+            name, self._parts(name), lambda: self.do_job("case", None, name=name)
         )
 
     def _parts(self, name: str) -> tuple[object, ...]:
@@ -210,7 +200,7 @@ class _CaseRun(MeasuringRun[CaseReport]):
 
     def tasks(self, name: str) -> Iterator[tuple[Any, ...]]:
         """The case, if it is not stored."""
-        if self.load("stability", self._parts(name), bytes) is None:
+        if self.load(self.kind, self._parts(name), bytes) is None:
             yield task_of("case", None, name=name)
 
 

@@ -18,7 +18,6 @@ from msgspec import Raw, Struct
 from msgspec.structs import replace
 
 from coursebuild.api import Diagnostic, Options, UsageError
-from coursebuild.core.files.errors import require
 from coursebuild.core.model.measurements import EngineReport, SceneReport
 from coursebuild.core.model.report_files import BENCH, ENGINES, ReportFailure
 from coursebuild.core.model.scenarios import DeclaredSweep, keyframe_scenarios
@@ -76,7 +75,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure models, or check their recorded reports."""
-    require("mjbench", "measure", "`coursebuild bench`")
     names, quick, record = tuple(arguments.scenes), arguments.quick, arguments.record
     if arguments.engines is not None:
         if arguments.check:
@@ -87,22 +85,20 @@ def run(arguments: argparse.Namespace) -> int:
             raise UsageError("--engines measures engines on this machine, not on others")
     report, field = ("bench", "scenes") if arguments.engines is None else ("engines", "engines")
 
-    def measure(options: Options) -> Measurement[Any]:
-        with Mjbench(options.root, "`coursebuild bench`") as mjbench:
-            if arguments.check:
-                return check(options, mjbench, names, quick=quick)
-            measurement: Measurement[Any]
-            if arguments.engines is None:
-                measurement = bench(options, mjbench, names, quick=quick, record=record)
-            else:
-                choice = choose_engines(mjbench, arguments.engines)
-                measurement = bench_engines(
-                    options, mjbench, names, choice, quick=quick, record=record
-                )
-            return in_words(arguments, mjbench, report, measurement)
+    def measure(options: Options, mjbench: Mjbench) -> Measurement[Any]:
+        if arguments.check:
+            return check(options, mjbench, names, quick=quick)
+        measurement: Measurement[Any]
+        if arguments.engines is None:
+            measurement = bench(options, mjbench, names, quick=quick, record=record)
+        else:
+            choice = choose_engines(mjbench, arguments.engines)
+            measurement = bench_engines(options, mjbench, names, choice, quick=quick, record=record)
+        return in_words(arguments, mjbench, report, measurement)
 
     return run_measurement(
         arguments,
+        "bench",
         measure,
         lambda measurement: measurement_json({field: measurement.values}, measurement),
         empty="there is no model to measure\n",
@@ -122,10 +118,10 @@ def bench(
         forbid_quick("--record", quick=quick)
     scenes = find_scenes(options.root, names)
     run = SceneRun(options, mjbench, scenes.diagnostics, quick=quick, cards=record)
-    measurement = run.measure_each(scenes.value, run.measure)
-    if not record:
-        return measurement
-    return record_reports(options.root, mjbench, BENCH, "bench", measurement)
+    measurement = run.measure_each(scenes.value)
+    if record:
+        return record_reports(options.root, mjbench, BENCH, "bench", measurement)
+    return measurement
 
 
 def check(
@@ -146,7 +142,7 @@ def check(
         else:
             recorded[scene.name] = report
     by_name = {scene.name: scene for scene in scenes.value if scene.name in recorded}
-    measurement = run.measure_each(tuple(by_name.values()), run.measure)
+    measurement = run.measure_each(tuple(by_name.values()))
     checks = []
     for report, value in zip(measurement.reports, measurement.values, strict=True):
         record, remarks = recorded[report.model], []
@@ -173,7 +169,7 @@ def check(
 class SceneRun(MeasuringRun[SceneReport]):
     """Measures scenes one after the other."""
 
-    report_type = SceneReport
+    report_type, kind = SceneReport, "bench"
 
     def __init__(
         self,
@@ -193,9 +189,7 @@ class SceneRun(MeasuringRun[SceneReport]):
     def measure(self, scene: CourseScene) -> bytes | None:
         """Report on a scene; `None` if it cannot be measured."""
         parts = self._parts(scene)
-        return self.load_or_measure(
-            scene.name, "bench", (*parts, self.cards), lambda: self._report(scene, parts), scene
-        )
+        return self.load_or_measure(scene, (*parts, self.cards), lambda: self._report(scene, parts))
 
     def _parts(self, scene: CourseScene) -> tuple[object, ...]:
         return scene.name, scene.digest, self.quick, self.code, self.facts.pinned
@@ -203,7 +197,7 @@ class SceneRun(MeasuringRun[SceneReport]):
     def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
         """The scenarios of a scene, and its sweeps in pieces, that are not stored."""
         parts = self._parts(scene)
-        if self.load("bench", (*parts, self.cards), bytes) is not None:
+        if self.load(self.kind, (*parts, self.cards), bytes) is not None:
             return
         for number in range(_scenario_count(scene)):
             if self.load("bench-scenarios", (*parts, number), tuple[bytes, ...]) is None:
@@ -309,7 +303,7 @@ def bench_engines(
     run = _EngineRun(options, mjbench, scenes.diagnostics)
     run.choice, run.quick = choice, quick
     run.remarks += choice.remarks
-    measurement = run.measure_each(scenes.value, run.measure)
+    measurement = run.measure_each(scenes.value)
     if not record:
         return measurement
     outcome = record_reports(options.root, mjbench, ENGINES, "engines", measurement)
@@ -319,7 +313,7 @@ def bench_engines(
 class _EngineRun(MeasuringRun[EngineReport]):
     """Measures scenes in engines, one after the other."""
 
-    report_type = EngineReport
+    report_type, kind = EngineReport, "bench-engines"
     choice: EngineChoice
     quick = False
 
@@ -329,9 +323,5 @@ class _EngineRun(MeasuringRun[EngineReport]):
         parts = (scene.name, scene.digest, self.quick, self.code, self.facts.machine, engines)
         names = [name for name, _ in engines]
         return self.load_or_measure(
-            scene.name,
-            "bench-engines",
-            parts,
-            lambda: self.mjbench.do("engines", scene, names=names, quick=self.quick),
-            scene,
+            scene, parts, lambda: self.mjbench.do("engines", scene, names=names, quick=self.quick)
         )

@@ -22,7 +22,6 @@ from msgspec import Raw, Struct
 from msgspec.structs import replace
 
 from coursebuild.api import Diagnostic, EffectError, Options, Store, UsageError
-from coursebuild.core.files.errors import require
 from coursebuild.core.files.read import read_course
 from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model.diet_findings import DietReport
@@ -75,32 +74,25 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Look at models, and mend them or record what was found."""
-    require("mjbench", "measure", "`coursebuild diet`")
     settings = {name: getattr(arguments, name) for name in ("quick", "fix", "record", "only")}
     names = tuple(arguments.models)
     quiet = arguments.quiet and arguments.format == "text"
 
-    def measure(options: Options) -> Measurement[DietReport]:
-        with Mjbench(options.root, "`coursebuild diet`") as mjbench:
-            measurement = diet(options, mjbench, names, **settings)
-            if quiet:
-                pairs = zip(measurement.reports, measurement.values, strict=True)
-                values = tuple(value for report, value in pairs if not report.ok)
-                reports = tuple(report for report in measurement.reports if not report.ok)
-                measurement = replace(measurement, reports=reports, values=values)
-                measurement = Measurement(()) if measurement.ok else measurement
-            return in_words(
-                arguments,
-                mjbench,
-                "diet",
-                measurement,
-                command="coursebuild diet {}",
-                declarations="models/{}.toml",
-            )
+    def measure(options: Options, mjbench: Mjbench) -> Measurement[DietReport]:
+        measurement = diet(options, mjbench, names, **settings)
+        if quiet:
+            pairs = zip(measurement.reports, measurement.values, strict=True)
+            values = tuple(value for report, value in pairs if not report.ok)
+            reports = tuple(report for report in measurement.reports if not report.ok)
+            measurement = replace(measurement, reports=reports, values=values)
+            measurement = Measurement(()) if measurement.ok else measurement
+        places = {"command": "coursebuild diet {}", "declarations": "models/{}.toml"}
+        return in_words(arguments, mjbench, "diet", measurement, **places)
 
     empty = "" if quiet else "there is no model to look at\n"
     return run_measurement(
         arguments,
+        "diet",
         measure,
         lambda measurement: measurement_json(diet_values(measurement), measurement),
         empty=empty,
@@ -132,10 +124,10 @@ def diet(
     scenes = find_scenes(options.root, names)
     run = _DietRun(options, mjbench, scenes.diagnostics, quick=quick, fix=fix)
     run.only = tuple(only)
-    measurement = run.measure_each(scenes.value, run.look_at)
-    if not record:
-        return measurement
-    return record_reports(options.root, mjbench, DIET, "diet", measurement)
+    measurement = run.measure_each(scenes.value)
+    if record:
+        return record_reports(options.root, mjbench, DIET, "diet", measurement)
+    return measurement
 
 
 class _Change(Struct, frozen=True):
@@ -156,7 +148,7 @@ class _DietRun(MeasuringRun[DietReport]):
 
     stage, success = "looking at models", "looked at"
     function = f"{__name__}:measure_part"
-    report_type = DietReport
+    report_type, kind = DietReport, "diet"
     only: tuple[str, ...] = ()
     """The kinds of findings that are looked for; all if none is named."""
 
@@ -175,18 +167,20 @@ class _DietRun(MeasuringRun[DietReport]):
         self.files = read_course(options.root).value
         self.course = load(options.root).value
 
-    def look_at(self, scene: CourseScene) -> bytes | None:
+    def measure(self, scene: CourseScene) -> bytes | None:
         """Report on a model; `None` if it cannot be looked at, or cannot be changed."""
-        model = DietModel(self.options.root, self.files, self.course, scene)
-        return self.load_or_measure(
-            scene.name, "diet", self._parts(model), lambda: self._report(model), scene
-        )
+        model = self.model_of(scene)
+        return self.load_or_measure(scene, self._parts(model), lambda: self._report(model))
 
     def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
         """The model, if no report on it is stored."""
-        model = DietModel(self.options.root, self.files, self.course, scene)
-        if not self.only and self.load("diet", self._parts(model), bytes) is None:
+        parts = self._parts(self.model_of(scene))
+        if not self.only and self.load(self.kind, parts, bytes) is None:
             yield self._task(scene)
+
+    def model_of(self, scene: CourseScene) -> DietModel:
+        """The model of a scene, with its files and readers."""
+        return DietModel(self.options.root, self.files, self.course, scene)
 
     def _task(self, scene: CourseScene) -> tuple[Any, ...]:
         return scene.name, scene.digest, self.quick, self.fix
@@ -240,7 +234,7 @@ class _DietRun(MeasuringRun[DietReport]):
         self.files = read_course(self.options.root).value
         self.course = load(self.options.root).value
         for scene in scenes.value:
-            return DietModel(self.options.root, self.files, self.course, scene)
+            return self.model_of(scene)
         self.diagnostics += scenes.diagnostics
         return None
 
@@ -311,7 +305,7 @@ def measure_part(root: Path, data: bytes) -> bytes:
         for scene in find_scenes(root, (name,)).value:
             if scene.digest != digest:  # its files have been edited meanwhile
                 return b""
-            model = DietModel(root, run.files, run.course, scene)
+            model = run.model_of(scene)
             files = {path: root / path for path in model.paths}
             before = {path: file.read_bytes() for path, file in files.items() if file.is_file()}
             try:

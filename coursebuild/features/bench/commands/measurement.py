@@ -167,7 +167,8 @@ def add_report_options(parser: argparse.ArgumentParser) -> None:
 
 def run_measurement(
     arguments: argparse.Namespace,
-    measure: Callable[[Options], Measurement[Any]],
+    command: str,
+    measure: Callable[[Options, Mjbench], Measurement[Any]],
     json: Callable[[Measurement[Any]], str],
     *,
     empty: str = "",
@@ -178,7 +179,8 @@ def run_measurement(
     """
     options = options_of(arguments)
     try:
-        measurement = measure(options)
+        with Mjbench(options.root, f"`coursebuild {command}`") as mjbench:
+            measurement = measure(options, mjbench)
     finally:
         options.store.close()
     status = CLEAN if measurement.ok else FAILURE
@@ -232,6 +234,8 @@ class MeasuringRun(Generic[_T]):
     function = f"{__name__}:do_task"
     """Measures a task in another process: `module:name`, as in `Executor.map`."""
     report_type: type[_T]
+    kind: str
+    """That of the entries of the store which hold reports."""
 
     def __init__(
         self,
@@ -263,16 +267,14 @@ class MeasuringRun(Generic[_T]):
         """The code on which reports depend: mjbench's, and what exact motions may import."""
         return self.facts.code, code_digest("mjcourse/spatial")
 
-    def measure_each(
-        self, things: Sequence[_A], measure: Callable[[_A], bytes | None]
-    ) -> Measurement[_T]:
+    def measure_each(self, things: Sequence[Any]) -> Measurement[_T]:
         """Measure each thing, and collect the reports."""
         reports: list[bytes | None] = []
         if things:
             with self.progress.stage(self.stage, len(things)):
                 if self.options.executor is not None:
                     self._measure_elsewhere(self.options.executor, things)
-                reports = [measure(thing) for thing in things]
+                reports = [self.measure(thing) for thing in things]
         present = [report for report in reports if report is not None]
         return Measurement(
             tuple(msgspec.json.decode(report, type=self.report_type) for report in present),
@@ -293,6 +295,10 @@ class MeasuringRun(Generic[_T]):
         if left := sum(not result for result in self.results.values()):
             self.progress.say(f"{left} of {plural(len(tasks), 'part')} can only be measured here")
 
+    def measure(self, thing: Any) -> bytes | None:
+        """Report on a thing, a scene or the name of a hard case; `None` if it cannot be."""
+        raise NotImplementedError
+
     def tasks(self, thing: Any) -> Iterable[tuple[Any, ...]]:
         """What there is to measure of a thing: jobs for `do_task`, each by plain values.
 
@@ -307,40 +313,38 @@ class MeasuringRun(Generic[_T]):
 
     def load_or_measure(
         self,
-        name: str,
-        kind: str,
+        thing: CourseScene | str,
         parts: tuple[object, ...],
         measure: Callable[[], bytes | None],
-        scene: CourseScene | None = None,
     ) -> bytes | None:
         """Load the report on a thing by all that it depends on, or measure the thing now."""
-        report = self.load(kind, parts, bytes)
+        report = self.load(self.kind, parts, bytes)
         if report is None:
             with project_lock(self.options.root, self.progress.say, name="bench-lock"):
                 # The run that held the lock may have measured it.
-                report = self.load(kind, parts, bytes)
+                report = self.load(self.kind, parts, bytes)
                 if report is None:
-                    report = self._measure(name, measure, scene)
+                    report = self._measure(thing, measure)
                     if report is not None:
-                        self.save(kind, parts, report)
+                        self.save(self.kind, parts, report)
                     return report
         self.progress.skip()
         return report
 
     def _measure(
-        self, name: str, measure: Callable[[], bytes | None], scene: CourseScene | None
+        self, thing: CourseScene | str, measure: Callable[[], bytes | None]
     ) -> bytes | None:
-        report = None
+        report, name = None, thing if isinstance(thing, str) else thing.name
         self.progress.start(name)
         self.mjbench.tell = functools.partial(self.progress.describe, name)
         start = time.monotonic()
         try:
             report = measure()
         except FailedJobError as error:
-            if scene is None:
+            if isinstance(thing, str):
                 self.failures.append(ReportFailure(str(error), error.failure.help))
             else:
-                self.diagnostics.append(diagnostic_of(error.failure, scene))
+                self.diagnostics.append(diagnostic_of(error.failure, thing))
         verdict = f"not {self.success}" if report is None else self.success
         self.progress.finish(name, verdict, time.monotonic() - start)
         return report

@@ -89,17 +89,11 @@ class _Line(Struct, frozen=True):
 class Mjbench:
     """The process, started with the first job."""
 
-    def __init__(
-        self,
-        root: Path,
-        purpose: str,
-        *,
-        tell: Callable[[str], None] = lambda text: None,
-        rerun: Callable[[Mapping[str, bytes]], str] = lambda files: "",
-    ) -> None:
-        """`purpose`: the command that needs it; `rerun`: names what prints something else."""
-        self.tell = tell
-        self.rerun = rerun
+    def __init__(self, root: Path, purpose: str) -> None:
+        """`purpose`: the command that needs it."""
+        self.tell: Callable[[str], None] = lambda text: None
+        self.rerun: Callable[[Mapping[str, bytes]], str] = lambda files: ""
+        """Names what prints something else with changed files."""
         self._root = root
         self._purpose = purpose
         self._scene: CourseScene | None = None
@@ -107,6 +101,7 @@ class Mjbench:
         self._errors: IO[bytes] | None = None
 
     def __enter__(self) -> Self:
+        require("mjbench", "measure", self._purpose)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -153,7 +148,6 @@ class Mjbench:
         return words or f"with status {status}"
 
     def _start(self) -> gate.Process:
-        require("mjbench", "measure", self._purpose)
         python_path = os.environ.get("PYTHONPATH", "")  # where the user has further packages
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  # it is closed with the process
         self._process = gate.start(

@@ -51,7 +51,9 @@ def context_fields(pieces: Iterable[str]) -> dict[str, str]:
     fields: dict[str, str] = {}
     statements = (statement for code in pieces for statement in js.parse_statements(code))
     for node in (node for statement in statements for node in js.walk(statement)):
-        if node.type == "assignment_expression" or _is_default(node):
+        is_augmented = node.type == "augmented_assignment_expression"
+        is_default = is_augmented and expressions.operator_of(node) == "??="
+        if node.type == "assignment_expression" or is_default:
             match js.dotted_name(js.field(node, "left")):
                 case ("ctx", name):
                     is_truth = js.field(node, "right").type in ("true", "false")
@@ -62,12 +64,6 @@ def context_fields(pieces: Iterable[str]) -> dict[str, str]:
         if keyword.iskeyword(name) or name.startswith("__") or not name.isidentifier():
             raise js.UntranslatableError(f"the name `ctx.{name}`")
     return dict(sorted(fields.items()))
-
-
-def _is_default(node: Node) -> bool:
-    """Whether a node is `name ??= value`."""
-    is_augmented = node.type == "augmented_assignment_expression"
-    return is_augmented and expressions.operator_of(node) == "??="
 
 
 class _Statements(expressions.Expressions):

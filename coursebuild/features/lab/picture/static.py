@@ -326,10 +326,8 @@ class _Frame(Struct, frozen=True):
         if len(run) == 1:
             t, v = run[0]
             if self.y.low <= v <= self.y.high:
-                yield from (
-                    f"M{self.x(t):.1f} {self.y(v):.1f}",
-                    "h0",
-                )  # round ends make a single point visible
+                yield f"M{self.x(t):.1f} {self.y(v):.1f}"
+                yield "h0"  # round ends make a single point visible
             return
         pen = False
         for (t0, v0), (t1, v1) in pairwise(run):

@@ -104,8 +104,8 @@ export class Desk extends Shell {
     this.charts.forEach((chart, i) => chart.set(this.samples.plots[i], ghost?.plots[i] ?? null))
     this.controls.show(values)
     if (this.result.failure !== null) {
-      const kind = { value: 'value', blowup: 'value' }[this.result.failure.kind] ?? this.result.failure.kind
-      const reason = words(`lab.live.ended_${kind}`)
+      const { kind } = this.result.failure
+      const reason = words(`lab.live.ended_${kind === 'blowup' ? 'value' : kind}`)
       notices.show(words('lab.live.ended', { place: this.textOf(this.result.end), reason }), 'warning')
     } else notices.clear()
     this.showPlace()

@@ -6,7 +6,7 @@
  * Nothing is sent anywhere. What is read is bounded, whatever a zip claims of itself.
  */
 
-import { LONGEST_MODEL } from './share.js'
+import { LONGEST_MODEL, pipe } from './share.js'
 
 export const MOST_BYTES = 64 << 20 // of all files, unpacked
 const MOST_FILES = 2000
@@ -127,16 +127,5 @@ async function unpack(bytes, view, entry, room) {
   if (data + size > bytes.length) throw new RangeError('cut off')
   const packed = bytes.subarray(data, data + size)
   if (method === STORED) return packed.slice()
-  const chunks = []
-  let length = 0
-  const reader = new Blob([packed]).stream().pipeThrough(new DecompressionStream('deflate-raw')).getReader()
-  for (let part = await reader.read(); !part.done; part = await reader.read()) {
-    chunks.push(part.value)
-    length += part.value.length
-    if (length > room) {
-      await reader.cancel()
-      throw new FilesError('file_large')
-    }
-  }
-  return new Uint8Array(await new Blob(chunks).arrayBuffer())
+  return pipe(packed, new DecompressionStream('deflate-raw'), room, new FilesError('file_large'))
 }

@@ -112,15 +112,18 @@ function isLog(value) {
   return value[1].length <= MOST_EVENTS && value[0].every((item) => item === null || isValue(item)) && value[1].every((event) => Array.isArray(event) && isEvent(event))
 }
 
-/** Deflate or inflate bytes by a stream. */
-async function pipe(bytes, stream) {
+/** Deflate or inflate bytes by a stream, to at most so many. */
+export async function pipe(bytes, stream, most = LARGEST, tooMuch = new RangeError('the link unfolds to too much')) {
   const chunks = []
   let size = 0
   const reader = new Blob([bytes]).stream().pipeThrough(stream).getReader()
   for (let part = await reader.read(); !part.done; part = await reader.read()) {
     chunks.push(part.value)
     size += part.value.length
-    if (size > LARGEST) throw new RangeError('the link unfolds to too much')
+    if (size > most) {
+      await reader.cancel()
+      throw tooMuch
+    }
   }
   return new Uint8Array(await new Blob(chunks).arrayBuffer())
 }

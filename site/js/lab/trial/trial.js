@@ -175,16 +175,16 @@ class Trial {
   }
 
   /** Do something with a fresh lab whose failures are known: they are not noted again, nor under another attempt. */
-  fresh(config, action) {
-    const { failures, reportedKeys } = this
-    const lab = new Lab(this.engine, this.bytes, config, this.code)
+  fresh(config, action, code = this.code) {
+    const { code: ownCode, failures, reportedKeys, during } = this
+    const lab = new Lab(this.engine, this.bytes, config, code)
     try {
-      Object.assign(this, { failures: [], reportedKeys: new Set() })
+      Object.assign(this, { code, failures: [], reportedKeys: new Set() })
       lab.start()
       return action(lab)
     } finally {
       lab.dispose()
-      Object.assign(this, { failures, reportedKeys })
+      Object.assign(this, { code: ownCode, failures, reportedKeys, during })
     }
   }
 
@@ -239,22 +239,16 @@ class Trial {
 
   /** The entry whose code changes what labs share, if it does so again. */
   findGuilty(action) {
-    const { code, failures, reportedKeys, during } = this
-    const watched = watchedCode(code, this.guard)
-    Object.assign(this, { code: watched.code, failures: [], reportedKeys: new Set() })
-    let lab = null
+    const { entry } = this.during
+    const watched = watchedCode(this.code, this.guard)
     try {
-      lab = new Lab(this.engine, this.bytes, this.config, this.code)
-      lab.start()
-      action(lab)
+      this.fresh(this.config, action, watched.code)
     } catch {
       // The watched code throws as soon as it is known.
     } finally {
       this.guard.repair()
-      lab?.dispose()
-      Object.assign(this, { code, failures, reportedKeys, during })
     }
-    return watched.entry() ?? during.entry
+    return watched.entry() ?? entry
   }
 
   /** Note divergence and warnings of the lab. */

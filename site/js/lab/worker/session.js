@@ -144,6 +144,13 @@ export class Session {
     if (play && !this.lab.interrupted) this.play()
   }
 
+  /** Begin another run, in which no time has passed yet. */
+  begin(action) {
+    action(this.lab)
+    this.clock.stop()
+    this.afterChange()
+  }
+
   /** After lab code has run: send the values of the controls, warnings and divergence. */
   afterChange() {
     this.stale = true
@@ -195,7 +202,7 @@ export class Session {
         steps += result.steps
         due -= result.steps
         this.adapt(this.now() - sliceStart, result.steps)
-        if (result.stopped !== null) this.stopAtEnd(result.stopped)
+        if (result.stopped === 'stopAt') this.stop('stopAt')
       }
       if (steps > 0) this.report()
     })
@@ -218,10 +225,6 @@ export class Session {
     if (steps < this.chunk) return
     if (took < CHUNK / 2) this.chunk = Math.min(2 * this.chunk, 1024)
     else if (took > CHUNK) this.chunk = Math.max(1, this.chunk >> 1)
-  }
-
-  stopAtEnd(reason) {
-    if (reason === 'stopAt') this.stop('stopAt')
   }
 
   /** Send a frame if something has changed and there is a buffer for it. */
@@ -268,11 +271,7 @@ const HANDLERS = {
     session.lab.tape.seek(time)
     session.afterChange()
   },
-  reset(session) {
-    session.lab.reset()
-    session.clock.stop()
-    session.afterChange()
-  },
+  reset: (session) => session.begin((lab) => lab.reset()),
   speed: (session, { factor }) => session.clock.setSpeed(factor),
   control: (session, { index, value, play }) => session.act((lab) => lab.setControl(index, value), play),
   press: (session, { index, play }) => session.act((lab) => lab.press(index), play),
@@ -285,11 +284,7 @@ const HANDLERS = {
     session.stale = true
   },
   actuate: (session, { index, value, play }) => session.act((lab) => lab.actuate(index, value), play),
-  keyframe(session, { index }) {
-    session.lab.startAt(index)
-    session.clock.stop()
-    session.afterChange()
-  },
+  keyframe: (session, { index }) => session.begin((lab) => lab.startAt(index)),
   overlay(session, { name, on }) {
     session.lab.pictures.setOverlay(name, on)
     session.stale = true
@@ -306,15 +301,9 @@ const HANDLERS = {
     session.report()
   },
   state: (session) => session.post('state', { state: session.lab.state() }),
-  restore(session, { state }) {
-    session.lab.restore(state)
-    session.clock.stop()
-    session.afterChange()
-  },
+  restore: (session, { state }) => session.begin((lab) => lab.restore(state)),
   replay(session, { log }) {
-    session.lab.replay(log)
-    session.clock.stop()
-    session.afterChange()
+    session.begin((lab) => lab.replay(log))
     session.play()
   },
 }
