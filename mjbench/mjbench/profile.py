@@ -18,10 +18,10 @@ import mujoco
 import numpy as np
 
 from mjbench.costs import inputs_of
-from mjbench.pilot import with_setting
 from mjbench.problem import Array, Inputs
 from mjbench.reports.scene_report import PhaseProfile, WorkPrecisionRow, step_evaluations
 from mjbench.scene import Scene
+from mjbench.settings import with_setting
 from mjbench.simulation import STATE, full_state, initial_data, silent
 
 _ROUNDS, _QUICK_ROUNDS = 12, 5

@@ -27,15 +27,7 @@ from mjbench.detector import driving_force
 from mjbench.judge import compared_rows
 from mjbench.measured_setting import Basis, measure_setting
 from mjbench.parts import Parts
-from mjbench.pilot import (
-    Pilot,
-    horizon_error,
-    nudges,
-    own_setting,
-    run_pilot,
-    settings,
-    with_setting,
-)
+from mjbench.pilot import Pilot, horizon_error, nudges, run_pilot
 from mjbench.profile import profile_rows
 from mjbench.reports import reach_bound, scene_report
 from mjbench.reports.shown_errors import (
@@ -45,6 +37,7 @@ from mjbench.reports.shown_errors import (
     solving_parts,
 )
 from mjbench.scene import Scene, SceneError
+from mjbench.settings import own_setting, settings, with_setting
 from mjbench.stability import stable_rows
 from mjbench.sweep import DrawnModel
 from mjbench.theory_figures import measure_expected

@@ -101,9 +101,21 @@ def test_a_scene_that_blows_up_under_its_own_setting() -> None:
     assert limits["discrete"] == "all"
 
 
+def test_a_scene_that_diverges_at_its_timesteps_is_measured_at_shorter_ones() -> None:
+    model = stiff(0.1, 0.01)
+    declared = parse_declared(f"{FROM_KEYFRAME}duration = 2\ntimesteps = [0.05]\n")
+    (scene,) = scenes(model, declared, quick=True)
+    report = measure_scenario(model, scene, quick=True, clock=None)
+    steps = {row.setting.timestep for row in report.rows}
+    assert steps == {0.1, 0.05, 0.00625, 0.003125}, "0.05 s over 8 is the first below 2/ω = 6.3 ms"
+    lost, sentence, limit, *_ = report.verdict.lines[1:]
+    assert lost == "it is lost" and "does not run under its own setting" in sentence
+    assert limit.startswith("Euler stays bounded at steps to 5.7"), "2/ω (10/11)"
+
+
 def test_a_scene_that_diverges_at_every_timestep_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"it diverges within .* s even under Euler at 250 ms"):
-        measure(stiff(1.0, 0.01), quick=True)
+    with pytest.raises(SceneError, match=r"it diverges within 1 ms even under Euler at 6.10352 µs"):
+        measure(stiff(0.1, 0.01, -1e8), f"{FROM_KEYFRAME}duration = 0.8\n", quick=True)
 
 
 def test_times_are_of_the_clock() -> None:
