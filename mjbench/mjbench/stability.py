@@ -39,7 +39,6 @@ from mjbench.problem import (
     STANDARD,
     Array,
     Integrator,
-    Limit,
     Problem,
     Setup,
 )
@@ -362,28 +361,18 @@ def stable_rows(
     scene = pilot.scene
     duration = scene.declaration.stable_for or scene.scenario.duration
     low, high = sorted(scene.declaration.search or [part * scene.timestep for part in _SEARCH])
-    limits = scene.declaration.limits
     setup_over = cache(partial(longer_setup, model, pilot))
     motion = kept_motion(model, pilot, reference)
     questions = ("astray", "through") if Passages(model).needed else ("astray",)
 
-    def declared_limit(integrator: Integrator) -> Limit | None:
-        step = limits.get(integrator.value)  # type: ignore[call-overload]
-        return None if step is None else Limit(step, "as the scenario declares")
-
     theory = parts.run(
         f"{scene.name}: theory of stability",
         lambda: (
-            Theory(declared_limit if limits else None)
+            Theory()
             if scene.scenario.loop is not None  # which no linearization of the engine knows
-            else find_theory(
-                model,
-                scene.scenario,
-                declared_limit if limits else None,
-                visits=partial(_comes_near, motion, model),
-            )
+            else find_theory(model, scene.scenario, visits=partial(_comes_near, motion, model))
         ),
-        Theory(declared_limit if limits else None),
+        Theory(),
     )
 
     def row(integrator: Integrator) -> StableRow | None:
