@@ -204,7 +204,7 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
             ("engine", [f"{r.title}, {r.bits} bits" if r.bits else r.title for r in rows]),
             ("device", [row.device for row in rows]),
             ("from MuJoCo", ["" if r.apart is None else f"{r.apart:.2g}" for r in rows]),
-            ("a step by number of worlds", costs),
+            ("a step of a world, by their number", costs),
             ("status", [_lost(row.status, (row.message,)) for row in rows]),
         ]
         lines += ["", f"  {style.strong(scenario.name)}: {scenario.title}"]
