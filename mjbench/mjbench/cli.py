@@ -188,9 +188,8 @@ def _source(file: Path, data: bytes) -> str:
 
     def folder(match: re.Match[str]) -> str:
         for parent in file.resolve().parents:
-            for place in (parent, parent / match[1]):
-                if place.name == match[1] and place.is_dir():
-                    return f"{place.as_posix()}/"
+            if (parent / match[1]).is_dir():
+                return f"{parent.as_posix()}/{match[1]}/"
         message = f"{file} takes files from the package `{match[1]}`, and no folder of that name"
         raise _UsageError(f"{message} lies beside it or above it: put the package there")
 
