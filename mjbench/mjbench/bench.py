@@ -122,6 +122,14 @@ class Subject(Struct, frozen=True):
             return mujoco.MjModel.from_binary_path(path)
         return mujoco.MjModel.from_xml_path(path, assets={path: self.mjcf.encode()})
 
+    def read_spec(self) -> Any:
+        """Its `MjSpec`; `None` where it has no source."""
+        if not self.path.endswith(".urdf"):
+            return None if self.is_binary else mujoco.MjSpec.from_file(self.file)
+        spec = mujoco.MjSpec.from_string(self.mjcf)  # which may name files by other paths
+        spec.modelfiledir = self.folder
+        return spec
+
 
 class CompiledModel(Struct, frozen=True):
     """A model, compiled in this process, with its scenarios."""
@@ -163,8 +171,7 @@ def compile_subject(
             replace(scene, exact=exact, scenario=replace(scene.scenario, loop=loop))
             for scene in found_scenes
         )
-        spec = None if subject.is_binary else mujoco.MjSpec.from_file(subject.file)
-        return CompiledModel(subject, model, declarations, found_scenes, spec)
+        return CompiledModel(subject, model, declarations, found_scenes, subject.read_spec())
 
 
 def _under_control(declarations: Declarations) -> Declarations:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import atexit
 import hashlib
+import re
 import runpy
 import shutil
 import sys
@@ -171,7 +172,7 @@ def read_subject(file: Path) -> Subject:
     return Subject(
         folder=str(folder),
         path=file.name,
-        mjcf="" if file.suffix == ".mjb" else data.decode("utf-8", "surrogatepass"),
+        mjcf="" if file.suffix == ".mjb" else _source(file, data),
         name=file.stem,
         digest=digest.hexdigest(),
         declarations_path=declarations.name if declarations.is_file() else "",
@@ -180,6 +181,20 @@ def read_subject(file: Path) -> Subject:
         parts=parts,
         fair=True,
     )
+
+
+def _source(file: Path, data: bytes) -> str:
+    """The text of a model; in URDF, packages are the folders of their names beside it or above."""
+
+    def folder(match: re.Match[str]) -> str:
+        for parent in file.resolve().parents:
+            if (parent / match[1]).is_dir():
+                return f"{parent.as_posix()}/{match[1]}/"
+        message = f"{file} takes files from the package `{match[1]}`, and no folder of that name"
+        raise _UsageError(f"{message} lies beside it or above it: put the package there")
+
+    text = data.decode("utf-8", "surrogatepass")
+    return re.sub(r"package://([^/\s\"'<>]+)/", folder, text) if file.suffix == ".urdf" else text
 
 
 def _dependencies(file: Path) -> list[Path]:

@@ -22,11 +22,11 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from mjbench.pilot import apply, with_setting
 from mjbench.problem import Array, Inputs, Scenario
 from mjbench.reports import Interval
 from mjbench.reports.scene_report import MeasuredSetting
 from mjbench.scene import Scene
+from mjbench.settings import apply, with_setting
 from mjbench.simulation import STATE, advance, full_state, initial_data, silent
 
 Clock: TypeAlias = Callable[[], int]

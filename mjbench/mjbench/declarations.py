@@ -22,7 +22,6 @@ Slug: TypeAlias = Annotated[str, Meta(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$")]
 Text: TypeAlias = Annotated[str, Meta(pattern=r"\S")]
 Deviation: TypeAlias = Annotated[str, Meta(pattern=r"^±\s*(?!0+(?:\.0+)?\s*%)\d+(?:\.\d+)?\s*%$")]
 """To both sides of the model's own value, as in `± 10 %`."""
-Integrator: TypeAlias = Literal["Euler", "implicit", "implicitfast", "RK4", "discrete"]
 Expected: TypeAlias = Literal[
     "restitution", "penetration", "slip", "crossing", "last", "largest", "smallest"
 ]
@@ -112,7 +111,6 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     reference: Annotated[str, Meta(pattern=r"^(ode|self|closed:\S.*)$")] | None = None
     conserved: tuple[Literal["energy", "angular-momentum"], ...] | None = None
     timesteps: tuple[Positive, ...] = ()
-    limits: dict[Integrator, Positive] = {}
     expected: dict[Expected, float] = {}
     precision: Positive | None = None
     room: Positive = 10.0

@@ -1,7 +1,7 @@
 """Whether a simulation went well: divergence never passes as success.
 
-1. MuJoCo resets a state that has become huge or no number, and carries on: a run that blew up can
-   end in its initial state, with no error at all. Only the warning counters and the clock tell.
+1. MuJoCo may reset a state that has become huge or no number, and carry on: a run that blew up can
+   end in its initial state, with no error at all. Only the warning counters tell.
 2. A slow growth raises no warning for a long time: the state is compared with what can be.
 3. A state may shoot up and come back: the peaks on the way count, not only the end.
 4. Bodies that go through each other raise no warning either. Depth alone is no loss: what is soft
@@ -49,8 +49,6 @@ class RunStatus(enum.Enum):
     """No warning, but the state left the range of what can be."""
     DIVERGED = "diverged"
     """MuJoCo warned of a huge acceleration, velocity or position, or the state is no number."""
-    RESET = "reset"
-    """MuJoCo put the state back to its beginning on the way: the end says nothing."""
 
 
 class RunJudgement(Struct, frozen=True):
@@ -139,14 +137,12 @@ def _larger(before: float, values: Array) -> float:
 
 
 def judge(
-    model: Any,
     data: Any,
-    elapsed: float,
     before: Peaks | None = None,
     setup: Setup = _UNBOUNDED,
     passages: Sequence[str] = (),
 ) -> RunJudgement:
-    """The worst status of a run that has ended after `elapsed` s, with every reason for it.
+    """The worst status of a run that has ended, with every reason for it.
 
     `before` holds the peaks on the way, `setup` the bounds, `passages` what went through what.
     """
@@ -156,9 +152,6 @@ def judge(
         symptoms.append((RunStatus.DIVERGED, "the state is not finite"))
     if bad := [subject for kind, subject in BAD_STATES.items() if data.warning[kind].number]:
         symptoms.append((RunStatus.DIVERGED, f"MuJoCo warned of bad {', '.join(bad)}"))
-    if not abs(data.time - elapsed) <= model.opt.timestep / 2:
-        text = f"the clock says {data.time:.6g} s after {elapsed:.6g} s: the state was reset"
-        symptoms.append((RunStatus.RESET, text))
     for size, bound, subject in (
         (peaks.position, setup.position_bound, "positions"),
         (peaks.velocity, setup.velocity_bound, "velocities"),

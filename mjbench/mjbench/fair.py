@@ -86,9 +86,9 @@ def _begin(model: Any) -> tuple[int | None, str, Any]:
     if names:
         number = names.index("home") if "home" in names else 0
         mujoco.mj_resetDataKeyframe(model, data, number)
-        data.ctrl[:] = _clip(model, data.ctrl)
-        return number, f"from the keyframe {names[number] or number}", data
     data.ctrl[:] = _clip(model, data.ctrl)
+    if names:
+        return number, f"from the keyframe {names[number] or number}", data
     variant = without_sleep(model)
     variant.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     steps = min(round(_SETTLING / float(model.opt.timestep)), MOST_STEPS)

@@ -316,6 +316,7 @@ def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> R
         return RowVerdict(False, None, None, text)
     better = min(candidates, key=lambda c: (c[0].error, c[0].cost.value, c[1]))[1]
     text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
+    text += _AS_FAR if min(p.error for p, _ in candidates) <= quantity.least else ""
     unseen = [(p.cost.value, n) for p, n in candidates if (rows[n].seen or 0.0) < 1]
     cost, cheapest = min(unseen, default=(0.0, better))
     if cheapest != better:

@@ -41,10 +41,11 @@ from mjbench.measure import (
     quantity_name,
     visible_error,
 )
-from mjbench.pilot import CONES, NUDGE, Pilot, horizon_errors, position_distances
+from mjbench.pilot import NUDGE, Pilot, horizon_errors, position_distances
 from mjbench.problem import ROUNDING, Integrator, Setup, Sizes
 from mjbench.reports.scene_report import FLOORS
 from mjbench.scene import ExactMotion, Scene, SceneError
+from mjbench.settings import CONES
 from mjbench.simulation import (
     EngineStates,
     initial_data,

@@ -293,7 +293,7 @@ class Theory(Struct, frozen=True, eq=False):
 def find_theory(
     model: Any,
     scenario: Scenario,
-    formula: Callable[[Integrator], Limit | None] | None,
+    formula: Callable[[Integrator], Limit | None] | None = None,
     visits: Callable[[Array], bool] = lambda _: True,
 ) -> Theory:
     """What theory says of a scene at its rest.

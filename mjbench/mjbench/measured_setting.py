@@ -11,8 +11,9 @@ from msgspec import Struct
 from msgspec.structs import asdict, replace
 
 from mjbench import known_motion, measure, simulation
-from mjbench.pilot import Pilot, horizon_errors, position_distances, with_setting
+from mjbench.pilot import Pilot, horizon_errors, position_distances
 from mjbench.reports import scene_report
+from mjbench.settings import with_setting
 
 
 class Basis(Struct, frozen=True, eq=False):

@@ -1,4 +1,4 @@
-"""A first run of a scene in small steps: what acts in it, its bounds, and the settings to measure.
+"""A first run of a scene in small steps: what acts in it, and its bounds.
 
 1. Every step is observed: a contact, a limit that is reached or dry friction makes accelerations
    jump, so that errors need not follow a power of the timestep and no smooth integration applies.
@@ -7,10 +7,6 @@
    the horizon. The growth until there gives about the largest Lyapunov exponent.
 3. The largest positions, and the largest energy where nothing drives the motion, else velocity,
    give the bounds, with room for coarse timesteps.
-4. A setting is what can be chosen without changing the scene: every integrator at every timestep;
-   where a solver runs, also other solvers, fewer iterations and other options; where something
-   touches, also the other cone. These vary one at a time about the model's own, at its timestep and
-   at those beside it: the full product would take hours and say little more.
 """
 
 from __future__ import annotations
@@ -24,9 +20,16 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench import simulation
-from mjbench.detector import Passages, Peaks, driving_force, pair_names, thickness, update_peaks
-from mjbench.problem import STANDARD, Array, Integrator, Setup
-from mjbench.reports.scene_report import MeasuredSetting
+from mjbench.detector import (
+    Passages,
+    Peaks,
+    driving_force,
+    has_bad_state,
+    pair_names,
+    thickness,
+    update_peaks,
+)
+from mjbench.problem import Array, Integrator, Setup
 from mjbench.reports.shown_errors import seconds_text
 from mjbench.scene import Scene, SceneError
 
@@ -45,6 +48,10 @@ _EXCESS = 0.1
 """The share of the largest kinetic energy above what there can be, from which it is nonsense."""
 DEEPER = 1.25
 """How many times deeper than in small steps bodies may lie in each other."""
+_FINER = 8
+"""How many times shorter steps are in which not even RK4 damps what an integrator is lost with."""
+MOST_STEPS = 200_000
+"""The most steps of a motion whose timestep is searched for."""
 _PEAK_INTERVAL = 8
 """Steps from one look at how large the state is to the next."""
 
@@ -84,7 +91,42 @@ class Pilot(Struct, frozen=True):
 
 
 def run_pilot(model: Any, scene: Scene) -> Pilot:
-    """Run a scene at its shortest timestep; a `SceneError` says that it diverges even there."""
+    """Run a scene at its shortest timestep.
+
+    Where it diverges there, the first of a half, a quarter, … at which it does not, and half of
+    that, join the scene's: just below its limit an integrator swings far too wide. A `SceneError`
+    where there is none, or the scenario does not fit.
+    """
+    ladder = scene.timesteps
+    while True:
+        step = min(scene.timesteps) / 2
+        try:
+            pilot = _pilot_of(model, scene)
+        except _DivergenceError:
+            if scene.scenario.duration > MOST_STEPS * step:
+                raise
+            scene = replace(scene, timesteps=(step, *ladder))
+            continue
+        if len(scene.timesteps) != len(ladder) + 1:
+            return pilot
+        scene = replace(scene, timesteps=(step, *scene.timesteps))
+
+
+class _DivergenceError(SceneError):
+    """A scene has no motion at its shortest timestep."""
+
+
+def _failure(model: Any, data: Any) -> SceneError:
+    time = seconds_text(data.time, 2)
+    if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:
+        message = f"a command is no number, or huge, before {time}"
+        return SceneError(f"{message}: MuJoCo takes all of them as 0 then")
+    setting = f"{simulation.integrator_of(model).value} at {seconds_text(model.opt.timestep)}"
+    message = f"it diverges within {time} even under {setting}"
+    return _DivergenceError(message, help="another integrator may hold")
+
+
+def _pilot_of(model: Any, scene: Scene) -> Pilot:
     step, scenario = min(scene.timesteps), scene.scenario
     variant = simulation.without_sleep(
         simulation.with_integrator(model, simulation.integrator_of(model), step)
@@ -111,13 +153,8 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
             if number % _PEAK_INTERVAL == 0 or number == steps_per_sample - 1:
                 peaks = update_peaks(data, peaks, half_thickness)
                 passages.look(data)
-        if not peaks.finite:
-            setting = f"{simulation.integrator_of(model).value} at {seconds_text(step)}"
-            message = f"it diverges within {seconds_text(times[index])} even under {setting}"
-            raise SceneError(message, help="shorter `timesteps` or another integrator may hold")
-        if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:
-            message = f"a command is no number, or huge, before {seconds_text(times[index])}"
-            raise SceneError(f"{message}: MuJoCo takes all of them as 0 then")
+                if not peaks.finite or has_bad_state(data):
+                    raise _failure(variant, data)
         for twin, gap in zip(twins, gaps, strict=True):
             if index == 0 or gap[index - 1] < 1:
                 simulation.advance(variant, twin, steps_per_sample)
@@ -127,7 +164,7 @@ def run_pilot(model: Any, scene: Scene) -> Pilot:
     if not (look.constrained or driving_force(model, scenario)):  # most is at the beginning
         kinetic = peaks.kinetic
         if peaks.energy > energy + _EXCESS * kinetic:  # the integrator itself is lost
-            fine = simulation.with_integrator(variant, Integrator.RK4, step)
+            fine = simulation.with_integrator(variant, Integrator.RK4, step / _FINER)
             kinetic = simulation.simulate(Setup(scenario=scenario), fine).energy[:, 1].max()
         peaks = replace(peaks, energy=energy, kinetic=float(np.fmin(kinetic, peaks.kinetic)))
     setup = replace(_bounds(variant, scene, peaks), passing=passages.pairs())
@@ -321,122 +358,3 @@ def longer_setup(model: Any, pilot: Pilot, span: float) -> Setup:
             passing = pilot.setup.passing | run.passing
             return replace(_bounds(model, longer_scene, peaks), passing=passing)
     return pilot.setup
-
-
-_SOLVERS = {
-    "PGS": int(mujoco.mjtSolver.mjSOL_PGS),
-    "CG": int(mujoco.mjtSolver.mjSOL_CG),
-    "Newton": int(mujoco.mjtSolver.mjSOL_NEWTON),
-}
-CONES = {
-    "pyramidal": int(mujoco.mjtCone.mjCONE_PYRAMIDAL),
-    "elliptic": int(mujoco.mjtCone.mjCONE_ELLIPTIC),
-}
-_ITERATIONS, _QUICK_ITERATIONS = (1, 2, 4, 10, 30), (1, 4)
-_OPTIONS: dict[str, dict[str, float]] = {
-    "tolerance": {"0.01": 1e-2, "1e-4": 1e-4, "1e-6": 1e-6},
-    "noslip_iterations": {"0": 0, "4": 4},
-    "impratio": {"1": 1, "10": 10},
-    "jacobian": {
-        "dense": int(mujoco.mjtJacobian.mjJAC_DENSE),
-        "sparse": int(mujoco.mjtJacobian.mjJAC_SPARSE),
-    },
-}
-"""Options of the solver, and the values that are tried where they are not the model's own."""
-_FLAGS = {
-    "island": ("disableflags", int(mujoco.mjtDisableBit.mjDSBL_ISLAND)),
-    "multiccd": ("disableflags", int(mujoco.mjtDisableBit.mjDSBL_MULTICCD)),
-    "sleep": ("enableflags", int(mujoco.mjtEnableBit.mjENBL_SLEEP)),
-}
-"""Flags that are tried the other way, with their bits."""
-_OF_CONTACTS = frozenset(("noslip_iterations", "impratio", "multiccd"))
-
-
-def own_setting(model: Any, pilot: Pilot) -> MeasuredSetting:
-    """The setting that the model has."""
-    return MeasuredSetting(
-        integrator=simulation.integrator_of(model).value,
-        timestep=pilot.scene.timestep,
-        solver=_name(_SOLVERS, int(model.opt.solver)) if pilot.constrained else "",
-        iterations=int(model.opt.iterations) if pilot.constrained else 0,
-        cone=_name(CONES, int(model.opt.cone)) if pilot.contact else "",
-    )
-
-
-def _name(names: dict[str, int], number: int) -> str:
-    return next(name for name, value in names.items() if value == number)
-
-
-def settings(model: Any, pilot: Pilot, *, quick: bool = False) -> tuple[MeasuredSetting, ...]:
-    """All settings to measure, each once, the model's own among them."""
-    baseline, ladder = own_setting(model, pilot), pilot.scene.timesteps
-    variants = [
-        replace(baseline, integrator=integrator.value, timestep=step)
-        for integrator in STANDARD
-        for step in reversed(ladder)
-    ]
-    own_index = ladder.index(pilot.scene.timestep)
-    for step in (
-        ladder[own_index : own_index + 1]
-        if quick
-        else ladder[max(0, own_index - 1) : own_index + 2]
-    ):
-        variants += _solving_variants(model, replace(baseline, timestep=step), pilot, quick=quick)
-    return tuple(dict.fromkeys(variants))
-
-
-def _solving_variants(
-    model: Any, baseline: MeasuredSetting, pilot: Pilot, *, quick: bool
-) -> list[MeasuredSetting]:
-    """The settings at a timestep that differ from the model's own in one thing of its solver."""
-    variants = [replace(baseline, cone=cone) for cone in CONES] if pilot.contact else []
-    if not pilot.constrained:
-        return variants
-    variants += [replace(baseline, solver=solver) for solver in _SOLVERS]
-    counts = _QUICK_ITERATIONS if quick else _ITERATIONS
-    variants += [replace(baseline, iterations=n) for n in counts if n < baseline.iterations]
-    if quick:
-        return variants
-    options = [
-        (name, text)
-        for name, values in _OPTIONS.items()
-        for text, value in values.items()
-        if value != getattr(model.opt, name)
-        and (name != "tolerance" or value > model.opt.tolerance)
-    ]
-    for name, (field, bit) in _FLAGS.items():
-        is_set = bool(getattr(model.opt, field) & bit)
-        options.append((name, "enable" if is_set == (field == "disableflags") else "disable"))
-    return variants + [
-        replace(baseline, options=((name, text),))
-        for name, text in options
-        if pilot.contact or name not in _OF_CONTACTS
-    ]
-
-
-def apply(model: Any, setting: MeasuredSetting, own_model: Any) -> None:
-    """Give a `mjModel` a setting; what is empty in it is as in `own_model`, the scene's."""
-    for name in ("solver", "iterations", "cone", "disableflags", "enableflags", *_OPTIONS):
-        setattr(model.opt, name, getattr(own_model.opt, name))
-    simulation.set_integrator(model, Integrator(setting.integrator), setting.timestep)
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    if setting.solver:
-        model.opt.solver = _SOLVERS[setting.solver]
-        model.opt.iterations = setting.iterations
-    if setting.cone:
-        model.opt.cone = CONES[setting.cone]
-    for name, text in setting.options:
-        if name in _OPTIONS:
-            setattr(model.opt, name, _OPTIONS[name][text])
-            continue
-        field, bit = _FLAGS[name]
-        is_set = (text == "enable") == (field == "enableflags")
-        flags = int(getattr(model.opt, field))
-        setattr(model.opt, field, flags | bit if is_set else flags & ~bit)
-
-
-def with_setting(model: Any, setting: MeasuredSetting) -> Any:
-    """A copy of a `mjModel` with a setting, and automatic reset off."""
-    variant = simulation.with_integrator(model, Integrator(setting.integrator), setting.timestep)
-    apply(variant, setting, model)
-    return variant

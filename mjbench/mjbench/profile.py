@@ -11,17 +11,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from mjbench.costs import inputs_of
-from mjbench.pilot import with_setting
 from mjbench.problem import Array, Inputs
 from mjbench.reports.scene_report import PhaseProfile, WorkPrecisionRow, step_evaluations
 from mjbench.scene import Scene
+from mjbench.settings import with_setting
 from mjbench.simulation import STATE, full_state, initial_data, silent
 
 _ROUNDS, _QUICK_ROUNDS = 12, 5
@@ -51,25 +51,18 @@ def profile_rows(
     rows: Mapping[int, WorkPrecisionRow],
     *,
     quick: bool = False,
-    clock: Callable[[], float] | None = None,
 ) -> tuple[PhaseProfile, ...]:
     """Profile a scenario under settings, given by the numbers of their rows.
 
-    `clock`: time so far in s; `None`: MuJoCo's own. A `FatalError` of MuJoCo where one is lost.
+    A `FatalError` of MuJoCo where one is lost.
     """
     jobs = [_Job(model, scene, number, row) for number, row in rows.items()]
-    if clock is not None:
-        mujoco.set_mjcb_time(clock)
-    try:
-        with silent():
-            for count in range(_QUICK_ROUNDS if quick else _ROUNDS):
-                spent = sum(job.run() for job in jobs)
-                if count and (count + 2) * spent > (_QUICK_BUDGET if quick else _BUDGET):
-                    break
-            return tuple(job.profile() for job in jobs)
-    finally:
-        if clock is not None:
-            mujoco.set_mjcb_time(None)
+    with silent():
+        for count in range(_QUICK_ROUNDS if quick else _ROUNDS):
+            spent = sum(job.run() for job in jobs)
+            if count and (count + 2) * spent > (_QUICK_BUDGET if quick else _BUDGET):
+                break
+        return tuple(job.profile() for job in jobs)
 
 
 class _Job:

@@ -149,29 +149,18 @@ def watch_steps(model: Any, data: Any, steps: int, passages: Passages) -> None:
             passages.look(data)
 
 
-def advance_watching(
-    model: Any,
-    data: Any,
-    steps: int,
-    peaks: Peaks,
-    passages: Passages,
-    *,
-    interval: int = _LOOK_INTERVAL,
-) -> tuple[Peaks, int]:
-    """Make so many steps; stop once the state is not finite.
+def advance_watching(model: Any, data: Any, steps: int, peaks: Peaks, passages: Passages) -> Peaks:
+    """Make so many steps; stop once the state is not finite. Returns the updated `peaks`.
 
-    `passages` watches what goes through what. Returns the updated `peaks` and the number of steps
-    made. Only one state per `interval` is looked at, which suffices: what shoots up takes longer to
-    come back.
+    `passages` watches what goes through what. Only one state in a few is looked at, which suffices:
+    what shoots up takes longer to come back.
     """
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    steps_made = 0
-    while steps_made < steps and peaks.finite:
-        part = min(interval, steps - steps_made)
-        watch_steps(model, data, part, passages)
-        steps_made += part
-        peaks = update_peaks(data, peaks, passages.thickness)
-    return peaks, steps_made
+    for done in range(0, steps, _LOOK_INTERVAL):
+        if peaks.finite:
+            watch_steps(model, data, min(_LOOK_INTERVAL, steps - done), passages)
+            peaks = update_peaks(data, peaks, passages.thickness)
+    return peaks
 
 
 def initial_data(scenario: Scenario, model: Any) -> Any:
@@ -272,25 +261,23 @@ class Run(Struct, frozen=True):
 
 def simulate(setup: Setup, model: Any) -> Run:
     """Run a scenario with a model under its own options."""
-    scenario, timestep = setup.scenario, float(model.opt.timestep)
-    steps_per_sample, times = scenario.steps(timestep), scenario.times
+    scenario, times = setup.scenario, setup.scenario.times
+    steps = scenario.steps(float(model.opt.timestep))
     data, scratch = initial_data(scenario, model), initial_data(scenario, model)
     qpos, qvel, act = (np.full((len(times), n), np.nan) for n in (model.nq, model.nv, model.na))
     table = np.full((len(times) + 1, 5), np.nan)
     table[0] = invariants(model, scratch, data.qpos, data.qvel)
-    peaks, steps = Peaks(penetration=deepest_contact(scratch)), 0
-    passages = Passages(model, setup)
+    peaks, passages = Peaks(penetration=deepest_contact(scratch)), Passages(model, setup)
     for index, inputs in enumerate(scenario.inputs(scenario.sample)):
         inputs.give(data)
-        peaks, steps_made = advance_watching(model, data, steps_per_sample, peaks, passages)
-        steps += steps_made
+        peaks = advance_watching(model, data, steps, peaks, passages)
         if not peaks.finite:
             break
         qpos[index], qvel[index], act[index] = data.qpos, data.qvel, data.act
         table[index + 1] = invariants(model, scratch, data.qpos, data.qvel)
         # Where a step ends, its contacts are still those of its beginning.
         peaks = replace(peaks, penetration=max(peaks.penetration, deepest_contact(scratch)))
-    judgement = judge(model, data, steps * timestep, peaks, setup, passages.texts())
+    judgement = judge(data, peaks, setup, passages.texts())
     states = EngineStates(times, qpos, qvel, act)
     return Run(
         states,

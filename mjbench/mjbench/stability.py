@@ -30,6 +30,7 @@ from mjbench.detector import Passages, driving_force
 from mjbench.linearization import Theory, find_theory
 from mjbench.parts import Parts
 from mjbench.pilot import (
+    MOST_STEPS,
     Pilot,
     longer_setup,
     position_distances,
@@ -38,7 +39,6 @@ from mjbench.problem import (
     STANDARD,
     Array,
     Integrator,
-    Limit,
     Problem,
     Setup,
 )
@@ -70,8 +70,6 @@ _GRID, _FINE, _CLOSER = 16, 1e-4, 32
 _QUICK_GRID, _COARSE, _QUICK_CLOSER = 6, 1e-2, 8
 """The timesteps that are tried in a decade, the relative width at which a bisection ends, and the
 timesteps that are tried from half the limit up to it."""
-MOST_STEPS = 200_000
-"""The most steps of a span."""
 _SMALL_STEPS = 100_000
 """Steps of the run that says how much energy there can be, at most."""
 _GAIN, _GAIN_RESOLUTION = 0.01, 0.02
@@ -347,8 +345,9 @@ def attempt(problem: Problem, integrator: Integrator, timestep: float) -> Stabil
     return run_trial(problem, compile_model(problem.mjcf, integrator, timestep), problem.span)
 
 
-_SEARCH = (0.25, 64.0)
-"""The multiples of the model's timestep between which the largest stable one is searched for."""
+_SEARCH, _LOWER = (0.25, 64.0), 8.0
+"""The multiples of the model's timestep between which the largest stable one is searched for, and
+by how much lower it is searched for again where all of these are lost."""
 
 
 def stable_rows(
@@ -357,33 +356,23 @@ def stable_rows(
     """The largest stable timestep of every integrator, over the scenario.
 
     They are searched for as those of the hard cases. No timestep is tried of which the scenario
-    has fewer than 20: so few steps would say nothing. `kept`: the motion that small steps keep.
+    has fewer than 20: so few steps would say nothing.
     """
     scene = pilot.scene
     duration = scene.declaration.stable_for or scene.scenario.duration
     low, high = sorted(scene.declaration.search or [part * scene.timestep for part in _SEARCH])
-    limits = scene.declaration.limits
     setup_over = cache(partial(longer_setup, model, pilot))
     motion = kept_motion(model, pilot, reference)
     questions = ("astray", "through") if Passages(model).needed else ("astray",)
 
-    def declared_limit(integrator: Integrator) -> Limit | None:
-        step = limits.get(integrator.value)  # type: ignore[call-overload]
-        return None if step is None else Limit(step, "as the scenario declares")
-
     theory = parts.run(
         f"{scene.name}: theory of stability",
         lambda: (
-            Theory(declared_limit if limits else None)
+            Theory()
             if scene.scenario.loop is not None  # which no linearization of the engine knows
-            else find_theory(
-                model,
-                scene.scenario,
-                declared_limit if limits else None,
-                visits=partial(_comes_near, motion, model),
-            )
+            else find_theory(model, scene.scenario, visits=partial(_comes_near, motion, model))
         ),
-        Theory(declared_limit if limits else None),
+        Theory(),
     )
 
     def row(integrator: Integrator) -> StableRow | None:
@@ -397,12 +386,17 @@ def stable_rows(
         limit = theory.limit(integrator, (low, high)) if settles else None
         if limit is not None and math.isfinite(limit.timestep):
             span = max(span, _SETTLED_STEPS * limit.timestep)
+        least = low if scene.declaration.search else span / MOST_STEPS
         search = max(low, span / MOST_STEPS), min(high, span / FEWEST_STEPS)
         if search[1] <= search[0]:
             return None
         starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
         laboratory = Laboratory(run, span, starts, questions, shortest)
-        return search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
+        while True:
+            row = search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
+            if row.largest != "none" or search[0] <= least:
+                return row
+            search = max(search[0] / _LOWER, least), search[0]
 
     rows = (
         parts.run(f"{scene.name}: stable timesteps of {i.value}", partial(row, i), None)

@@ -161,7 +161,7 @@ def run_trial(
             commands[stop].give(data)
         sizes.append((count, math.hypot(*data.qvel.tolist())))
     is_lost = is_lost or excess_end > _DECAY * span  # it shot up, and has not come down
-    judgement = judge(model, data, count * timestep, now, setup if is_lost else limits)
+    judgement = judge(data, now, setup if is_lost else limits)
     status, reason = judgement.status, "; ".join(judgement.reasons)
     if is_lost and status is RunStatus.OK:
         status, reason = RunStatus.SLOW_GROWTH, "what shot up in the first steps did not come down"

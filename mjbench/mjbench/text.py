@@ -19,7 +19,6 @@ from mjbench.reports.plot_text import plot_lines
 from mjbench.reports.profile_table import profile_lines
 from mjbench.reports.records import Departure
 from mjbench.reports.scene_report import (
-    MeasuredRun,
     OrderRow,
     ScenarioReport,
     StableRow,
@@ -118,7 +117,7 @@ def _settings(report: ScenarioReport, style: Style) -> Iterator[str]:
     lost: dict[str, list[str]] = {}
     for row in rows:
         if row.status != "ok":
-            lost.setdefault(_status(row), []).append(row.name)
+            lost.setdefault(_lost(row.status, row.reasons), []).append(row.name)
     for reason, names in lost.items():
         yield from style.wrap(f"{'; '.join(names)}: {reason}")
 
@@ -135,10 +134,6 @@ def _error(row: WorkPrecisionRow, name: str, least: float) -> str:
 
 def _percent(value: float | None) -> str:
     return "" if value is None else f"{100 * value:+.2g} %"
-
-
-def _status(run: MeasuredRun) -> str:
-    return "" if run.status == "ok" else "; ".join((status_text(run.status), *run.reasons))
 
 
 def _orders(orders: Sequence[OrderRow], style: Style) -> Iterator[str]:
@@ -209,7 +204,7 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
             ("engine", [f"{r.title}, {r.bits} bits" if r.bits else r.title for r in rows]),
             ("device", [row.device for row in rows]),
             ("from MuJoCo", ["" if r.apart is None else f"{r.apart:.2g}" for r in rows]),
-            ("a step by number of worlds", costs),
+            ("a step of a world, by their number", costs),
             ("status", [_lost(row.status, (row.message,)) for row in rows]),
         ]
         lines += ["", f"  {style.strong(scenario.name)}: {scenario.title}"]
@@ -258,7 +253,7 @@ def case_text(report: CaseReport, style: Style = _PLAIN) -> str:
     for name in ("position", "attitude", "velocity"):
         pairs = [getattr(run, name) for run in runs]
         columns.append((name, ["" if pair is None else f"{pair[0]:.3g}" for pair in pairs]))
-    columns.append(("status", [_status(run) for run in runs]))
+    columns.append(("status", [_lost(run.status, run.reasons) for run in runs]))
     parts += ["", *fitted_table(columns, inner.width), ""]
     for chart in report.charts[:1]:
         parts += plot_lines(chart, inner.width)

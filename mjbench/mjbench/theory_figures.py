@@ -17,10 +17,10 @@ from msgspec.structs import replace
 
 from mjbench.declarations import Expected, Place
 from mjbench.measure import quantity_name, quantity_values
-from mjbench.pilot import with_setting
 from mjbench.problem import STANDARD, Setup
 from mjbench.reports.scene_report import FigureLine, MeasuredSetting, SweepRow
 from mjbench.scene import Scene, SceneError
+from mjbench.settings import with_setting
 from mjbench.simulation import EngineStates, initial_data, simulate, stiffened
 from mjbench.sweep import with_contacts
 

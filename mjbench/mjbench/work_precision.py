@@ -27,24 +27,16 @@ from mjbench.detector import driving_force
 from mjbench.judge import compared_rows
 from mjbench.measured_setting import Basis, measure_setting
 from mjbench.parts import Parts
-from mjbench.pilot import (
-    Pilot,
-    horizon_error,
-    nudges,
-    own_setting,
-    run_pilot,
-    settings,
-    with_setting,
-)
+from mjbench.pilot import Pilot, horizon_error, nudges, run_pilot
 from mjbench.profile import profile_rows
 from mjbench.reports import reach_bound, scene_report
 from mjbench.reports.shown_errors import (
-    horizon_error_text,
     is_idle,
     setting_text,
     solving_parts,
 )
 from mjbench.scene import Scene, SceneError
+from mjbench.settings import own_setting, settings, with_setting
 from mjbench.stability import stable_rows
 from mjbench.sweep import DrawnModel
 from mjbench.theory_figures import measure_expected
@@ -402,16 +394,10 @@ def _notes(
         notes.append(
             f"errors count until {reference.horizon:.6g} s: the motion is not known beyond"
         )
-    if pilot.scene.declaration.horizon_error and pilot.lyapunov is None:
-        error = horizon_error_text(horizon_error(model, pilot.scene))
-        notes.append(f"no run that begins 1e-10 away comes to be off by {error}: it is not chaotic")
     if int(model.opt.enableflags) & mujoco.mjtEnableBit.mjENBL_SLEEP:
         notes.append("nothing sleeps in the reference, so errors hold what sleep changes")
     if drivers := driving_force(model, pilot.scene.scenario):
         notes.append(f"energy is not judged: {drivers}")
-    states = np.abs(np.hstack([reference.states.qpos, reference.states.qvel, reference.states.act]))
-    if np.any((states > 0) & (states < np.finfo(np.float64).tiny)):
-        notes.append("the state holds subnormal numbers, with which processors are slow")
     limit = simulation.refsafe_from(model, contact=pilot.contact)
     refsafe_limit = limit if pilot.constrained else math.inf
     if any(min(reach_bound(row.largest), row.searched[1]) > refsafe_limit for row in largest):

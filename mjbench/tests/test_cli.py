@@ -10,7 +10,9 @@ from typing import Any
 
 import pytest
 
-from mjbench.cli import main
+from mjbench.bench import compile_subject
+from mjbench.cli import main, read_subject
+from mjbench.host import LocalHost
 from mjbench.reports.records import BENCH, DIET
 
 Capture = pytest.CaptureFixture[str]
@@ -92,6 +94,31 @@ def test_what_a_model_does_not_need_is_taken_out_and_its_interface_stays(
     assert main(["diet", str(model), "--quick"]) == 1
     out = capsys.readouterr().out
     assert "`unused-mesh` no longer keeps anything: remove the entry (arm.toml:7:12)" in out
+
+
+URDF = """\
+<robot name="r">
+  <link name="base"><collision><geometry><mesh filename="package://kit/meshes/a.obj"/></geometry>
+  </collision></link>
+  <link name="arm"><inertial><mass value="1"/>
+    <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="j" type="continuous"><parent link="base"/><child link="arm"/></joint>
+</robot>
+"""
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+def test_a_package_of_urdf_is_the_folder_of_its_name(tmp_path: Path, capsys: Capture) -> None:
+    file, mesh = tmp_path / "kit/urdf/r.urdf", tmp_path / "kit/meshes/a.obj"
+    for path, text in ((file, URDF), (mesh, TETRAHEDRON)):
+        path.parent.mkdir(parents=True)
+        path.write_text(text, "utf-8")
+    subject = read_subject(file)
+    compiled_model = compile_subject(subject, LocalHost(tmp_path, lambda _: None), quick=True)
+    assert compiled_model.model.nmesh == compiled_model.spec.compile().nmesh == 1
+    file.write_text(URDF.replace("kit", "kat"), "utf-8")
+    assert main([str(file)]) == 2
+    assert "from the package `kat`, and no folder of that name lies" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

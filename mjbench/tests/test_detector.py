@@ -46,10 +46,7 @@ def test_a_run_that_was_reset_and_ends_with_error_zero_is_lost() -> None:
     model, data = spring_data(0.3, qvel=1.0)
     advance(model, data, 1000)
     assert data.qpos[0] == 0.0 == data.qvel[0]  # as if it had come to rest
-    judgement = judge(model, data, 1000 * 0.3)
-    assert judgement.status is RunStatus.RESET
-    assert "MuJoCo warned of bad accelerations" in judgement.reasons
-    assert any("the state was reset" in reason for reason in judgement.reasons)
+    assert judge(data).reasons == ("MuJoCo warned of bad accelerations",)
 
 
 def test_a_slow_growth_without_any_warning_is_seen() -> None:
@@ -57,33 +54,26 @@ def test_a_slow_growth_without_any_warning_is_seen() -> None:
     advance(model, data, 130)
     assert abs(data.qpos[0]) > 100
     assert not any(warning.number for warning in data.warning)
-    judgement = judge(model, data, 130 * 0.2002, setup=BOUNDS)
+    judgement = judge(data, setup=BOUNDS)
     assert judgement.status is RunStatus.SLOW_GROWTH
     assert any(reason.startswith("positions reached") for reason in judgement.reasons)
 
 
 def test_a_state_that_is_no_number() -> None:
     for field in ("qpos", "qvel"):
-        model, data = spring_data(0.01)
+        _, data = spring_data(0.01)
         getattr(data, field)[0] = np.nan
-        assert judge(model, data, 0.0).reasons[0] == "the state is not finite"
+        assert judge(data).reasons[0] == "the state is not finite"
 
 
 def test_a_state_that_was_no_number_on_the_way_is_lost() -> None:
-    model, data = spring_data(0.01)
+    _, data = spring_data(0.01)
     peaks = Peaks()
     for value in (0.1, np.nan, 0.2):
         data.qpos[0] = value
         peaks = update_peaks(data, peaks)
-    judgement = judge(model, data, 0.0, peaks)
+    judgement = judge(data, peaks)
     assert (judgement.status, *judgement.reasons) == (RunStatus.DIVERGED, "the state is not finite")
-
-
-def test_a_clock_that_is_off_by_one_step_tells_of_a_reset() -> None:
-    model, data = spring_data(0.01)
-    advance(model, data, 10)
-    for steps, status in ((9, RunStatus.RESET), (10, RunStatus.OK), (11, RunStatus.RESET)):
-        assert judge(model, data, steps * 0.01).status is status
 
 
 def test_peaks_may_reach_every_bound_and_pass_none() -> None:
@@ -210,10 +200,7 @@ def test_a_state_that_shot_up_and_came_back_is_seen() -> None:
 def test_a_good_run_is_good() -> None:
     model, data = spring_data(0.01, qpos=0.5)
     advance(model, data, 100)
-    good = judge(model, data, 1.0, setup=BOUNDS)
-    assert good.ok and good.reasons == ()
-    data.time = math.nan
-    assert judge(model, data, 1.0).status is RunStatus.RESET
+    assert judge(data, setup=BOUNDS).reasons == ()
 
 
 def test_warnings_are_counted_and_not_printed(capfd: pytest.CaptureFixture[str]) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import itertools
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -34,16 +35,6 @@ ROLLING = """\
 IMU = '<accelerometer site="imu"/><gyro site="imu"/>'
 
 
-def ticks() -> Callable[[], float]:
-    now = [0.0]
-
-    def clock() -> float:
-        now[0] += 1.0
-        return now[0]
-
-    return clock
-
-
 def profile(
     integrator: str = "Euler", sensors: str = "", flags: str = 'island="enable"', **fields: Any
 ) -> PhaseProfile:
@@ -52,7 +43,11 @@ def profile(
     (scene,) = scenes(model, NO_DECLARATIONS, quick=True)
     setting = {"solver": "Newton", "iterations": 100, "cone": "pyramidal"}
     profiled_row = row(integrator, 0.01, name="its own", **{**setting, **fields})
-    (result,) = profile_rows(model, brief(scene), {3: profiled_row}, quick=True, clock=ticks())
+    mujoco.set_mjcb_time(itertools.count(1.0).__next__)
+    try:
+        (result,) = profile_rows(model, brief(scene), {3: profiled_row}, quick=True)
+    finally:
+        mujoco.set_mjcb_time(None)
     return result
 
 

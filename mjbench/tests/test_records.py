@@ -262,9 +262,9 @@ def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
 
 def test_boundaries_and_runs_of_cases() -> None:
     line = BoundaryLine(
-        "Euler", "all", (1e-3, 1.0), (0.3, 0.4), 9.0, 9, 9, None, beyond="reset", growth=1.5
+        "Euler", "all", (1e-3, 1.0), (0.3, 0.4), 9.0, 9, 9, None, beyond="through", growth=1.5
     )
-    old, run = case(), replace(case().errors[0], status="reset")
+    old, run = case(), replace(case().errors[0], status="through")
     new = replace(old, boundaries=(line, *old.boundaries[1:]), errors=(run, *old.errors[1:]))
     departures = case_departures([old], [new])
     assert [
@@ -273,8 +273,8 @@ def test_boundaries_and_runs_of_cases() -> None:
     ] == [
         ("Euler", "largest stable timestep", "200 ms", "all"),
         ("Euler", "monotone", "yes", "no"),
-        ("Euler", "beyond", "diverged", "reset"),
-        ("Euler at 10 ms", "status", "ok", "reset"),
+        ("Euler", "beyond", "diverged", "through"),
+        ("Euler at 10 ms", "status", "ok", "through"),
     ]
     fuzzy = replace(old, boundaries=(replace(line, largest=0.22), *old.boundaries[1:]))
     for pair in ((old, fuzzy), (fuzzy, old)):

@@ -151,10 +151,6 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     timesteps: Annotated[
         tuple[Positive, ...], describe("seconds; instead of a ladder about the model's own")
     ] = ()
-    limits: Annotated[
-        dict[Literal["Euler", "implicit", "implicitfast", "RK4", "discrete"], Positive],
-        describe("seconds, by integrator: the largest stable timestep in theory"),
-    ] = {}
     expected: Annotated[
         dict[Expected, float],
         describe(

@@ -24,11 +24,12 @@ from msgspec.structs import asdict, replace
 from mjbench.costs import Clock, time_jobs
 from mjbench.known_motion import KnownMotion, find_references
 from mjbench.measure import energy_drift, errors
-from mjbench.pilot import Pilot, nudges, own_setting, position_distances, run_pilot
+from mjbench.pilot import Pilot, nudges, position_distances, run_pilot
 from mjbench.problem import Array, Scenario
 from mjbench.reports import Interval
 from mjbench.reports.engine_report import EngineRow, EngineScenario
 from mjbench.scene import Scene
+from mjbench.settings import own_setting
 from mjbench.simulation import (
     STATE,
     EngineStates,

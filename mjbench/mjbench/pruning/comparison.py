@@ -202,7 +202,7 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
     twin.qvel[:] += velocity
     start, change = data.qpos.copy(), np.zeros(model.nv)
     displacements, speeds = np.zeros(model.nv), np.zeros(model.nv)
-    steps_made, horizon = 0, math.inf
+    horizon = math.inf
     touching: set[tuple[int, int]] = set()
     peaks, passages = Peaks(), Passages(model)
     gauge = _Gauge(model, model, index_map(model, {}), scene)
@@ -210,7 +210,6 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
         inputs.give(data)
         inputs.give(twin)
         advance(model, data)
-        steps_made += 1
         if data.ncon:
             pairs = data.contact.geom[data.contact.exclude == 0]  # none has a force within its gap
             touching |= {(min(p), max(p)) for p in pairs.tolist() if min(p) >= 0}
@@ -230,8 +229,7 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
         passing, fastest = _small_steps(model, scene)
         setup = replace(setup, passing=passing, velocity_bound=_FASTER * fastest)
         passages.setup = setup
-    elapsed = steps_made * scene.timestep
-    judgement = judge(model, data, elapsed, peaks, setup, passages.texts())
+    judgement = judge(data, peaks, setup, passages.texts())
     observations = frozenset(touching), displacements, speeds, horizon
     return WatchedRun(scene, judgement, *observations)
 
@@ -249,7 +247,7 @@ def _small_steps(model: Any, scene: Scene) -> tuple[frozenset[tuple[int, int]], 
     data, peaks, passages = initial_data(scene.scenario, fine), Peaks(), Passages(fine)
     for inputs in scene.scenario.inputs(scene.timestep):
         inputs.give(data)
-        peaks, _ = advance_watching(fine, data, _FINER, peaks, passages, interval=_FINER)
+        peaks = advance_watching(fine, data, _FINER, peaks, passages)
         if not peaks.finite:
             return frozenset(), math.inf
     return passages.pairs(), peaks.velocity
@@ -343,7 +341,7 @@ def _follow(
         mujoco.mj_kinematics(model, state)  # a step leaves places as they were at its beginning
     if not identical and data.time <= run.horizon:
         gauge.look(data, variant_data)
-    judgement = judge(variant, variant_data, scene.scenario.duration)
+    judgement = judge(variant_data)
     if not judgement.ok:
         return MotionComparison(False, math.inf, f"the run is lost: {'; '.join(judgement.reasons)}")
     difference, words = gauge.with_sensors()

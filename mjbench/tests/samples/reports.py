@@ -170,7 +170,11 @@ def awkward() -> ScenarioReport:
             **{**newton, "solver": "CG", "iterations": 7, "cone": "elliptic"},
         ),
         diverged_row(
-            "RK4", 0.1, status="reset", reasons=("the clock was reset",), **{**newton, "cone": ""}
+            "RK4",
+            0.1,
+            status="diverged",
+            reasons=("the state is not finite",),
+            **{**newton, "cone": ""},
         ),
     ]
     text = "implicitfast at 333.333 µs is better in every respect."
