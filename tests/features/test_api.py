@@ -27,7 +27,7 @@ Features, and the tests of features, import from `coursebuild.api` alone; [Write
 feature](../how-to/features.md) shows how. All other modules of coursebuild may change any day. This
 is version {version}: a feature that needs a newer one says so (`api=2`, say) and is refused where
 there is none. Each release that adds to the interface raises the version; what goes is announced in
-CHANGELOG.md.
+CHANGELOG.md. What is in a module, such as `marks`, Python's `help(marks)` tells.
 """
 SUBJECTS = {
     "What a feature has": ("core.features", "core.text.rules"),
