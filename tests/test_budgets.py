@@ -129,14 +129,17 @@ def test_no_part_weighs_more_than_its_budget(request: pytest.FixtureRequest) -> 
     budgets = tomllib.loads(FILE.read_text(encoding="utf-8"))
     entries = budgets.pop("ledger")
     budgets.pop("loaded")
-    assert sorted(budgets) == sorted(measurements()), "each part has a budget, and is there"
+    assert sorted(budgets) == sorted(measurements()), (
+        'a part needs a line `"PART" = { why = "…" }`; --rewrite-budgets then enters its numbers'
+    )
     violations = [
         f"{part}: {key} is {number}, and may be {budgets[part][key]}"
         for part, numbers in measurements().items()
         for key, number in numbers.items()
         if number > budgets[part][key]
     ]
-    assert not violations, "\n".join(violations)
+    advice = "join or remove something; else raise the number in budgets.toml, and say there why"
+    assert not violations, "\n".join([*violations, advice])
     assert [part for part, budget in budgets.items() if not budget["why"].strip()] == []
     assert [entry for entry in entries if {*entry} != {"issue", "what", "weight"}] == []
 

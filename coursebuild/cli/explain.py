@@ -183,25 +183,22 @@ def declare(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print what is known of a rule or a path."""
     installed_features()  # they have rules of their own
-    rule = RULES.get(arguments.name)
-    if rule is not None:
-        text = rule_text(rule, rules_page())
-        return write(json_text(rule) if arguments.format == "json" else text, CLEAN)
-    options = options_of(arguments)
-    if match := re.fullmatch(r"(.+\.(?:md|toml)):([1-9][0-9]{0,8})", arguments.name):
+    name = arguments.name
+    if name not in RULES:
+        options = options_of(arguments)
+        course = load_course(options.root)  # whose own features have some too
+    value: object
+    if name in RULES:
+        value, text = RULES[name], rule_text(RULES[name], rules_page())
+    elif match := re.fullmatch(r"(.+\.(?:md|toml)):([1-9][0-9]{0,8})", name):
         path = path_from_root(match[1], options.root)
-        origins = value_origins(load_course(options.root), path, int(match[2]))
+        value = origins = value_origins(course, path, int(match[2]))
         text = origins_text(f"{path}:{match[2]}", origins)
-        return write(json_text(origins) if arguments.format == "json" else text, CLEAN)
-    explanation = explain(options, arguments.name)
-    if arguments.format == "json":
-        return write(json_text(plain(explanation, runs="own", shown_in="shown")), CLEAN)
-    return write(explanation_text(explanation, style_of(sys.stdout)), CLEAN)
-
-
-def explain(options: Options, name: str) -> Explanation:
-    """What is known of a script, lab, lesson, page, model, or any file of the project."""
-    return _Explainer(load_course(options.root), options).explain(name)
+    else:
+        explanation = _Explainer(course, options).explain(name)
+        value = plain(explanation, runs="own", shown_in="shown")
+        text = explanation_text(explanation, style_of(sys.stdout))
+    return write(json_text(value) if arguments.format == "json" else text, CLEAN)
 
 
 class _Explainer:

@@ -353,7 +353,7 @@ class Feature(Struct, frozen=True, kw_only=True):
     with the document's summary (`Library.summaries`); `None` if there is nothing."""
     model_part: ModelPart | None = None
     rules: tuple[Rule, ...] = ()
-    """Rules of its own, in addition to those that `coursebuild explain` knows."""
+    """Mistakes that it reports, besides those of the core."""
     reference: Callable[[Course, Store, Interpreter | None], Struct | None] | None = None
     """What it reads of the environment of the scripts, kept in `course.references`; the interpreter
     is `None` where the one of this tool runs them."""

@@ -5,14 +5,14 @@ The JSON has all of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from mjbench.machine import Machine
 from mjbench.reports import Interval
 from mjbench.reports.case_report import CaseReport
 from mjbench.reports.diet_report import DietReport
 from mjbench.reports.diet_text import diet_text
-from mjbench.reports.engine_report import EngineReport
+from mjbench.reports.engine_report import BatchCost, EngineReport
 from mjbench.reports.limits import reach_text
 from mjbench.reports.model_report import SceneReport
 from mjbench.reports.plot_text import plot_lines
@@ -176,7 +176,13 @@ def _again(row: StableRow) -> str:
 
 def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
     rows = report.rows
-    columns: list[tuple[str, list[str]]] = [
+    statuses = [
+        ""
+        if row.status == "ok"
+        else "; ".join(filter(None, (status_text(row.status), *row.reasons)))
+        for row in rows
+    ]
+    columns = [
         ("", [">" if row.own else "" for row in rows]),
         ("parameter", [row.parameter for row in rows]),
         ("value", [row.value for row in rows]),
@@ -187,7 +193,7 @@ def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
     columns += [
         ("cost", [_interval(row.cost) for row in rows]),
         ("× real time", [_interval(row.throughput) for row in rows]),
-        ("status", [_lost(row.status, row.reasons) for row in rows]),
+        ("status", statuses),
     ]
     yield from fitted_table(columns, style.width - 4)
 
@@ -197,29 +203,27 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
     lines = [style.strong(report.model), f"  {_machine_text(report.machine)}"]
     for scenario in report.scenarios:
         rows = scenario.rows
-        costs = [
-            "; ".join(f"{c.worlds}: {_cost(c.seconds, c.remark)}" for c in r.costs) for r in rows
-        ]
+        names = [f"{row.title}, {row.bits} bits" if row.bits else row.title for row in rows]
+        costs = ["; ".join(map(_cost, row.costs)) for row in rows]
         columns = [
-            ("engine", [f"{r.title}, {r.bits} bits" if r.bits else r.title for r in rows]),
+            ("engine", names),
             ("device", [row.device for row in rows]),
             ("from MuJoCo", ["" if r.apart is None else f"{r.apart:.2g}" for r in rows]),
-            ("a step of a world, by their number", costs),
-            ("status", [_lost(row.status, (row.message,)) for row in rows]),
+            ("a step by number of worlds", costs),
         ]
         lines += ["", f"  {style.strong(scenario.name)}: {scenario.title}"]
         setting = f"{setting_text(scenario.setting)}, over {seconds_text(scenario.duration)}"
         lines += style.wrap(f"{setting}, against {scenario.source}", "    ")
         lines += indented(fitted_table(columns, style.width - 4))
+        for name, row in zip(names, rows, strict=True):
+            if row.message:
+                lines += style.wrap(f"{name}: {row.status}, {row.message}", "    ")
     return printable("\n".join(lines) + "\n")
 
 
-def _cost(seconds: Interval | None, remark: str) -> str:
-    return remark if seconds is None else seconds_text(seconds.value, 3)
-
-
-def _lost(status: str, reasons: Iterable[str]) -> str:
-    return "" if status == "ok" else "; ".join(filter(None, (status_text(status), *reasons)))
+def _cost(cost: BatchCost) -> str:
+    time = cost.seconds
+    return f"{cost.worlds}: {cost.remark if time is None else seconds_text(time.value, 3)}"
 
 
 def case_text(report: CaseReport, style: Style = _PLAIN) -> str:

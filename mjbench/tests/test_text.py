@@ -117,11 +117,14 @@ def test_an_engine_has_what_a_step_costs_by_number_of_worlds() -> None:
     engine = EngineRow(
         **lost, engine="mjx", title="MJX", versions=(), status="ok", bits=32, costs=costs
     )
-    run = EngineScenario("a", "A", 1.0, 1.0, "ode", "theory", 0.0, 0.0, setting(), (engine,))
+    refusal = replace(engine, status="unsupported", message="no hinges " * 20, costs=())
+    rows = (engine, refusal)
+    run = EngineScenario("a", "A", 1.0, 1.0, "ode", "theory", 0.0, 0.0, setting(), rows)
     text = engines_text(
         EngineReport("arm", "", quick=True, machine=MACHINE, load=0.0, scenarios=(run,))
     )
     assert "MJX, 32 bits" in text and "1: 2 µs; 64: no memory\n" in text
+    assert "    MJX, 32 bits: unsupported, no hinges no hinges" in text and "no room" not in text
 
 
 def test_costs_that_are_uncertain_say_so() -> None:

@@ -27,7 +27,8 @@ Features, and the tests of features, import from `coursebuild.api` alone; [Write
 feature](../how-to/features.md) shows how. All other modules of coursebuild may change any day. This
 is version {version}: a feature that needs a newer one says so (`api=2`, say) and is refused where
 there is none. Each release that adds to the interface raises the version; what goes is announced in
-CHANGELOG.md.
+CHANGELOG.md. A field without a default has to be given. What is in a module, such as `marks`,
+Python's `help(marks)` tells.
 """
 SUBJECTS = {
     "What a feature has": ("core.features", "core.text.rules"),
@@ -140,12 +141,12 @@ def first_sentence(text: str) -> str:
 
 
 def form(statement: ast.stmt) -> str:
-    """A field with its type, a function with its arguments."""
+    """A field with its type and default, a function with its arguments."""
     match statement:
         case ast.AnnAssign(annotation=ast.Subscript(ast.Name("Annotated"), ast.Tuple([kind, *_]))):
             return f"{ast.unparse(statement.target)}: {ast.unparse(kind)}"
         case ast.AnnAssign():
-            return f"{ast.unparse(statement.target)}: {ast.unparse(statement.annotation)}"
+            return ast.unparse(statement)
         case ast.FunctionDef(name, arguments, returns=result):
             if any(ast.unparse(d).endswith("property") for d in statement.decorator_list):
                 return f"{name}: {ast.unparse(result) if result else ''}"

@@ -157,6 +157,7 @@ def test_the_rule_of_the_docs_sees_the_whole_text_of_each_document(course: Folde
     result = course.main("check")
     places = re.findall(r"warning\[todo\]: a note to oneself\n  --> .*:(\d+:\d+)\n", result.out)
     assert (result.status, places) == (0, ["3:6", "5:3"]), result.out
+    assert course.main("explain", "todo").out == "todo\n\nA text holds a note of its author.\n"
 
 
 def defined_name(node: ast.stmt) -> str:
