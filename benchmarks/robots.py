@@ -67,7 +67,8 @@ def main() -> int:
             if not any(name in f"{package} {path}" for name in arguments.names or [""]):
                 continue
             model = _unpack(package, keep) / path
-            report = keep / f"{package.partition('=')[0]}-{model.stem}.json"
+            name = f"{package.partition('=')[0]}-{model.parent.name}-{model.stem}"
+            report = keep / f"{name}.json"
             outcomes.append(_measure(model, report, arguments.minutes, full=arguments.full))
     print(f"{sum(outcomes)} of {len(outcomes)} robots are measured")
     return 0 if all(outcomes) else 1
