@@ -248,19 +248,20 @@ export class Instrument extends Shell {
   /** Update numbers and plots, less often than the picture. */
   refresh({ time, readouts, realtime, goal, panel, tape }, now) {
     const resting = this.state !== 'playing'
+    const marks = tape.marks.map(([at, i]) => ({ time: at, label: this.config.controls[i].label }))
     if (resting || now - this.textAt >= TEXT_EVERY) {
       this.goal?.show(goal)
       this.textAt = now
       if (readouts !== null) this.readouts.show(readouts)
       this.panel.show(panel)
       this.transport.setTime(time, resting ? this.digits : undefined)
-      this.tape.show(tape, time)
+      const touches = tape.touches.map((at) => ({ time: at, label: this.words('lab.live.touch') }))
+      this.tape.show(tape, time, [...marks, ...touches])
       this.showPlay(!resting)
       this.transport.setRatio(resting ? 1 : realtime)
     }
     if (resting || now - this.plotAt >= PLOT_EVERY) {
       this.plotAt = now
-      const marks = tape.marks.map(([at, i]) => ({ time: at, label: this.config.controls[i].label }))
       this.plots.forEach((plot) => plot.draw({ time, resting, marks }))
       this.panel.draw(panel, { time, resting, marks })
     }
