@@ -81,8 +81,8 @@ export class Desk extends Shell {
     const panel = h('div', { class: 'lab-panel' }, this.controls.element, this.readouts.element)
     this.show(
       'lab-live lab-desk',
-      [h('div', { class: 'lab-screen' }, charts, this.transport.full), this.slider, this.transport.element, this.notices.message],
-      [this.goal?.element ?? null, panel],
+      [h('div', { class: 'lab-screen' }, charts, this.transport.full), this.slider, this.transport.element],
+      [this.goal?.element ?? null, panel, this.notices.message], // below what the reader holds
       foot,
       (isVisible) => {
         this.visible = isVisible

@@ -109,14 +109,14 @@ export class Instrument extends Shell {
     this.motion = h('p', { class: 'lab-motion', hidden: true })
     this.controls.show(this.values)
     this.transport.setTime(0)
-    const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full)
+    const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full, this.notices.message)
     const panel = h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element)
     const plots = this.plots.map((plot) => plot.element)
     const reason = config.still ? h('p', { class: 'lab-reason' }, config.still) : null // why nothing moves when a reader presses Play
     this.show(
       'lab-live',
       [screen, this.transport.element, this.tape.element, reason],
-      [this.motion, this.notices.message, this.goal?.element ?? null, ...plots, panel],
+      [this.motion, this.goal?.element ?? null, ...plots, panel],
       this.makeFoot(),
       (isVisible) => this.simulation.setVisible(isVisible),
     )
