@@ -18,7 +18,6 @@ export class Exercise extends Instrument {
   constructor(element, config, base, words, progress = null) {
     const worker = `${config.worker}#${config.id}` // so that it is dedicated
     super(element, { ...config, worker, kind: 'exercise', exportPython: null }, base, words, progress) // an export would be the solution
-    this.base = base
     this.leave = progress?.onChange(() => this.showState())
     this.showState()
   }
@@ -70,14 +69,14 @@ export class Exercise extends Instrument {
   // --- judging
 
   check() {
-    const { config, words, base, editor } = this
+    const { config, words, simulation, editor } = this
     this.stopJudging()
     for (const row of this.rows) this.showVerdict(row, 'waiting')
     if (!this.read(editor.text)) return this.summary.replaceChildren()
     this.tries += 1
     this.checkedText = editor.text
     this.summary.replaceChildren(words('exercise.live.checking'))
-    const address = (path) => new URL(path, base).href
+    const { address } = simulation
     const addresses = { worker: address(config.worker), module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
     const results = []
     const next = () => results.length < this.rows.length && this.showVerdict(this.rows[results.length], 'running')

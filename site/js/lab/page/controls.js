@@ -9,7 +9,7 @@ const SIGNS = { momentum: 'p', angularMomentum: 'L', forces: 'F' }
 
 /**
  * @param {any[]} controls of the lab's JSON
- * @param {{set: (index: number, value: unknown) => void, press: (index: number) => void}} actions
+ * @param {{set?: (index: number, value: unknown) => void, press?: (index: number) => void}} actions of sliders and lists, and of buttons
  * @returns {{element: HTMLElement | null, show: (values: unknown[]) => void, setEnabled: (on: boolean) => void}}
  */
 export function buildControls(controls, actions) {
