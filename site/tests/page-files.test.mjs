@@ -60,6 +60,8 @@ test('a zip is unpacked, and the scene in it is the model', async () => {
 test('without a scene the highest model that no other includes is taken', async () => {
   const { main } = await open(['a/b/c.xml', model()], ['part.xml', model()], ['whole.xml', '<mujoco><include file="part.xml"/></mujoco>'])
   assert.equal(main, 'whole.xml')
+  const { main: floor } = await open(['arm.xml', model()], ['arm_fixed.xml', model()], ['on_a_floor.xml', '<mujoco><include file="arm.xml"/></mujoco>'])
+  assert.equal(floor, 'on_a_floor.xml', 'that which includes another')
   assert.equal((await readModel([file('robot.urdf', '<robot name="r"/>')])).main, 'robot.urdf')
 })
 

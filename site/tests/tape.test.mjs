@@ -215,3 +215,18 @@ test('what a lab keeps itself is counted, so that the tape of a long run stays s
   lab.tape.seek(17)
   assert.ok(Math.abs(lab.ctx.delays[99] - 17 + 0.002) < 1e-9)
 })
+
+test('when bodies begin or cease to touch is noted, once in a while, and forgotten with what came after', (t) => {
+  const lab = taped(t, '<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .5"><freejoint/><geom size=".1"/></body></worldbody></mujoco>')
+  lab.step(100)
+  assert.deepEqual(lab.tape.range.touches, [])
+  lab.step(400)
+  const [fall] = lab.tape.range.touches
+  assert.ok(Math.abs(fall - Math.sqrt(0.8 / 9.81)) < 0.01, `${fall} s`)
+  lab.tape.seek(fall)
+  assert.ok(lab.sync().data.ncon > 0)
+  lab.tape.seek(fall - 0.05)
+  assert.equal(lab.sync().data.ncon, 0)
+  lab.step(1)
+  assert.deepEqual(lab.tape.range.touches, [])
+})

@@ -194,6 +194,14 @@ def test_a_formula_is_written_as_on_paper(page: Page) -> None:
     text.fill("(2*g*h)^0.5")
     press(push, "Check")
     expect(verdicts(push)).to_contain_text("passed 3.132 m/s was seen")
+    text.fill("9,81*h")
+    press(push, "Check")
+    fault = "The formula cannot be read from here on: ,81*h"
+    expect(text).to_have_accessible_description(fault)
+    expect(verdicts(push)).to_contain_text("not tried yet")
+    text.fill("")
+    press(push, "Play")
+    expect(text).to_have_accessible_description("Write a formula of h, g.")
 
 
 @pytest.mark.parametrize("width", [390, 820, 1440])

@@ -51,6 +51,28 @@ def test_motion_that_is_not_welcome_begins_with_a_press_or_a_move(
         reach(page, SWING, "playing")
 
 
+def test_button_and_values_have_their_room_before_the_lab_plays(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
+    def answer(route: Route) -> None:
+        config = route.fetch().json()
+        config["start"] = config["controls"][2]["label"] = "Push it from the left"
+        route.fulfill(json=config)
+
+    widths = "e => ['.lab-play', '.lab-live dd'].map((part) => e.querySelector(part).offsetWidth)"
+    with browsers["plain"].new_context(service_workers="block") as context:
+        context.route(re.compile(r"/labs/[^/]*lab-1\.[0-9a-f]+\.json$"), answer)
+        page, _ = watch_page(context)
+        page.goto(base + PAGE)
+        swing = lab(page, SWING, None)
+        expect(swing.locator(".lab-play")).to_have_text("Push it from the left")
+        room = swing.evaluate(widths)
+        swing.locator(".lab-play").click()
+        expect(swing.locator(".lab-live dd").first).to_contain_text(re.compile(r"\d"))
+        expect(swing.locator(".lab-play")).to_have_text("Pause")
+        assert swing.evaluate(widths) == room
+
+
 def test_on_a_desk_picture_curves_and_controls_share_a_screen(
     browsers: Mapping[str, Browser], base: str
 ) -> None:
@@ -273,9 +295,11 @@ def test_divergence_and_errors_of_lab_code_are_told_and_it_goes_on(
     swing = lab(page)
     press(swing, "Play")
     wait_for_condition(page, lambda: time_of(swing) > 0)
+    height = swing.evaluate("e => e.offsetHeight")
     press(swing, "Push")
     message = swing.locator(".lab-message:visible")
     expect(message).to_have_text(re.compile(r"^Diverged at t = \d+\.\d\d s: "))
+    assert swing.evaluate("e => e.offsetHeight") == height
     reach(page, SWING, "paused")
     press(swing, "Play")
     reach(page, SWING, "playing")

@@ -96,6 +96,7 @@ class Exercise(FeatureBlock, frozen=True):
             "id": self.id,
             "subject": self.subject,
             "names": self.names,
+            "maths": MATHS.split(),
             "bounds": self.bounds,
             "start": self.start.text.rstrip(),
             "trials": [

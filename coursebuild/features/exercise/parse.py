@@ -114,7 +114,7 @@ def _check(
     for attempt in node.objects("wrong"):
         fails = attempt.get("fails")
         if isinstance(fails, StringNode) and fails.value not in known_names:
-            message, help = f"no trial is called `{fails.value}`", ""
+            message = f"no trial is called `{fails.value}`"
             help = did_you_mean(fails.value, known_names)
             yield diagnose("field-value", fails.span, message, help=help)
     yield from check_axes(node, structs)

@@ -4,12 +4,14 @@
  * `config.exercise` is what coursebuild/features/exercise/model.py says of the exercise, `config.attempt` the text.
  */
 
+import { formulaCode } from './formula.js'
+
 /**
  * The code of a lab with an attempt in it; that of a model is not in the code.
  *
  * @param {Record<string, any>} config
  * @param {Record<string, any>} code of the lab
- * @throws {SyntaxError} the text is no JavaScript
+ * @throws {SyntaxError} the text is no JavaScript, or no formula
  */
 export function attemptCode({ exercise, attempt }, code) {
   if (exercise.subject === 'model') return code
@@ -34,11 +36,11 @@ export function watchableCode(config, code) {
   return { ...attemptCode(config, code), readouts }
 }
 
-function compile({ subject, bounds: [before, after] }, attempt) {
-  // As it stands alone: a text that closes its function and opens another is refused.
-  const text = subject === 'formula' ? attempt.replaceAll('^', '**') : attempt
-  new Function(subject === 'formula' ? `return (${text}\n)` : text)
-  return new Function(`"use strict"; return (${before}${text}${after})`)()
+function compile(exercise, attempt) {
+  if (exercise.subject === 'formula') return new Function(...exercise.names, `return ${formulaCode(attempt, exercise)}`)
+  const [before, after] = exercise.bounds
+  new Function(attempt) // as it stands alone: a text that closes its function and opens another is refused
+  return new Function(`"use strict"; return (${before}${attempt}${after})`)()
 }
 
 const REACH = [

@@ -9,6 +9,7 @@ import { Editor } from '../lab/page/editor.js'
 import { Instrument } from '../lab/page/instrument.js'
 import { formatReadout, withUnit } from '../lab/page/numbers.js'
 import { sign } from '../progress/signs.js'
+import { formulaCode } from './formula.js'
 
 const STARTING = 60_000 // ms for the engine to arrive and start
 const PATIENCE = 10_000 // ms for one trial
@@ -17,7 +18,6 @@ export class Exercise extends Instrument {
   constructor(element, config, base, words, progress = null) {
     const worker = `${config.worker}#${config.id}` // so that it is dedicated
     super(element, { ...config, worker, kind: 'exercise', exportPython: null }, base, words, progress) // an export would be the solution
-    this.base = base
     this.leave = progress?.onChange(() => this.showState())
     this.showState()
   }
@@ -69,15 +69,14 @@ export class Exercise extends Instrument {
   // --- judging
 
   check() {
-    const { config, words, base, editor } = this
+    const { config, words, simulation, editor } = this
     this.stopJudging()
-    editor.clear()
-    this.notices.clear()
+    for (const row of this.rows) this.showVerdict(row, 'waiting')
+    if (!this.read(editor.text)) return this.summary.replaceChildren()
     this.tries += 1
     this.checkedText = editor.text
-    for (const row of this.rows) this.showVerdict(row, 'waiting')
     this.summary.replaceChildren(words('exercise.live.checking'))
-    const address = (path) => new URL(path, base).href
+    const { address } = simulation
     const addresses = { worker: address(config.worker), module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
     const results = []
     const next = () => results.length < this.rows.length && this.showVerdict(this.rows[results.length], 'running')
@@ -90,6 +89,21 @@ export class Exercise extends Instrument {
       },
       end: (problem) => this.finish(problem, results),
     }) // prettier-ignore
+  }
+
+  /** Say what is wrong with a formula, if anything; returns whether the text can be tried. */
+  read(text) {
+    const { editor, words, config } = this
+    const { exercise } = config
+    editor.clear()
+    this.notices.clear()
+    try {
+      if (exercise.subject === 'formula') formulaCode(text, exercise)
+      return true
+    } catch ({ problem, detail, message }) {
+      editor.fail(problem ? words(`exercise.live.formula_${problem}`, { detail, names: exercise.names.join(', ') }) : message)
+      return false
+    }
   }
 
   showVerdict({ element, verdict, seen, advice, watch, hint }, state, result = null) {
@@ -134,16 +148,16 @@ export class Exercise extends Instrument {
 
   // --- watching
 
-  /** Load what is in the editor, if it is not loaded. */
+  /** Load a text, if it is not loaded; returns whether it can be tried. */
   load(text) {
-    if (this.loadedText === text && this.state !== 'ended') return
+    if (this.loadedText === text && this.state !== 'ended') return true
     const { simulation, config } = this
+    if (!this.read(text)) return false
     this.loadedText = text
-    this.editor.clear()
-    this.notices.clear()
     const model = config.exercise.subject === 'model' ? { xml: text } : {}
     simulation.config = { ...simulation.config, attempt: text, ...model }
     simulation.restart()
+    return true
   }
 
   showPlay(isPlaying) {
@@ -151,8 +165,7 @@ export class Exercise extends Instrument {
   }
 
   togglePlay() {
-    if (this.state !== 'playing' && this.state !== 'loading') this.load(this.editor.text)
-    super.togglePlay()
+    if (this.state === 'playing' || this.state === 'loading' || this.load(this.editor.text)) super.togglePlay()
   }
 
   /** Show the run of a trial, of the text that was judged. */

@@ -365,11 +365,6 @@ export class Lab {
     })
   }
 
-  /** The traces of all plots in turn, evaluated now. */
-  sample() {
-    return this.sampler.evaluate(this.sync())
-  }
-
   /** The warnings that MuJoCo raised since the last call. */
   takeWarnings() {
     return this.warnings.splice(0)

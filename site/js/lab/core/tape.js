@@ -16,7 +16,7 @@ const MOST_NUMBERS = 1_000_000 // in all of them, 8 MB
 const LARGEST = 5000 // values that `ctx` may hold
 const SAMPLES = 4 // of the plots, between two states
 const MOST_MARKS = 200
-const APART = 0.3 // s between two marks of one control
+const APART = 0.3 // s between two marks of one control, or of contacts
 const TOLERANCE = 1e-6 // of a step
 
 export class Tape {
@@ -34,13 +34,18 @@ export class Tape {
     this.isKept = true // no longer if `ctx` holds what cannot be copied
     this.end = { step: -1, time: 0, log: null } // the last step; -1: none yet
     this.marks = []
+    this.touches = []
+    this.contacts = -1 // in the last step; -1: not known
   }
 
-  /** The times (s) between which the lab can be put, and those at which a control was used: `[time, control]`. */
+  /**
+   * The times (s) between which the lab can be put, those at which a control was used, `[time, control]`, and those at which bodies have
+   * begun or ceased to touch.
+   */
   get range() {
-    const { end, marks } = this
+    const { end, marks, touches } = this
     const start = this.states[0]?.time ?? this.lab.time
-    return { start, end: end.step < 0 ? start : end.time, marks }
+    return { start, end: end.step < 0 ? start : end.time, marks, touches }
   }
 
   /** Whether the lab stands at an earlier step. */
@@ -62,7 +67,16 @@ export class Tape {
   /** A step was made. @param {Float64Array | null} numbers of `before` @param {number} time s */
   after(numbers, time) {
     if (numbers !== null) this.keep(numbers, this.lab.physics.read())
+    this.touch(time)
     this.markEnd(time)
+  }
+
+  /** Note that there are more contacts than in the step before, or less. */
+  touch(time) {
+    const { touches, contacts } = this
+    this.contacts = this.lab.data.ncon
+    if (contacts < 0 || contacts === this.contacts || time - touches.at(-1) < APART) return
+    this.touches = [...touches, time].slice(-MOST_MARKS)
   }
 
   /** Something was done to the lab; @param {Float64Array} numbers before `mj_forward` */
@@ -134,6 +148,7 @@ export class Tape {
     const { steps, time } = this.lab
     this.states = this.states.filter(({ step }) => step <= steps)
     this.marks = this.marks.filter(([at]) => at <= time)
+    this.touches = this.touches.filter((at) => at <= time)
     this.lab.sampler.cut(time)
     this.markEnd()
   }
@@ -176,6 +191,7 @@ export class Tape {
     lab.sampler.write(seen)
     lab.steps = step
     lab.log = end.log
+    this.contacts = -1
     lab.arrive()
   }
 

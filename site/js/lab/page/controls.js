@@ -3,12 +3,13 @@
 import { freshId, h, textButton } from './dom.js'
 import { digitsOfStep, formatNumber, withUnit } from './numbers.js'
 
+const USUAL = 9 // characters of a value, for which there is room at first (lab-live.css)
 const STEPS = 200 // of a slider without a step
 const SIGNS = { momentum: 'p', angularMomentum: 'L', forces: 'F' }
 
 /**
  * @param {any[]} controls of the lab's JSON
- * @param {{set: (index: number, value: unknown) => void, press: (index: number) => void}} actions
+ * @param {{set?: (index: number, value: unknown) => void, press?: (index: number) => void}} actions of sliders and lists, and of buttons
  * @returns {{element: HTMLElement | null, show: (values: unknown[]) => void, setEnabled: (on: boolean) => void}}
  */
 export function buildControls(controls, actions) {
@@ -107,7 +108,7 @@ export function switchButton(sign, kind, text, isOn, toggle) {
 /** The readouts: labels, and values whose space grows but never shrinks. */
 export function buildReadouts(readouts, format) {
   if (readouts.length === 0) return { element: null, show: () => {} }
-  const rows = readouts.map(({ label }) => ({ label, value: h('dd', {}, '–'), room: 0, text: '–' }))
+  const rows = readouts.map(({ label }) => ({ label, value: h('dd', {}, '–'), room: USUAL, text: '–' }))
   const element = h('dl', { class: 'lab-readouts' }, ...rows.map(({ label, value }) => h('div', {}, h('dt', {}, label), value)))
   const show = (values) => {
     rows.forEach((row, i) => {

@@ -66,7 +66,7 @@ export class Desk extends Shell {
     this.slider = h('input', { type: 'range', class: 'lab-scrub', 'aria-label': label, title: label })
     Object.assign(this.slider, { min: String(axis.min), max: String(axis.max), step: String((axis.max - axis.min) / 600) })
     this.slider.addEventListener('input', () => this.seek(Number(this.slider.value)))
-    this.controls = buildControls(config.controls, { set: (index, value) => this.set(index, value), press: () => {} })
+    this.controls = buildControls(config.controls, { set: (index, value) => this.set(index, value) })
     this.readouts = buildReadouts(config.readouts, formatReadout)
     this.goal = this.makeGoal({
       show: () => this.begin(config.goal.values),
@@ -81,8 +81,8 @@ export class Desk extends Shell {
     const panel = h('div', { class: 'lab-panel' }, this.controls.element, this.readouts.element)
     this.show(
       'lab-live lab-desk',
-      [h('div', { class: 'lab-screen' }, charts, this.transport.full), this.slider, this.transport.element, this.notices.message],
-      [this.goal?.element ?? null, panel],
+      [h('div', { class: 'lab-screen' }, charts, this.transport.full), this.slider, this.transport.element],
+      [this.goal?.element ?? null, panel, this.notices.message], // below what the reader holds
       foot,
       (isVisible) => {
         this.visible = isVisible

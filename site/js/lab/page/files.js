@@ -54,7 +54,7 @@ function pathOf(name) {
   return parts.length === 0 || parts.includes('..') || /[\0:]/.test(name) ? null : parts.join('/')
 }
 
-/** The model that no other includes; of several that of a scene, then the one that lies highest. */
+/** The model that no other includes; of several that of a scene, then one that includes others, as scenes do, then the one that lies highest. */
 function mainModel(files) {
   const texts = new Map()
   for (const [path, bytes] of files) {
@@ -64,7 +64,7 @@ function mainModel(files) {
   }
   const included = new Set([...texts.values()].flatMap((text) => [...text.matchAll(INCLUDED)].map(([, file]) => file.split('/').at(-1))))
   const depth = (path) => path.split('/').length
-  const rank = (path) => [included.has(path.split('/').at(-1)) ? 1 : 0, SCENE.test(path) ? 0 : 1, depth(path)]
+  const rank = (path) => [included.has(path.split('/').at(-1)) ? 1 : 0, SCENE.test(path) ? 0 : 1, texts.get(path).match(INCLUDED) ? 0 : 1, depth(path)]
   const order = [...texts.keys()].sort((a, b) => {
     const [left, right] = [rank(a), rank(b)]
     const i = left.findIndex((value, k) => value !== right[k])

@@ -109,14 +109,14 @@ export class Instrument extends Shell {
     this.motion = h('p', { class: 'lab-motion', hidden: true })
     this.controls.show(this.values)
     this.transport.setTime(0)
-    const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full)
+    const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full, this.notices.message)
     const panel = h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element)
     const plots = this.plots.map((plot) => plot.element)
     const reason = config.still ? h('p', { class: 'lab-reason' }, config.still) : null // why nothing moves when a reader presses Play
     this.show(
       'lab-live',
       [screen, this.transport.element, this.tape.element, reason],
-      [this.motion, this.notices.message, this.goal?.element ?? null, ...plots, panel],
+      [this.motion, this.goal?.element ?? null, ...plots, panel],
       this.makeFoot(),
       (isVisible) => this.simulation.setVisible(isVisible),
     )
@@ -248,19 +248,20 @@ export class Instrument extends Shell {
   /** Update numbers and plots, less often than the picture. */
   refresh({ time, readouts, realtime, goal, panel, tape }, now) {
     const resting = this.state !== 'playing'
+    const marks = tape.marks.map(([at, i]) => ({ time: at, label: this.config.controls[i].label }))
     if (resting || now - this.textAt >= TEXT_EVERY) {
       this.goal?.show(goal)
       this.textAt = now
       if (readouts !== null) this.readouts.show(readouts)
       this.panel.show(panel)
       this.transport.setTime(time, resting ? this.digits : undefined)
-      this.tape.show(tape, time)
+      const touches = tape.touches.map((at) => ({ time: at, label: this.words('lab.live.touch') }))
+      this.tape.show(tape, time, [...marks, ...touches])
       this.showPlay(!resting)
       this.transport.setRatio(resting ? 1 : realtime)
     }
     if (resting || now - this.plotAt >= PLOT_EVERY) {
       this.plotAt = now
-      const marks = tape.marks.map(([at, i]) => ({ time: at, label: this.config.controls[i].label }))
       this.plots.forEach((plot) => plot.draw({ time, resting, marks }))
       this.panel.draw(panel, { time, resting, marks })
     }

@@ -40,26 +40,24 @@ export class ModelPanel {
     let start = 0
     this.sensors = sensors.map(({ name, size }) => ({ name, start, end: (start += size) }))
     this.sliders = buildControls(
-      actuators.map(({ name, min, max }) => ({ type: 'slider', label: name, unit: '', min, max, step: null, digits: DIGITS })),
-      { set: (i, value) => actions.actuate(i, Number(value)), press: () => {} },
+      actuators.map(({ name, min, max }) => ({ type: 'slider', label: name, min, max, step: null, digits: DIGITS })),
+      { set: (i, value) => actions.actuate(i, Number(value)) },
     )
     this.readouts = buildReadouts(
       sensors.map(({ name }) => ({ label: name, digits: DIGITS })),
       formatReadout,
     )
     const views = [[words('lab.live.camera_free'), -1], ...cameras.map(({ name, index }) => [name, index])]
-    const menu = buildControls([{ type: 'select', label: words('lab.live.camera'), unit: '', options: views }], {
+    const menu = buildControls([{ type: 'select', label: words('lab.live.camera'), options: views }], {
       set: (_, camera) => actions.look(Number(camera)),
-      press: () => {},
     })
     const buttons = buildControls(
       keys.map((label) => ({ type: 'button', label })),
-      { set: () => {}, press: actions.startAt },
+      { press: actions.startAt },
     )
     const tree = parts.map(({ kind, index, depth, name }) => [`${INDENT.repeat(depth)}${kind} ${name}`, { kind, index }])
-    const chooser = buildControls([{ type: 'select', label: words('lab.live.part'), unit: '', options: [['–', null], ...tree] }], {
+    const chooser = buildControls([{ type: 'select', label: words('lab.live.part'), options: [['–', null], ...tree] }], {
       set: (_, part) => actions.examine(/** @type {{kind: string, index: number} | null} */ (part)),
-      press: () => {},
     })
     this.rows = h('div')
     this.rowLabels = ''

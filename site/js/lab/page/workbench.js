@@ -49,7 +49,7 @@ export class Workbench extends Instrument {
     const { words, config, body } = this
     const options = [[config.title, ''], ...(config.starts ?? []).map(({ name, source }) => [name, source])]
     const start = (_, source) => this.startFrom(source)
-    this.starts = buildControls([{ type: 'select', label: words('lab.live.start_from'), unit: '', options }], { set: start, press: () => {} })
+    this.starts = buildControls([{ type: 'select', label: words('lab.live.start_from'), options }], { set: start })
     const picker = h('input', { type: 'file', multiple: true, hidden: true })
     picker.addEventListener('change', async () => {
       await this.openFiles(picker.files)
