@@ -158,19 +158,13 @@ def test_the_nodes_of_a_drawing_are_links(page: Page, base: str) -> None:
 
 
 def test_a_path_that_the_reader_began_leads_on_and_back(page: Page, base: str) -> None:
-    def steps(way: str) -> Locator:
-        return page.get_by_role("link", name=re.compile(way))  # in the bar, and at the end
-
     page.set_viewport_size({"width": 800, "height": 700})
-    page.goto(base + FORMULAS)
-    expect(steps("^Next: 1.2|^Next 1.2")).to_have_count(2)
     page.goto(base)
     page.locator(".path-start").get_by_role("link").click()
-    expect(steps("^Next: ")).to_have_accessible_name("Next: 1.3 Lesson three")
-    page.locator('.pager [rel="next"]').click()
+    page.get_by_role("link", name="Next: 1.3 Lesson three").click()
     page.wait_for_url("**/1.3-three.html")
-    expect(steps("^Previous: 1.1|^Previous 1.1")).to_have_count(2)
-    expect(steps("^Previous")).to_have_count(2)
+    previous = page.get_by_role("link", name="Previous")  # in the bar of the level, and at the end
+    expect(previous).to_have_text(["← 1.1", "Previous 1.1 Lesson one"])
 
 
 def test_the_keyboard_gets_past_the_head_at_once(page: Page, base: str) -> None:

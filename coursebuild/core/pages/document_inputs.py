@@ -310,7 +310,7 @@ def _steps(
     The first path is the map, without a title; of others, steps are left out that are the map's.
     """
     own: dict[str, Lesson] = {}
-    paths = [(path.title, path.lessons) for path in library.course.paths if lesson.id in path.lessons]
+    paths = [(p.title, p.lessons) for p in library.course.paths if lesson.id in p.lessons]
     for title, ids in [("", tuple(x.id for x in library.order)), *paths]:
         position = ids.index(lesson.id)
         for way, side in ("prev", reversed(ids[:position])), ("next", ids[position + 1 :]):
