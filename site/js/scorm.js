@@ -5,6 +5,7 @@
  * lesson does not end it, and answers on other lessons' pages do not count for this lesson.
  */
 
+import { openStorage } from './page/choices.js'
 import { openProgress } from './progress/store.js'
 import { findApi } from './scorm/find.js'
 import { followFrame } from './scorm/frame.js'
@@ -16,14 +17,6 @@ const main = document.querySelector('main')
 const { lesson, src } = main.dataset
 const frame = main.querySelector('iframe')
 const notice = main.querySelector('[role="status"]')
-
-function openStorage() {
-  try {
-    return localStorage
-  } catch {
-    return null
-  }
-}
 
 /** Show one of the page's sentences, or none. */
 function say(name) {

@@ -7,6 +7,7 @@ import { leaveLabs, loadLabs } from './page/labs.js'
 import { keepOffline } from './page/offline.js'
 import { addLineNumbers, followLines } from './page/lines.js'
 import { placeNotes } from './page/notes.js'
+import { followPath } from './page/path.js'
 import { openForPrint } from './page/print.js'
 import { markScrolling } from './page/scroll.js'
 import { leaveQuizzes, mountQuizzes } from './page/quizzes.js'
@@ -43,6 +44,7 @@ let leaveNotes = placeNotes(document)
 openForPrint(window)
 keepOffline(window, words)
 followLines(window)
+followPath(document)
 unfoldLinked(window)
 showVersions(document)
 

@@ -106,7 +106,7 @@ def pytest_of(path: Path) -> tuple[int, str]:
             "Hold it",
             "test_1_1_hold.py",
             "data.qfrc_applied[0] = 0",
-            "data.qfrc_applied[0] = 50 * (0.5 - data.qpos[0]) - 10 * data.qvel[0]",
+            "ctx.way = 0.5 - data.qpos[0]; data.qfrc_applied[0] = 50 * ctx.way - 10 * data.qvel[0]",
             2,
         ),
         ("A push", "test_1_1_speed.py", "return 2 * g * h", "return math.sqrt(2 * g * h)", 1),
@@ -127,6 +127,7 @@ def test_trials_run_by_pytest_on_a_file_of_the_page(
     assert text.startswith("# /// script\n") and start in text
     path.write_text(text.replace(start, solution))
     assert pytest_of(path)[0] == 0
+    assert f"python {name}" in element.inner_text()
     command = [sys.executable, "-I", name]  # as `uv run` does
     process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert (process.returncode, "failed:" in process.stdout) == (0, False), process.stdout

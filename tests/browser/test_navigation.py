@@ -157,6 +157,16 @@ def test_the_nodes_of_a_drawing_are_links(page: Page, base: str) -> None:
     page.wait_for_url("**/1.1-one.html")
 
 
+def test_a_path_that_the_reader_began_leads_on_and_back(page: Page, base: str) -> None:
+    page.set_viewport_size({"width": 800, "height": 700})
+    page.goto(base)
+    page.locator(".path-start").get_by_role("link").click()
+    page.get_by_role("link", name="Next: 1.3 Lesson three").click()
+    page.wait_for_url("**/1.3-three.html")
+    previous = page.get_by_role("link", name="Previous")  # in the bar of the level, and at the end
+    expect(previous).to_have_text(["← 1.1", "Previous 1.1 Lesson one"])
+
+
 def test_the_keyboard_gets_past_the_head_at_once(page: Page, base: str) -> None:
     page.goto(base + FORMULAS)
     page.keyboard.press("Tab")

@@ -289,11 +289,6 @@ def stub_inputs(library: Library, lesson: Lesson) -> PageInputs:
 
 def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, object]:
     """The values that the pages of written and planned lessons share."""
-    order, position = library.order, library.positions[lesson.id]
-    # A reader is led to what can be read.
-    earlier = (x for x in reversed(order[:position]) if x.document is not None)
-    later = (x for x in order[position + 1 :] if x.document is not None)
-    previous, following = next(earlier, None), next(later, None)
     return {
         "lesson": lesson_link(library, place, lesson, whole=True),
         "level": level_view(library, place, library.levels[lesson.level]),
@@ -303,24 +298,27 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
         ),
         "graph": neighbourhood(library, place, lesson),
         "referrers": owner_links(place, library.referrers.get(lesson.id, ())),
-        "previous": previous and lesson_link(library, place, previous),
-        "following": following and lesson_link(library, place, following),
-        "path_steps": tuple(_path_steps(library, place, lesson, following)),
+        "steps": tuple(_steps(library, place, lesson)),
     }
 
 
-def _path_steps(
-    library: Library, place: urls.Place, lesson: Lesson, following: Lesson | None
-) -> Iterator[tuple[str, LessonLink]]:
-    """The title of each path through a lesson, and its next one, where that is not the map's."""
-    for path in library.course.paths:
-        after = (
-            path.lessons[path.lessons.index(lesson.id) + 1 :] if lesson.id in path.lessons else ()
-        )
-        readable = (x for x in map(library.lessons.__getitem__, after) if x.document is not None)
-        step = next(readable, None)
-        if step is not None and step is not following:
-            yield path.title, lesson_link(library, place, step)
+def _steps(
+    library: Library, place: urls.Place, lesson: Lesson
+) -> Iterator[tuple[str, str, LessonLink]]:
+    """The title of each path, its relation, and the next lesson there that can be read.
+
+    The first path is the map, without a title; of others, steps are left out that are the map's.
+    """
+    own: dict[str, Lesson] = {}
+    paths = [(p.title, p.lessons) for p in library.course.paths if lesson.id in p.lessons]
+    for title, ids in [("", tuple(x.id for x in library.order)), *paths]:
+        position = ids.index(lesson.id)
+        for way, side in ("prev", reversed(ids[:position])), ("next", ids[position + 1 :]):
+            lessons = map(library.lessons.__getitem__, side)
+            step = next((x for x in lessons if x.document is not None), None)
+            if step is not None and step is not own.get(way):
+                own |= {} if title else {way: step}
+                yield title, way, lesson_link(library, place, step)
 
 
 def edit_address(library: Library, path: str) -> str | None:

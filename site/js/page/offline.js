@@ -6,6 +6,7 @@
  */
 
 import { isSparing } from '../offline/list.js'
+import { readChoice, writeChoice } from './choices.js'
 
 const WORKER = 'service-worker.js'
 const CHOICES = ['auto', 'read', 'text', 'all', 'none']
@@ -16,21 +17,11 @@ const choiceKey = (document) => `coursebuild.offline.${document.documentElement.
 
 /** What the reader wants to store; `auto` if nothing was chosen, or storage is blocked. */
 export function storedChoice(document) {
-  try {
-    const choice = localStorage.getItem(choiceKey(document))
-    return CHOICES.includes(choice) ? choice : 'auto'
-  } catch {
-    return 'auto'
-  }
+  const choice = readChoice(choiceKey(document))
+  return CHOICES.includes(choice) ? choice : 'auto'
 }
 
-export function storeChoice(document, choice) {
-  try {
-    localStorage.setItem(choiceKey(document), choice)
-  } catch {
-    // Storage is blocked: the choice holds for this page.
-  }
-}
+export const storeChoice = (document, choice) => writeChoice(choiceKey(document), choice)
 
 /** The address of the site's root if a service worker may serve it, else `null`. */
 export function workingRoot({ document, location, navigator, isSecureContext, self, top }) {

@@ -3,25 +3,14 @@
  * Its script is loaded only then; the search page loads it at once.
  */
 
+import { readChoice, writeChoice } from './choices.js'
+
 const KEY = 'coursebuild.shortcuts'
 
 /** Whether shortcuts of a single key are on (WCAG 2.1.4). */
-export function singleKeys() {
-  try {
-    return localStorage.getItem(KEY) !== 'off'
-  } catch {
-    return true
-  }
-}
+export const singleKeys = () => readChoice(KEY) !== 'off'
 
-function setSingleKeys(isOn) {
-  try {
-    if (isOn) localStorage.removeItem(KEY)
-    else localStorage.setItem(KEY, 'off')
-  } catch {
-    // Storage is blocked: they stay on, as on every page.
-  }
-}
+const setSingleKeys = (isOn) => writeChoice(KEY, isOn ? null : 'off')
 
 const FIELDS = 'input, textarea, select, [contenteditable]:not([contenteditable="false"]), .lab, dialog[open]'
 

@@ -1,25 +1,14 @@
 /** The theme: light, dark or the system's; stored in the reader's browser. */
 
+import { readChoice, writeChoice } from './choices.js'
+
 const KEY = 'coursebuild.theme'
 const THEMES = ['auto', 'light', 'dark']
 
 /** The theme that the reader chose; `auto` if none is stored or storage is blocked. */
 export function storedTheme() {
-  try {
-    const theme = localStorage.getItem(KEY)
-    return THEMES.includes(theme) ? theme : 'auto'
-  } catch {
-    return 'auto'
-  }
-}
-
-function storeTheme(theme) {
-  try {
-    if (theme === 'auto') localStorage.removeItem(KEY)
-    else localStorage.setItem(KEY, theme)
-  } catch {
-    // Storage is blocked: the choice holds for this page.
-  }
+  const theme = readChoice(KEY)
+  return THEMES.includes(theme) ? theme : 'auto'
 }
 
 /** Show a theme: the style sheet reads `data-theme`, the browser's interface the meta element. */
@@ -44,7 +33,7 @@ export function addThemeSwitch(document, words) {
   for (const theme of THEMES) select.add(new Option(words(`theme.${theme}`), theme))
   select.value = storedTheme()
   select.addEventListener('change', () => {
-    storeTheme(select.value)
+    writeChoice(KEY, select.value === 'auto' ? null : select.value)
     applyTheme(select.value)
   })
   window.addEventListener('storage', (event) => {

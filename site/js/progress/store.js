@@ -11,6 +11,7 @@
  *    so. A damaged text is backed up before anything is written; its valid parts are taken over.
  */
 
+import { openStorage } from '../page/choices.js'
 import { PREFIX } from './storage.js'
 import { changesSchedule } from './schedule.js'
 import { answerOf, canonical, emptyState, encode, isTime, latest, latestRecalls, merge, NOTHING } from './state.js'
@@ -31,15 +32,6 @@ const LAST_TIME = Date.UTC(9999, 11, 31)
  * @property {string} lesson its id
  * @property {string} at when, ISO
  */
-
-/** The browser's storage; `null` if it is blocked. */
-function openStorage() {
-  try {
-    return globalThis.localStorage ?? null
-  } catch {
-    return null
-  }
-}
 
 /**
  * @param {string} course its key

@@ -1,12 +1,14 @@
 /** The reader's recent queries, stored in this browser only. */
 
+import { readChoice, writeChoice } from '../page/choices.js'
+
 const MOST = 5
 const key = (course) => `coursebuild.search.${course}`
 
 /** The last queries, the newest first. */
-export function recentQueries(course, storage = openStorage()) {
+export function recentQueries(course, storage) {
   try {
-    const queries = JSON.parse(storage.getItem(key(course)))
+    const queries = JSON.parse(readChoice(key(course), storage))
     return Array.isArray(queries) ? queries.filter((query) => typeof query === 'string' && query !== '').slice(0, MOST) : []
   } catch {
     return []
@@ -14,30 +16,14 @@ export function recentQueries(course, storage = openStorage()) {
 }
 
 /** Store a query that led somewhere. */
-export function noteQuery(course, query, storage = openStorage()) {
+export function noteQuery(course, query, storage) {
   const trimmed = query.trim().slice(0, 80)
   if (trimmed === '') return
   const rest = recentQueries(course, storage).filter((item) => item !== trimmed)
-  try {
-    storage.setItem(key(course), JSON.stringify([trimmed, ...rest].slice(0, MOST)))
-  } catch {
-    // Storage is blocked or full: nothing is stored.
-  }
+  writeChoice(key(course), JSON.stringify([trimmed, ...rest].slice(0, MOST)), storage)
 }
 
 /** Forget all queries. */
-export function forgetQueries(course, storage = openStorage()) {
-  try {
-    storage.removeItem(key(course))
-  } catch {
-    // Storage is blocked: nothing was stored.
-  }
-}
-
-function openStorage() {
-  try {
-    return globalThis.localStorage ?? null
-  } catch {
-    return null
-  }
+export function forgetQueries(course, storage) {
+  writeChoice(key(course), null, storage)
 }

@@ -235,7 +235,7 @@ def _keyframe(key: int | str | None) -> str:
 
 def _introduction(lab: Lab, metadata: ExportMetadata, writing: Writing | None) -> str:
     title = f"{_one_line(lab.fields.title)}: " if lab.fields.title else ""
-    commands = [f"uv run {metadata.name}"]
+    runners = ["uv run", "python"]
     if writing is None:
         use = (
             "It starts and steps as the lab in the page does, with the controls as they were "
@@ -243,11 +243,11 @@ def _introduction(lab: Lab, metadata: ExportMetadata, writing: Writing | None) -
         )
     else:
         use = f"Change `{writing.subject}` below until all trials of the page pass."
-        commands.append(f"pytest {metadata.name}")
+        runners.append("pytest")
     origin = f"From the course “{_one_line(metadata.course)}”, for MuJoCo {metadata.engine}. {use}"
     first = f"{title}{_one_line(metadata.origin)}, as a script."
     texts = (textwrap.fill(text, _WIDTH) for text in (first, origin, "Run it with:"))
-    return "\n\n".join([*texts, "\n".join(f"    {command}" for command in commands)])
+    return "\n\n".join([*texts, "\n".join(f"    {runner} {metadata.name}" for runner in runners)])
 
 
 def _comment(control: Slider | Select) -> list[str]:

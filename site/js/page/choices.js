@@ -1,0 +1,22 @@
+/** What the reader chose, stored in this browser. */
+
+/** The browser's storage; `null` if it is blocked. */
+export function openStorage() {
+  try {
+    return globalThis.localStorage ?? null
+  } catch {
+    return null
+  }
+}
+
+export const readChoice = (key, storage = openStorage()) => storage?.getItem(key) ?? null
+
+/** Store a choice; with `null`, forget it. Where storage is blocked or full, it holds for this page. */
+export function writeChoice(key, choice, storage = openStorage()) {
+  try {
+    if (choice === null) storage.removeItem(key)
+    else storage.setItem(key, choice)
+  } catch {
+    // Nothing is stored.
+  }
+}
