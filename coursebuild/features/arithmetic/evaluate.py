@@ -66,6 +66,8 @@ class Numeral(Struct, frozen=True):
     """How many zeros end a whole number."""
     zero: Real = _ZERO
     """Where the scale of its unit begins, in this unit."""
+    is_order: bool = False
+    """Whether it is a power of ten and no more: after `≈`, an order of magnitude."""
 
     def scale(self, size: Real) -> Numeral:
         """Return the number times the size of a unit."""
@@ -94,7 +96,8 @@ def read_numeral(expression: Expression, readings: Readings = FIRST_READINGS) ->
             return replace(numeral, value=beginning + beginning - numeral.value)
         case Expression(kind="^", parts=(Expression(kind="number", text="10"), _)):
             size = evaluate(expression).value
-            return Numeral(size, size, True, 1, ONE) if size.rational is not None else None
+            power = Numeral(size, size, True, 1, ONE, is_order=True)
+            return power if size.rational is not None else None
         case Expression(kind="*", parts=(inner, Expression(kind="unit" | "^") as factor)):
             numeral = read_numeral(inner, readings)
             if numeral is None:
@@ -163,6 +166,10 @@ def agrees(
     where no decimal can be exact, as of 100/3.
     """
     difference, step = (value - numeral.value).abs(), numeral.step
+    if numeral.is_order and relation == "≈":
+        ten = Real.of(10)
+        signs = [(a * ten - b).sign() for a, b in ((value, numeral.value), (numeral.value, value))]
+        return None if None in signs else -1 not in signs
     if numeral.is_whole and relation == "=":
         last_digit = step * Real.of(Fraction(1, 10**numeral.zeros))
         is_long = (value.abs() - last_digit * Real.of(10 ** (numeral.digits - 1))).sign()

@@ -36,6 +36,8 @@ _BRACKETS = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 """A formula between brackets, or below a line that holds nothing but a dollar sign."""
+_DOXYGEN = re.compile(r"(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)|\\f(?P<mark>[$\[\]])", re.DOTALL)
+"""What opens or closes a formula of Doxygen; or code, in which there is none."""
 _LABEL = re.compile(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
 """A label of LaTeX, or of mdBook's preprocessor `numeq`."""
 _EMPTY = re.compile(r"[ \t]*\n?[ \t]*")
@@ -61,6 +63,7 @@ _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 
 def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
+    text = _DOXYGEN.sub(lambda m: ("$" if m["mark"] == "$" else "$$") if m["mark"] else m[0], text)
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
     text = define_operators(_DISPLAY.sub(_drop_empty, text))
     text = _ENVIRONMENT.sub(lambda m: f"$${m['tex']}$$" if m["tex"] else m[0], text)
@@ -79,7 +82,14 @@ def define_operators(text: str) -> str:
 
 def display_formula(tex: str, label: str) -> str:
     """Return a displayed formula in Markdown."""
-    return f"$$\n{tex.strip()}\n$$" + (f" {{#eq:{formula_anchor(label)}}}" if label else "")
+    return f"$$\n{_align(tex).strip()}\n$$" + (f" {{#eq:{formula_anchor(label)}}}" if label else "")
+
+
+def _align(tex: str) -> str:
+    """Write the environment that MyST and Sphinx do not need to align at `&`."""
+    if not re.search(r"(?<!\\)&", _WHOLE_ENVIRONMENT.sub("", tex)):
+        return tex
+    return f"\n\\begin{{aligned}}\n{tex.strip()}\n\\end{{aligned}}\n"
 
 
 def _drop_empty(match: re.Match[str]) -> str:
@@ -95,9 +105,7 @@ def _label_formula(match: re.Match[str]) -> str:
     label = match["myst"] or match["quarto"] or (inside[1] if inside else "")
     tex = _LABEL.sub("", match["tex"])
     tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
-    bare = _WHOLE_ENVIRONMENT.sub("", tex)
-    if re.search(r"(?<!\\)&", bare):  # MyST aligns at `&`, and needs no environment
-        tex = f"\n\\begin{{aligned}}\n{tex.strip()}\n\\end{{aligned}}\n"
+    tex = _align(tex)
     opening, closing = "", match["behind"] or ""
     if lead := _LEAD.search(match["tex"]):  # a mark beside a text could be that of another formula
         line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]

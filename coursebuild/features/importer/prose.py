@@ -27,7 +27,7 @@ from coursebuild.features.importer.source_files import title_of_file
 
 _ATTRIBUTES = (
     r"\{(?:[ ]*(?:#[^\s{}\"'#]+|\.[A-Za-z][\w:-]*"
-    r"|[\w:-]+=(?:\"[^\"\n]*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}"
+    r"|[\w:-]+=(?:\"(?:\\.|[^\"\\\n])*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}"
     r"|\{:[^{}\n]*\}"
 )
 _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
@@ -44,7 +44,7 @@ _LINE = re.compile(
     rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?P<hover>{_LINK_TITLE})?[ \t]*\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
-    rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
+    rf"\((?P<address>(?:@ref[ ]+)?{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
@@ -123,7 +123,7 @@ _KEPT = {
 }
 """What is Markdown here as well."""
 _OVER_LINES = re.compile(
-    r"(?<![\w$\\])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
+    r"(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"

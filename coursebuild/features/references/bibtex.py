@@ -73,7 +73,12 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
     """
     from bibtexparser import middlewares
     from bibtexparser.entrypoint import parse_string
-    from bibtexparser.model import DuplicateBlockKeyBlock, ImplicitComment, MiddlewareErrorBlock
+    from bibtexparser.model import (
+        DuplicateBlockKeyBlock,
+        DuplicateFieldKeyBlock,
+        ImplicitComment,
+        MiddlewareErrorBlock,
+    )
 
     logging.getLogger("bibtexparser").disabled = True
     for name in (
@@ -82,20 +87,38 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
     ):
         logging.getLogger(name).disabled = True
     list_text = source.text.replace("\r\n", "\n").replace("\r", "\n")
-    library = parse_string(
-        list_text,
-        append_middleware=[
-            middlewares.NormalizeFieldKeys(),
-            middlewares.SeparateCoAuthors(),
-            middlewares.SplitNameParts(),
-        ],
-    )
+    library = parse_string(list_text, parse_stack=())
+    for block in library.failed_blocks:
+        if isinstance(block, DuplicateFieldKeyBlock):
+            entry = block.ignore_error_block
+            fields = {field.key: field for field in entry.fields}
+            if all(field.value == fields[field.key].value for field in entry.fields):
+                entry.fields = [*fields.values()]
+                library.replace(block, entry, fail_on_duplicate_key=False)
     diagnostics: list[Diagnostic] = []
 
     def report(line: int, message: str, help: str, notes: tuple[Note, ...] = ()) -> None:
         place = _line(source, line)
         diagnostics.append(diagnose("source-malformed", place, message, help=help, notes=notes))
 
+    for entry in library.entries:  # values as they are written
+        for field in entry.fields:
+            if (swallowed := _find_swallowed(field.value)) is not None:
+                start, message, help = swallowed
+                before = "\n".join(list_text.split("\n")[: field.start_line])
+                start += list_text.index(field.value, len(before))
+                report(
+                    list_text.count("\n", 0, start),
+                    f"in `{entry.key}`, the value of `{field.key}` {message}",
+                    help,
+                )
+    for middleware in (
+        *middlewares.default_parse_stack(),
+        middlewares.NormalizeFieldKeys(),
+        middlewares.SeparateCoAuthors(),
+        middlewares.SplitNameParts(),
+    ):
+        library = middleware.transform(library)
     for block in library.failed_blocks:
         match = _KEY.match(block.raw or "")
         name = f"`{match[1]}`" if match is not None and match[1] else "this entry"
@@ -108,6 +131,9 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
             reason = " ".join(str(block.error).split())
             message, help = f"{name} cannot be read: {reason[:200]}", "mend the field"
             report(block.start_line or 0, message, help)
+        elif isinstance(block, DuplicateFieldKeyBlock):
+            keys = " and ".join(f"`{key}`" for key in sorted(block.duplicate_keys))
+            report(block.start_line or 0, f"{name} has {keys} twice", "keep one of the two values")
         else:
             help = "close each value and each entry with the brace or quote that it opened"
             report(block.start_line or 0, f"{name} is not whole", help)
@@ -117,17 +143,6 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
         for match in _ENTRY.finditer(comment.comment or ""):
             line = (comment.start_line or 0) + comment.comment[: match.start()].count("\n")
             report(line, "no entry begins here", "an entry is `@article{key, title = {…}, …}`")
-    for entry in parse_string(list_text, parse_stack=()).entries:  # values as they are written
-        for field in entry.fields:
-            if (swallowed := _find_swallowed(field.value)) is not None:
-                start, message, help = swallowed
-                before = "\n".join(list_text.split("\n")[: field.start_line])
-                start += list_text.index(field.value, len(before))
-                report(
-                    list_text.count("\n", 0, start),
-                    f"in `{entry.key}`, the value of `{field.key}` {message}",
-                    help,
-                )
     works: list[Work] = []
     for entry in library.entries:
         fields: list[tuple[str, str]] = []

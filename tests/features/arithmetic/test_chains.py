@@ -37,6 +37,7 @@ I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168
 \sum_{n=0}^{10} \frac{1}{n!} \approx 2.7182818, \quad \prod_{i=1}^{5} i = 5!
 2\times10^{-6} = 2\,\mathrm{ppm}, \quad 10^{-9} = 1\,\mathrm{ppb}
 \sum_{i=1}^{3} 2^i\ \mathrm{m} = 14\ \mathrm m, \quad \sum_{i=3}^{2} i = 0
+26! \approx 10^{26}, \quad 26^{25} \approx 10^{35}
 """
 SILENT = r"""
 e = 1
@@ -266,6 +267,7 @@ g\,(0.1\ \mathrm s)^2 = 0.0981\ \mathrm m
 (2 + 1)(0.5) = 1.5
 """
 WRONG = r"""
+26^{25} \approx 10^{34}
 T = 2\pi\sqrt{\ell/g} \approx 2.060
 2\pi\sqrt{\ell/g} = 2\pi\sqrt{1/9.91}
 T = 2\pi\sqrt{\ell/g} \approx 2.006\ \mathrm m
