@@ -96,8 +96,8 @@ def read_numeral(expression: Expression, readings: Readings = FIRST_READINGS) ->
             return replace(numeral, value=beginning + beginning - numeral.value)
         case Expression(kind="^", parts=(Expression(kind="number", text="10"), _)):
             size = evaluate(expression).value
-            power = Numeral(size, size, True, 1, ONE, is_order=True)
-            return power if size.rational is not None else None
+            is_known = size.rational is not None
+            return Numeral(size, size, True, 1, ONE, is_order=True) if is_known else None
         case Expression(kind="*", parts=(inner, Expression(kind="unit" | "^") as factor)):
             numeral = read_numeral(inner, readings)
             if numeral is None:
@@ -168,7 +168,7 @@ def agrees(
     difference, step = (value - numeral.value).abs(), numeral.step
     if numeral.is_order and relation == "≈":
         ten = Real.of(10)
-        signs = [(a * ten - b).sign() for a, b in ((value, numeral.value), (numeral.value, value))]
+        signs = {(value * ten - numeral.value).sign(), (numeral.value * ten - value).sign()}
         return None if None in signs else -1 not in signs
     if numeral.is_whole and relation == "=":
         last_digit = step * Real.of(Fraction(1, 10**numeral.zeros))

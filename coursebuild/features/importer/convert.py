@@ -162,20 +162,18 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
         for path, text in texts.items()
     }
     lacks = {path: name for path in texts if (name := _find_lack(path, parts[path], texts))}
-    whole = {path: names for path, names in parts.items() if path not in lacks}
-    for root, names in _group_by_folder(whole).items():
+    pieces = {part for path in lacks for part in parts.pop(path)}
+    for root, names in _group_by_folder(parts).items():
         _place_models(root, names, models)
-    included = {part for names in whole.values() for part in names if part in texts}
-    pieces = {part for path in lacks for part in parts[path]} - included
+    included = {part for names in parts.values() for part in names if part in texts}
     for path in texts:
-        if path in lacks:
-            message = f"a model that includes `{lacks[path]}`, which the folder does not hold"
-            files.leave(path, message, "model")
-            models.pop(path, None)
-        elif path in included:
+        lack = lacks.get(path)
+        if path in included:
             files.account.changed["fragment of a model", "beside the models that include it"] += 1
-        elif path in pieces or _FRAGMENT.search(texts[path]):
+        elif lack or path in pieces or _FRAGMENT.search(texts[path]):
             message = "a fragment of a model, which no whole one includes: it is compiled with none"
+            if lack:
+                message = f"a model that includes `{lack}`, which the folder does not hold"
             files.leave(path, message, "fragment of a model")
             models.pop(path, None)
     return models
@@ -184,8 +182,8 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
 def _find_lack(path: str, parts: Sequence[str], texts: Mapping[str, str]) -> str:
     """Return the name of a file that a model includes and the folder lacks; empty for none."""
     held = {*map(posixpath.basename, parts)}
-    models = (_COMMENT.sub("", texts[name]) for name in (path, *parts) if name in texts)
-    names = (name for text in models for name in _INCLUDE.findall(text))
+    whole = _COMMENT.sub("", "".join(texts.get(name, "") for name in (path, *parts)))
+    names = _INCLUDE.findall(whole)
     return next((name for name in names if posixpath.basename(name) not in held), "")
 
 

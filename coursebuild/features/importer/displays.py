@@ -36,8 +36,6 @@ _BRACKETS = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 """A formula between brackets, or below a line that holds nothing but a dollar sign."""
-_DOXYGEN = re.compile(r"(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)|\\f(?P<mark>[$\[\]])", re.DOTALL)
-"""What opens or closes a formula of Doxygen; or code, in which there is none."""
 _LABEL = re.compile(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
 """A label of LaTeX, or of mdBook's preprocessor `numeq`."""
 _EMPTY = re.compile(r"[ \t]*\n?[ \t]*")
@@ -52,10 +50,11 @@ DEFINITION = re.compile(
 """A macro of LaTeX."""
 _OPERATOR = re.compile(
     r"(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)"
+    r"|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<display>[^$]+?)\\f\])"
     r"|\\DeclareMathOperator(?P<star>\*?)[ ]*\{?(?P<name>\\[A-Za-z]+)\}?[ ]*\{(?P<word>[^{}]*)\}",
     re.DOTALL,
 )
-"""An operator that is declared; or code, in which there is none."""
+"""An operator that is declared, a formula of Doxygen; or code, in which there is neither."""
 _MACROS = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
 """Where MyST and Sphinx have macros by their names."""
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
@@ -63,7 +62,6 @@ _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 
 def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
-    text = _DOXYGEN.sub(lambda m: ("$" if m["mark"] == "$" else "$$") if m["mark"] else m[0], text)
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
     text = define_operators(_DISPLAY.sub(_drop_empty, text))
     text = _ENVIRONMENT.sub(lambda m: f"$${m['tex']}$$" if m["tex"] else m[0], text)
@@ -71,9 +69,11 @@ def normalize_formulas(text: str) -> str:
 
 
 def define_operators(text: str) -> str:
-    r"""Write as macros what LaTeX's `\DeclareMathOperator` makes operators."""
+    r"""Write LaTeX's `\DeclareMathOperator` as a macro, formulas of Doxygen between dollars."""
 
     def define(match: re.Match[str]) -> str:
+        if match["inline"] or match["display"]:
+            return f"${match['inline']}$" if match["inline"] else f"$${match['display']}$$"
         operator = rf"\operatorname{match['star']}{{{match['word']}}}"
         return rf"\def{match['name']}{{{operator}}}" if match["name"] else match[0]
 

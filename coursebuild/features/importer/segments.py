@@ -32,12 +32,9 @@ _FRONT_MATTER = re.compile(
     r"|\+\+\+[ \t]*\n(?P<toml>.*?\n)?\+\+\+[ \t]*(?:\n|\Z)",
     re.DOTALL,
 )
-_SETTINGS = re.compile(
-    r"(?:\A|(?<=\n\n))---[ \t]*\n(?:[^\s#][^\n]*:[^\n]*\n(?:[ \t]+[^\n]*\n)*)+(?:---|\.\.\.)[ \t]*$",
-    re.MULTILINE,
-)
 _TITLE = re.compile(
-    r"^[ ]{0,3}#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?(?:[ \t]*\{(?:[^{}]*#(?P<label>[\w-]+))?[^{}]*\})?[ \t]*$"
+    r"^[ ]{0,3}#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?"
+    r"(?:[ \t]*\{(?:[^{}]*#(?P<label>[\w-]+))?[^{}]*\})?[ \t]*$"
     r"|(?:\A\n*|(?<=\n\n)|(?<==\n))(?:(?P<line>[^\s#>].*)\n=+|"
     r"(?P<lines>[^\s#>$][^$\n]*(?>(?:\n(?!=+[ \t]*$)[^\s#>$][^$\n]*)+))\n==+)[ \t]*$",
     re.MULTILINE,
@@ -106,8 +103,6 @@ def read_segments(text: str, name: str) -> ReadText:
     else:
         metadata, size = read_front_matter(text)
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
-        if name.endswith((".qmd", ".Rmd")):
-            segments, metadata = _take_settings(segments, metadata)
     # The first heading of level 1, and the segments without it; from the next on, all go down by 1
     titles: list[str] = []
     own_title = " ".join(str(metadata.get("title") or "").split())
@@ -170,26 +165,6 @@ _HIGHLIGHT = re.compile(
 def _join_gates(gates: re.Match[str]) -> str:
     mark = "`" * 12
     return f"{mark}{{{gates['name']}}}{gates['head']}\n{gates['body']}\n{mark}"
-
-
-def _take_settings(
-    segments: Iterable[Segment], metadata: Mapping[str, Any]
-) -> tuple[list[Segment], Mapping[str, Any]]:
-    """Return the segments without the settings that Pandoc takes anywhere, and all settings."""
-    settings: dict[str, Any] = {}
-
-    def take(block: re.Match[str]) -> str:
-        values, size = read_front_matter(block[0])
-        settings.update(values)
-        return block[0][size:] if values else block[0]
-
-    parts = [
-        replace(segment, text=_SETTINGS.sub(take, segment.text))
-        if segment.kind == "prose"
-        else segment
-        for segment in segments
-    ]
-    return parts, {**settings, **metadata}
 
 
 def lower_titles(text: str) -> str:

@@ -76,6 +76,7 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
     from bibtexparser.model import (
         DuplicateBlockKeyBlock,
         DuplicateFieldKeyBlock,
+        Entry,
         ImplicitComment,
         MiddlewareErrorBlock,
     )
@@ -88,16 +89,15 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
         logging.getLogger(name).disabled = True
     list_text = source.text.replace("\r\n", "\n").replace("\r", "\n")
     library = parse_string(list_text, parse_stack=())
-    for block in library.failed_blocks:
-        if isinstance(block, DuplicateFieldKeyBlock):
-            entry = block.ignore_error_block
-            fields = {field.key: field for field in entry.fields}
-            if all(field.value == fields[field.key].value for field in entry.fields):
-                entry.fields = [*fields.values()]
-                library.replace(block, entry, fail_on_duplicate_key=False)
+    for failed in library.failed_blocks:
+        entry = failed.ignore_error_block
+        if isinstance(failed, DuplicateFieldKeyBlock) and isinstance(entry, Entry):
+            if len({(f.key, f.value) for f in entry.fields}) == len(entry.fields_dict):
+                entry.fields = [*entry.fields_dict.values()]
+                library.replace(failed, entry, fail_on_duplicate_key=False)
     diagnostics: list[Diagnostic] = []
 
-    def report(line: int, message: str, help: str, notes: tuple[Note, ...] = ()) -> None:
+    def report(line: int | None, message: str, help: str, notes: tuple[Note, ...] = ()) -> None:
         place = _line(source, line)
         diagnostics.append(diagnose("source-malformed", place, message, help=help, notes=notes))
 
@@ -120,23 +120,19 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
     ):
         library = middleware.transform(library)
     for block in library.failed_blocks:
-        match = _KEY.match(block.raw or "")
+        match, notes = _KEY.match(block.raw or ""), tuple[Note, ...]()
         name = f"`{match[1]}`" if match is not None and match[1] else "this entry"
+        message = f"{name} is not whole"
+        help = "close each value and each entry with the brace or quote that it opened"
         if isinstance(block, DuplicateBlockKeyBlock):
-            first = _line(source, block.previous_block.start_line or 0)
-            notes = (Note("the first one is here", first),)
+            notes = (Note("the first one is here", _line(source, block.previous_block.start_line)),)
             message, help = f"{name} is listed twice", "give one of the two another key"
-            report(block.start_line or 0, message, help, notes)
+        elif isinstance(block, DuplicateFieldKeyBlock):
+            message, help = f"{name} has `{min(block.duplicate_keys)}` twice", "keep one of them"
         elif isinstance(block, MiddlewareErrorBlock):
             reason = " ".join(str(block.error).split())
             message, help = f"{name} cannot be read: {reason[:200]}", "mend the field"
-            report(block.start_line or 0, message, help)
-        elif isinstance(block, DuplicateFieldKeyBlock):
-            keys = " and ".join(f"`{key}`" for key in sorted(block.duplicate_keys))
-            report(block.start_line or 0, f"{name} has {keys} twice", "keep one of the two values")
-        else:
-            help = "close each value and each entry with the brace or quote that it opened"
-            report(block.start_line or 0, f"{name} is not whole", help)
+        report(block.start_line, message, help, notes)
     for comment in library.blocks:
         if not isinstance(comment, ImplicitComment):
             continue
@@ -152,7 +148,7 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
                 people.append((field.key, tuple(map(_read_name, field.value))))
             else:
                 fields.append((field.key, _plain(str(field.value), field.key)))
-        kind, span = entry.entry_type.lower(), _line(source, entry.start_line or 0)
+        kind, span = entry.entry_type.lower(), _line(source, entry.start_line)
         works.append(Work(entry.key, kind, tuple(fields), tuple(people), span))
     return Parsed(tuple(works), tuple(diagnostics))
 
@@ -191,9 +187,9 @@ def _end_of_piece(value: str, start: int) -> int:
     return len(value)
 
 
-def _line(source: Source, index: int) -> Span:
-    """A line of the list, from 0, without the white space at its ends."""
-    line = min(index + 1, len(source.line_starts))
+def _line(source: Source, index: int | None) -> Span:
+    """A line of the list, from 0, without the white space at its ends; the first if unknown."""
+    line = min((index or 0) + 1, len(source.line_starts))
     text = source.line_text(line)
     start = source.line_start(line) + len(text) - len(text.lstrip())
     return source.span(start, start + len(text.strip()))

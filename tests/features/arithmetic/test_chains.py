@@ -169,6 +169,7 @@ def test_what_can_be_meant_otherwise_is_not_judged() -> None:
         r"\tfrac34\cdot100 = 75\,\%": "its unit may be that of another part",
         r"2\cdot3000 = 6\,\mathrm{km/s}": base_units,
         r"1/(4\cdot10^{-4}) \approx 2.5\,\mathrm{kHz}": base_units,
+        r"-2\cdot96485\cdot1.10 = -212\ \mathrm{kJ/mol}": base_units,
         r"1.6\mathrm e{-19} = 1.6\times10^{-19}": "it may be a power of ten",
     }
     for tex, reason in reasons.items():
