@@ -58,7 +58,7 @@ class _Reader(HTMLParser):
             elif name.startswith("data-") and not _KEY.fullmatch(value):
                 self._read_data(value)
         if tag not in {"img", "input", "br", "meta", "link", "hr", "source", "wbr"}:
-            is_comment = re.search(r"\b(?:c1?|sd)\b", values.get("class", "")) and self._in_code()
+            is_comment = re.search(r"\b(?:c1?|d)\b", values.get("class", "")) and self._in_code()
             self._open.append("comment" if is_comment else tag)
 
     def handle_endtag(self, tag: str) -> None:
