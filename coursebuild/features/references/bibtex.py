@@ -91,10 +91,11 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
     library = parse_string(list_text, parse_stack=())
     for failed in library.failed_blocks:
         entry = failed.ignore_error_block
-        if isinstance(failed, DuplicateFieldKeyBlock) and isinstance(entry, Entry):
-            if len({(f.key, f.value) for f in entry.fields}) == len(entry.fields_dict):
-                entry.fields = [*entry.fields_dict.values()]
-                library.replace(failed, entry, fail_on_duplicate_key=False)
+        if not (isinstance(failed, DuplicateFieldKeyBlock) and isinstance(entry, Entry)):
+            continue
+        if len({(f.key, f.value) for f in entry.fields}) == len(entry.fields_dict):
+            entry.fields = [*entry.fields_dict.values()]
+            library.replace(failed, entry, fail_on_duplicate_key=False)
     diagnostics: list[Diagnostic] = []
 
     def report(line: int | None, message: str, help: str, notes: tuple[Note, ...] = ()) -> None:

@@ -227,6 +227,7 @@ TABLE = "| a | b |\n|---|---|\n| `{n}` | c |\n| `{n,}` | d |\n"
         ("a.md", TABLE, TABLE),
         ("a.md", '## B { #b data-label="C \\"d\\"" }\n\nText.\n', "## B {#b}\n\nText.\n"),
         ("a.md", "A.\n\n # B\n\nText.\n", "A.\n\n## B\n\nText.\n"),
+        ("a.md", "- A:\n\n  ```sh\n  # B\n  ```\n", "- A:\n\n  ```sh\n  # B\n  ```\n"),
         ("a.md", "% Later.\n\n```{bibliography} b.bib\n```\n", "<!-- Later. -->\n"),
     ],
 )
