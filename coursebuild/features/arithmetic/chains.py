@@ -28,7 +28,6 @@ from coursebuild.features.arithmetic.evaluate import (
     FormulaComparison,
     Readings,
     agrees,
-    choose_rounded,
     describe_dimension,
     evaluate,
     read_numeral,
@@ -51,6 +50,7 @@ from coursebuild.features.arithmetic.symbol_comparison import (
     NotJudged,
     SymbolComparison,
     SymbolQuantity,
+    choose_rounded,
     decide,
 )
 

@@ -96,8 +96,7 @@ def read_numeral(expression: Expression, readings: Readings = FIRST_READINGS) ->
             return replace(numeral, value=beginning + beginning - numeral.value)
         case Expression(kind="^", parts=(Expression(kind="number", text="10"), _)):
             size = evaluate(expression).value
-            is_known = size.rational is not None
-            return Numeral(size, size, True, 1, ONE, is_order=True) if is_known else None
+            return Numeral(size, size, True, 1, ONE, is_order=True) if size.rational else None
         case Expression(kind="*", parts=(inner, Expression(kind="unit" | "^") as factor)):
             numeral = read_numeral(inner, readings)
             if numeral is None:
@@ -180,18 +179,6 @@ def agrees(
         step = last_digit
     excess = (difference * Real.of(2) - step).sign()
     return None if excess is None else excess <= 0
-
-
-def choose_rounded(numerals: Mapping[int, Numeral], relation: str) -> int:
-    """Return which side of a relation may be rounded: that with the coarser digits.
-
-    A whole number is exact after `=`, and beside a decimal in another unit, as in `1 mi ≈ 1.6 km`.
-    """
-    rounded = {i: numeral for i, numeral in numerals.items() if not numeral.is_whole}
-    sizes = {float(numeral.unit_size) for numeral in numerals.values()}
-    if rounded and (relation == "=" or len(sizes) > 1):
-        numerals = rounded
-    return max(numerals, key=lambda i: (float(numerals[i].step), i))
 
 
 _MAX_CHOICES = 5

@@ -181,10 +181,10 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
 
 def _find_lack(path: str, parts: Sequence[str], texts: Mapping[str, str]) -> str:
     """Return the name of a file that a model includes and the folder lacks; empty for none."""
-    held = {*map(posixpath.basename, parts)}
+    part_names = {*map(posixpath.basename, parts)}
     whole = _COMMENT.sub("", "".join(texts.get(name, "") for name in (path, *parts)))
     names = _INCLUDE.findall(whole)
-    return next((name for name in names if posixpath.basename(name) not in held), "")
+    return next((name for name in names if posixpath.basename(name) not in part_names), "")
 
 
 def _group_by_folder(parts: Mapping[str, Sequence[str]]) -> Mapping[str, set[str]]:

@@ -89,13 +89,13 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
         logging.getLogger(name).disabled = True
     list_text = source.text.replace("\r\n", "\n").replace("\r", "\n")
     library = parse_string(list_text, parse_stack=())
-    for failed in library.failed_blocks:
-        entry = failed.ignore_error_block
-        if not (isinstance(failed, DuplicateFieldKeyBlock) and isinstance(entry, Entry)):
+    for block in library.failed_blocks:
+        entry = block.ignore_error_block
+        if not (isinstance(block, DuplicateFieldKeyBlock) and isinstance(entry, Entry)):
             continue
         if len({(f.key, f.value) for f in entry.fields}) == len(entry.fields_dict):
             entry.fields = [*entry.fields_dict.values()]
-            library.replace(failed, entry, fail_on_duplicate_key=False)
+            library.replace(block, entry, fail_on_duplicate_key=False)
     diagnostics: list[Diagnostic] = []
 
     def report(line: int | None, message: str, help: str, notes: tuple[Note, ...] = ()) -> None:
