@@ -223,11 +223,6 @@ def unproven(course: Course) -> tuple[Diagnostic, ...]:
     return tuple(entry for _, find in _offers("unproven") for entry in find(course))
 
 
-def proved_results(document: Document) -> tuple[Span, ...]:
-    """The results in a document that features prove."""
-    return tuple(span for _, find in _offers("proofs") for span in find(document))
-
-
 def summarize(document: Document, mathml: Mathml) -> Parsed[dict[str, Struct]]:
     """The summaries of a document that features make, by feature, and what is wrong in it."""
     summaries = {name: make(document, mathml) for name, make in _offers("summary")}

@@ -31,7 +31,7 @@ from coursebuild.core.model import (
     find_inlines,
 )
 from coursebuild.core.model.addresses import recorded_figures
-from coursebuild.core.registry import feature_trials, proved_results
+from coursebuild.core.registry import feature_trials, features
 from coursebuild.core.scripts.bound_places import document_bindings
 from coursebuild.core.text.source import Source, Span
 from coursebuild.core.values import fingerprint
@@ -177,7 +177,7 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
         if fence is not None and fence["word"] not in _TRIED:
             proof = _proof("block", _fenced_line(block.span), block.span)
             yield replace(proof, fence=fence["word"]), block.span, None
-    for span in proved_results(document):
+    for span in (s for f in features() if f.proofs is not None for s in f.proofs(document)):
         if numbers := _NUMBER.findall(span.text):
             yield _proof("result", numbers[-1], span), span, None
     for link in find_inlines(document, Link):
