@@ -81,10 +81,12 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
         MiddlewareErrorBlock,
     )
 
-    logging.getLogger("bibtexparser").disabled = True
     for name in (
-        *("bibtexparser.entrypoint", "bibtexparser.splitter"),
-        *("pylatexenc.latexwalker", "pylatexenc.latex2text"),
+        "bibtexparser",
+        "bibtexparser.entrypoint",
+        "bibtexparser.splitter",
+        "pylatexenc.latexwalker",
+        "pylatexenc.latex2text",
     ):
         logging.getLogger(name).disabled = True
     list_text = source.text.replace("\r\n", "\n").replace("\r", "\n")
