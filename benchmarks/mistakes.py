@@ -20,6 +20,9 @@ With `--lessons` only so many lessons and pages, drawn by the first seed, are ve
 compared, besides the map and models; what a change of these breaks elsewhere is then not noticed.
 
 Nothing excuses a silence: which slips could not be known either, a reader of the list decides.
+Claims are what says something that could be tried. None are a formula without a relation, as `$m$`,
+which names something and says nothing of it; commands, and what they printed, in blocks that are
+only shown; and docstrings and comments, which are words.
 Beside the silence stand the false alarms that it was bought with: those of `corpus.py --record`.
 """
 

@@ -21,6 +21,8 @@ _BLOCKS = {
     "output": "output",
     "quiz": "quiz",
     "lab": "lab",
+    "sh": "shown",
+    "console": "shown",
 }
 """Kinds of places by the first word of a fence; in all others it is `other block`."""
 _INLINE = re.compile(
@@ -39,6 +41,9 @@ _INLINE = re.compile(
     r"|(?P<words>[^\W\d_]{2,})",
     re.MULTILINE,
 )
+_RELATION = re.compile(
+    r"[=<>]|\\(?:approx|neq?|leq?|geq?|ll|gg|sim(?:eq)?|propto|equiv|in|to)(?![A-Za-z])"
+)
 _PLACES = {
     "words": "words of prose",
     "digits": "numbers in prose",
@@ -49,6 +54,7 @@ _PLACES = {
     "link": "links",
     "code": "inline code",
     "formula": "formulas",
+    "symbols": "symbols",
     "heading": "heading marks",
     "emphasis": "emphasis marks",
     "list": "marks of lists, tables and quotes",
@@ -61,6 +67,7 @@ _PLACES = {
     "quiz": "quizzes",
     "lab": "labs",
     "other block": "other blocks",
+    "shown": "commands",
     "map": "course map",
     "declarations": "declarations of models",
 }
@@ -160,7 +167,9 @@ def parts(path: str, text: str) -> list[Part]:
 def _prose_parts(text: str, start: int, end: int) -> Iterator[Part]:
     for match in _INLINE.finditer(text, start, end):
         for name, value in match.groupdict().items():
-            if value:
+            if name == "formula" and value and not _RELATION.search(value):
+                yield Part("symbols", match.start(name), match.end(name))
+            elif value:
                 yield Part(name, match.start(name), match.end(name))
 
 

@@ -21,6 +21,8 @@ _SAID = ("alt", "title", "aria-label", "content", "placeholder")
 """Attributes that hold prose."""
 _KEY = re.compile("[0-9a-f]{8}")
 """What the tool made of words: a hash, which may be a number."""
+_HASH = re.compile(r"\.[0-9a-f]{8}(?=\.\w+$)")
+"""That of a file to download, which holds what its page shows, and words that are said later."""
 _SAID_FIELDS = frozenset(
     "title label text note q options explain hint hints reference ylabel xlabel unit name".split()
 )
@@ -48,7 +50,7 @@ class _Reader(HTMLParser):
         visible = {n: v for n, v in values.items() if n not in _SAID and n not in structural}
         visible = {n: v for n, v in visible.items() if not n.startswith(("aria-", "data-"))}
         if "href" in values:
-            visible["href"] = values["href"].partition("#")[0]
+            visible["href"] = _HASH.sub("", values["href"].partition("#")[0])
         self.tokens.append(("tag", tag + json.dumps(visible, sort_keys=True)))
         for name, value in values.items():
             if name in _SAID:
@@ -56,7 +58,7 @@ class _Reader(HTMLParser):
             elif name.startswith("data-") and not _KEY.fullmatch(value):
                 self._read_data(value)
         if tag not in {"img", "input", "br", "meta", "link", "hr", "source", "wbr"}:
-            is_comment = re.search(r"\bc1?\b", values.get("class", "")) and self._in_code()
+            is_comment = re.search(r"\b(?:c1?|d)\b", values.get("class", "")) and self._in_code()
             self._open.append("comment" if is_comment else tag)
 
     def handle_endtag(self, tag: str) -> None:

@@ -373,6 +373,8 @@ class Feature(Struct, frozen=True, kw_only=True):
     """The diagnostics about what scripts did."""
     unproven: Callable[[Course], Iterable[Diagnostic]] | None = None
     """What the course states, and nothing in it gives, for `check --truth`."""
+    proofs: Callable[[Document], Iterable[Span]] | None = None
+    """The results in a document that its diagnostics, if there are none, prove."""
     check_models: (
         Callable[[Course, Callable[[FeatureBlock], ModelFacts | None]], Iterable[Diagnostic]] | None
     ) = None

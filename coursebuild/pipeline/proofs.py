@@ -31,18 +31,19 @@ from coursebuild.core.model import (
     find_inlines,
 )
 from coursebuild.core.model.addresses import recorded_figures
-from coursebuild.core.registry import feature_trials
+from coursebuild.core.registry import feature_trials, features
 from coursebuild.core.scripts.bound_places import document_bindings
 from coursebuild.core.text.source import Source, Span
 from coursebuild.core.values import fingerprint
 from coursebuild.report.values import plural
 
-Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "block", "link"]
+Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "block", "link", "result"]
 KIND = "proofs"
 """That of entries of the store: what was proved of a document, by the hash of its path."""
 _OPAQUE = re.compile(r"[A-Za-z][\w+.-]*:(?!//)")
 """An address that nothing looks up, as `mailto:` and a misspelt `lesson:`."""
 _FENCE = re.compile(r"(?:`{3,}|~{3,})[ ]*(?P<word>[\w-]+)")
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
 _TRIED = frozenset(("lab", "exercise"))
 """Blocks that are proved by a trial."""
 
@@ -71,8 +72,8 @@ class Proof(Struct, frozen=True):
         match self.kind:
             case "value":
                 return f"`{self.text}`"
-            case "figure":
-                return f"the figure `{self.text}`"
+            case "figure" | "result":
+                return f"the {self.kind} `{self.text}`"
             case "lab":
                 return "the lab"
             case "block":
@@ -176,6 +177,9 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
         if fence is not None and fence["word"] not in _TRIED:
             proof = _proof("block", _fenced_line(block.span), block.span)
             yield replace(proof, fence=fence["word"]), block.span, None
+    for span in (s for f in features() if f.proofs is not None for s in f.proofs(document)):
+        if numbers := _NUMBER.findall(span.text):
+            yield _proof("result", numbers[-1], span), span, None
     for link in find_inlines(document, Link):
         text = link.target_span.text
         is_opaque = isinstance(link.target, UrlTarget) and _OPAQUE.match(text)

@@ -13,7 +13,8 @@ from benchmarks.measure.building import make_site, remove
 from benchmarks.measure.running import measure_scripts
 from benchmarks.measure.tools import Places, all_tools
 from benchmarks.mistakes import describe, run, table
-from benchmarks.slips.changes import KINDS
+from benchmarks.slips.changes import KINDS, parts
+from benchmarks.slips.pages import compare_pages
 from coursebuild.cli import main
 from support.scratch_course import Folder
 
@@ -167,4 +168,13 @@ def test_mistakes_of_each_kind_end_as_they_did(rewriting: bool) -> None:
     if rewriting:
         EXPECTED.write_text(text, encoding="utf-8")
     assert text == EXPECTED.read_text(encoding="utf-8")
-    assert {outcome.change.kind for outcome in outcomes} >= {*KINDS} - {"declarations of models"}
+    kinds = {outcome.change.kind for outcome in outcomes}
+    assert {*KINDS} - kinds <= {"commands", "declarations of models"}
+
+
+def test_what_only_names_or_says_something_is_no_claim() -> None:
+    text = "So $m$ is in $a = b$.\n\n```sh\nls\n```\n"
+    places = [text[part.start : part.end] + " " + part.place for part in parts("a.md", text)]
+    assert {"$m$ symbols", "$a = b$ formula", "ls shown"} <= {*places}
+    pages = [f'<main><pre><i class="d">"""{w}."""</i></pre></main>'.encode() for w in ("A", "B")]
+    assert compare_pages(*pages) == "prose"

@@ -51,6 +51,24 @@ def test_a_value_that_is_bound_no_longer_is_told(
     assert_told(make, LESSON, old, new, remark)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "remark"),
+    [
+        (
+            r"0.2\cdot0.2",
+            "0.2cdot0.2",
+            "1.1: the result `0.64` in line 3 was proved before and is not now (proved: nothing)",
+        ),
+        (r"16\cdot0.2\cdot0.2 = 0.64", r"16\cdot0.1\cdot0.2 = 0.32", ""),
+        (r"$16\cdot0.2\cdot0.2 = 0.64$ kg", "little", ""),
+    ],
+)
+def test_a_result_that_is_not_computed_any_more_is_told(
+    make: Make, old: str, new: str, remark: str
+) -> None:
+    assert_told(make, "## Plate\n\nIt has $16\\cdot0.2\\cdot0.2 = 0.64$ kg.\n", old, new, remark)
+
+
 def test_an_output_that_became_an_illustration_is_told_once(make: Make) -> None:
     lesson = "## Fall\n\n" + block("fall.py", "print('time', 0.357, 's')", "time 0.357 s")
     folder = make(lesson)

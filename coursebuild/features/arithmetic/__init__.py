@@ -41,11 +41,14 @@ class FormulaSummary(Struct, frozen=True):
     """Symbols whose meaning the document declares, and their units."""
     identities: tuple[tuple[Excerpt, str, Span], ...]
     """Formulas whose label says `check`, their domains and where these stand."""
+    results: tuple[Span, ...] = ()
+    """Relations that hold."""
 
 
 def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]:
     """Summarize the formulas of a document; diagnostics are for numbers that are wrong."""
     identities: list[tuple[Excerpt, str, Span]] = []
+    results: list[Span] = []
     symbols, comparisons = read_symbols(document), check_formulas(document)
     diagnostics = list(symbols.diagnostics)
     for _, formula in find_formulas(document):
@@ -55,7 +58,9 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
             identities.append((tex, label.conditions or "", label.domain.span()))
         for comparison in comparisons.get(tex.span().start, ()):
             span, message = tex.span(comparison.start, comparison.end), comparison.message
-            if comparison.kind == "wrong":
+            if comparison.kind == "holds":
+                results.append(span)
+            elif comparison.kind == "wrong":
                 texts = (span.text, comparison.result)
                 are_plain = all(re.fullmatch(r"-?[\d.]+", text) for text in texts)
                 label_text = "" if is_inline else "#eq:name "
@@ -64,8 +69,15 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
                 mistake = diagnose("formula-arithmetic", span, message, help=fix)
                 diagnostics.append(mistake)
     units = tuple((symbol.name, symbol.unit_text) for symbol in symbols.declarations.values())
-    formulas = FormulaSummary(units, tuple(identities)) if units or identities else None
-    return Parsed(formulas, tuple(diagnostics))
+    formulas = FormulaSummary(units, tuple(identities), tuple(results))
+    is_empty = not (units or identities or results)
+    return Parsed(None if is_empty else formulas, tuple(diagnostics))
+
+
+def proofs(document: Document) -> tuple[Span, ...]:
+    """Return the relations of a document that were computed, and hold."""
+    document_summary = document.summary_of(FormulaSummary)
+    return () if document_summary is None else document_summary.results
 
 
 def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
@@ -109,6 +121,7 @@ FEATURE = Feature(
     name="arithmetic",
     summary=summary,
     check=check,
+    proofs=proofs,
     rules=(
         Rule("formula-arithmetic", "error", "A number in a formula is not the result."),
         Rule(

@@ -28,7 +28,6 @@ from coursebuild.features.arithmetic.evaluate import (
     FormulaComparison,
     Readings,
     agrees,
-    choose_rounded,
     describe_dimension,
     evaluate,
     read_numeral,
@@ -51,6 +50,7 @@ from coursebuild.features.arithmetic.symbol_comparison import (
     NotJudged,
     SymbolComparison,
     SymbolQuantity,
+    choose_rounded,
     decide,
 )
 
@@ -213,6 +213,8 @@ def _may_hold(sides: tuple[Expression, Expression], relation: str) -> bool:
 
 def _holds_in_base_units(bare: Expression, quantity: Expression, relation: str) -> bool:
     r"""Whether a number is that of a quantity in base units: `2\cdot3000 = 6\,\mathrm{kW}`."""
+    if quantity.kind == "-" and len(quantity.parts) == 1:
+        return _holds_in_base_units(replace(quantity, parts=(bare,)), quantity.parts[0], relation)
     if relation in ORDERS or bare.has("unit") or not quantity.ends_in_unit():
         return False
     numeral = read_numeral(quantity) if find_units(quantity.parts[1].text) else None

@@ -66,6 +66,8 @@ class Numeral(Struct, frozen=True):
     """How many zeros end a whole number."""
     zero: Real = _ZERO
     """Where the scale of its unit begins, in this unit."""
+    is_order: bool = False
+    """Whether it is a power of ten and no more: after `≈`, an order of magnitude."""
 
     def scale(self, size: Real) -> Numeral:
         """Return the number times the size of a unit."""
@@ -94,7 +96,7 @@ def read_numeral(expression: Expression, readings: Readings = FIRST_READINGS) ->
             return replace(numeral, value=beginning + beginning - numeral.value)
         case Expression(kind="^", parts=(Expression(kind="number", text="10"), _)):
             size = evaluate(expression).value
-            return Numeral(size, size, True, 1, ONE) if size.rational is not None else None
+            return Numeral(size, size, True, 1, ONE, is_order=True) if size.rational else None
         case Expression(kind="*", parts=(inner, Expression(kind="unit" | "^") as factor)):
             numeral = read_numeral(inner, readings)
             if numeral is None:
@@ -163,6 +165,10 @@ def agrees(
     where no decimal can be exact, as of 100/3.
     """
     difference, step = (value - numeral.value).abs(), numeral.step
+    if numeral.is_order and relation == "≈":
+        ten = Real.of(10)
+        signs = {(value * ten - numeral.value).sign(), (numeral.value * ten - value).sign()}
+        return None if None in signs else -1 not in signs
     if numeral.is_whole and relation == "=":
         last_digit = step * Real.of(Fraction(1, 10**numeral.zeros))
         is_long = (value.abs() - last_digit * Real.of(10 ** (numeral.digits - 1))).sign()
@@ -173,18 +179,6 @@ def agrees(
         step = last_digit
     excess = (difference * Real.of(2) - step).sign()
     return None if excess is None else excess <= 0
-
-
-def choose_rounded(numerals: Mapping[int, Numeral], relation: str) -> int:
-    """Return which side of a relation may be rounded: that with the coarser digits.
-
-    A whole number is exact after `=`, and beside a decimal in another unit, as in `1 mi ≈ 1.6 km`.
-    """
-    rounded = {i: numeral for i, numeral in numerals.items() if not numeral.is_whole}
-    sizes = {float(numeral.unit_size) for numeral in numerals.values()}
-    if rounded and (relation == "=" or len(sizes) > 1):
-        numerals = rounded
-    return max(numerals, key=lambda i: (float(numerals[i].step), i))
 
 
 _MAX_CHOICES = 5

@@ -24,7 +24,6 @@ from coursebuild.features.arithmetic.evaluate import (
     PhysicalQuantity,
     WrongDimensions,
     agrees,
-    choose_rounded,
     describe_dimension,
     evaluate,
     has_zero,
@@ -293,6 +292,18 @@ class SymbolComparison:
         if sign is None and all(symbol.step is None for symbol in self.known.values()):
             raise self.expressions[1].not_understood(UNDECIDED)
         return not sign
+
+
+def choose_rounded(numerals: Mapping[int, Numeral], relation: str) -> int:
+    """Return which side of a relation may be rounded: that with the coarser digits.
+
+    A whole number is exact after `=`, and beside a decimal in another unit, as in `1 mi ≈ 1.6 km`.
+    """
+    rounded = {i: numeral for i, numeral in numerals.items() if not numeral.is_whole}
+    sizes = {float(numeral.unit_size) for numeral in numerals.values()}
+    if rounded and (relation == "=" or len(sizes) > 1):
+        numerals = rounded
+    return max(numerals, key=lambda i: (float(numerals[i].step), i))
 
 
 def _find_symbol(name: str, symbols: Mapping[str, SymbolQuantity]) -> SymbolQuantity | None:

@@ -186,8 +186,11 @@ _PROOF_CLASSES = ("theorem", "lemma", "definition", "proof", "remark", "solution
 
 def _take_heading(text: str) -> tuple[str, str]:
     """Return the heading that begins a text, and the text below it; no heading is empty."""
-    heading = re.match(r"\s*#{1,6}[ \t]+(.*)\n?", text)
-    return (heading[1].strip(), text[heading.end() :]) if heading else ("", text)
+    heading = re.match(r"\s*#{1,6}[ \t]+(.*?)[ \t]*(?:\{#([\w-]+)\}[ \t]*)?(?:\n|\Z)", text)
+    if heading is None:
+        return "", text
+    anchor = f'<a id="{to_anchor(heading[2])}"></a>\n' if heading[2] else ""
+    return heading[1], anchor + text[heading.end() :]
 
 
 def _convert_fence(head: str, text: str, context: LessonContext) -> str:

@@ -261,6 +261,8 @@ def _without_host(text: str, context: LessonContext) -> str:
                 pass
             case ast.ImportFrom(module="myst_nb"):
                 pass
+            case ast.ImportFrom(module="__future__") if context.parts:  # it would come too late
+                pass
             case ast.Expr(ast.Call(ast.Name("glue"), [ast.Constant(str(name)), value, *_])):
                 text_of_value = ast.get_source_segment(text, value)
                 lines[statement.lineno - 1] = f'print("{name}:", {text_of_value})'

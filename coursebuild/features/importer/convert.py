@@ -113,6 +113,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
 
 _READABLE = re.compile(r"^(?![ ]{0,3}#{1,6}[ \t])[^\n]*\S", re.MULTILINE)
 """A line that is no heading."""
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 
 
 def _plan_empty_lessons(
@@ -120,11 +121,11 @@ def _plan_empty_lessons(
 ) -> ImportedCourse:
     """Return the course with lessons planned of whose texts nothing is left; their files go.
 
-    Those of which only headings are left are drafts.
+    Those of which only headings and comments are left are drafts.
     """
 
     def plan(text: ImportedText) -> ImportedText:
-        if not text.path or _READABLE.search(out[text.path].decode()):
+        if not text.path or _READABLE.search(_COMMENT.sub("", out[text.path].decode())):
             return text
         if out[text.path].strip():
             return replace(text, status="draft")
@@ -142,6 +143,7 @@ _FRAGMENT = re.compile(
     re.DOTALL,
 )
 """What is about bodies, and has none."""
+_INCLUDE = re.compile(r"<include\s[^<>]*?\bfile\s*=\s*[\"']([^\"'<>]+)")
 
 
 def _find_models(files: SourceFiles) -> Mapping[str, str]:
@@ -159,17 +161,30 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
         path: [part for part in existing_files(files.folder, path, text) if part in files]
         for path, text in texts.items()
     }
+    lacks = {path: name for path in texts if (name := _find_lack(path, parts[path], texts))}
+    pieces = {part for path in lacks for part in parts.pop(path)}
     for root, names in _group_by_folder(parts).items():
         _place_models(root, names, models)
     included = {part for names in parts.values() for part in names if part in texts}
     for path in texts:
+        lack = lacks.get(path)
         if path in included:
             files.account.changed["fragment of a model", "beside the models that include it"] += 1
-        elif _FRAGMENT.search(texts[path]):
-            message = "a fragment of a model, which none includes: it is compiled with none"
+        elif lack or path in pieces or _FRAGMENT.search(texts[path]):
+            message = "a fragment of a model, which no whole one includes: it is compiled with none"
+            if lack:
+                message = f"a model that includes `{lack}`, which the folder does not hold"
             files.leave(path, message, "fragment of a model")
             models.pop(path, None)
     return models
+
+
+def _find_lack(path: str, parts: Sequence[str], texts: Mapping[str, str]) -> str:
+    """Return the name of a file that a model includes and the folder lacks; empty for none."""
+    part_names = {*map(posixpath.basename, parts)}
+    whole = _COMMENT.sub("", "".join(texts.get(name, "") for name in (path, *parts)))
+    names = _INCLUDE.findall(whole)
+    return next((name for name in names if posixpath.basename(name) not in part_names), "")
 
 
 def _group_by_folder(parts: Mapping[str, Sequence[str]]) -> Mapping[str, set[str]]:

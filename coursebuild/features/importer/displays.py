@@ -50,10 +50,11 @@ DEFINITION = re.compile(
 """A macro of LaTeX."""
 _OPERATOR = re.compile(
     r"(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)"
+    r"|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<display>[^$]+?)\\f\])"
     r"|\\DeclareMathOperator(?P<star>\*?)[ ]*\{?(?P<name>\\[A-Za-z]+)\}?[ ]*\{(?P<word>[^{}]*)\}",
     re.DOTALL,
 )
-"""An operator that is declared; or code, in which there is none."""
+"""An operator that is declared, a formula of Doxygen; or code, in which there is neither."""
 _MACROS = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
 """Where MyST and Sphinx have macros by their names."""
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
@@ -68,9 +69,11 @@ def normalize_formulas(text: str) -> str:
 
 
 def define_operators(text: str) -> str:
-    r"""Write as macros what LaTeX's `\DeclareMathOperator` makes operators."""
+    r"""Write LaTeX's `\DeclareMathOperator` as a macro, formulas of Doxygen between dollars."""
 
     def define(match: re.Match[str]) -> str:
+        if match["inline"] or match["display"]:
+            return f"${match['inline']}$" if match["inline"] else f"$${match['display']}$$"
         operator = rf"\operatorname{match['star']}{{{match['word']}}}"
         return rf"\def{match['name']}{{{operator}}}" if match["name"] else match[0]
 
@@ -79,7 +82,14 @@ def define_operators(text: str) -> str:
 
 def display_formula(tex: str, label: str) -> str:
     """Return a displayed formula in Markdown."""
-    return f"$$\n{tex.strip()}\n$$" + (f" {{#eq:{formula_anchor(label)}}}" if label else "")
+    return f"$$\n{_align(tex).strip()}\n$$" + (f" {{#eq:{formula_anchor(label)}}}" if label else "")
+
+
+def _align(tex: str) -> str:
+    """Write the environment that MyST and Sphinx do not need to align at `&`."""
+    if not re.search(r"(?<!\\)&", _WHOLE_ENVIRONMENT.sub("", tex)):
+        return tex
+    return f"\n\\begin{{aligned}}\n{tex.strip()}\n\\end{{aligned}}\n"
 
 
 def _drop_empty(match: re.Match[str]) -> str:
@@ -95,9 +105,7 @@ def _label_formula(match: re.Match[str]) -> str:
     label = match["myst"] or match["quarto"] or (inside[1] if inside else "")
     tex = _LABEL.sub("", match["tex"])
     tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
-    bare = _WHOLE_ENVIRONMENT.sub("", tex)
-    if re.search(r"(?<!\\)&", bare):  # MyST aligns at `&`, and needs no environment
-        tex = f"\n\\begin{{aligned}}\n{tex.strip()}\n\\end{{aligned}}\n"
+    tex = _align(tex)
     opening, closing = "", match["behind"] or ""
     if lead := _LEAD.search(match["tex"]):  # a mark beside a text could be that of another formula
         line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]

@@ -27,7 +27,7 @@ from coursebuild.features.importer.source_files import title_of_file
 
 _ATTRIBUTES = (
     r"\{(?:[ ]*(?:#[^\s{}\"'#]+|\.[A-Za-z][\w:-]*"
-    r"|[\w:-]+=(?:\"[^\"\n]*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}"
+    r"|[\w:-]+=(?:\"(?:\\.|[^\"\\\n])*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}"
     r"|\{:[^{}\n]*\}"
 )
 _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
@@ -44,7 +44,7 @@ _LINE = re.compile(
     rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?P<hover>{_LINK_TITLE})?[ \t]*\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
-    rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
+    rf"\((?P<address>(?:@ref[ ]+)?{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
     r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
@@ -75,7 +75,7 @@ _LINE = re.compile(
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     r"|(?P<tag><(?i:a|img|source|video)[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
     r"|(?P<markdown>(?P<before><[a-z]\w*(?:[ ][^<>\n]*?)?)[ ]markdown(?:=[\"'\w]+)?(?=[ >]))"
-    rf"|(?P<attributes>(?:(?<=[^\s$])|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
+    rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
     rf"|(?P<span>\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
 GONE = "gone:"
@@ -109,6 +109,11 @@ _CONTENTS = re.compile(
     r'<div class="toc">.*?</div>|^(?:\[TOC\]|\[\[_?TOC_?\]\])[ \t]*$', re.DOTALL | re.M
 )
 """What Jupyter's extension and Python's Markdown replace by a list; the page has its own."""
+_SETTINGS = re.compile(
+    r"(?:\A|(?<=\n\n))---[ \t]*\n(?:\w[\w-]*:(?: [^\n]*)?\n(?:[ \t]+[^\n]*\n)*)+---[ \t]*$",
+    re.MULTILINE,
+)
+"""Settings of Pandoc, which takes them anywhere."""
 
 
 _KEPT = {
@@ -123,7 +128,7 @@ _KEPT = {
 }
 """What is Markdown here as well."""
 _OVER_LINES = re.compile(
-    r"(?<![\w$\\])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
+    r"(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
@@ -193,6 +198,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     text, count = _CONTENTS.subn("", text)
     if count:
         account.changed["table of contents", "dropped: the site has its own"] += count
+    if context.path.endswith((".qmd", ".Rmd")):
+        text = _SETTINGS.sub("", text)
     text, count = _COMMENT_AS_HEADING.subn(r"\1 `\2`", text)
     if count:
         change = "the words of a heading that has no others: its tool replaces it"

@@ -33,8 +33,9 @@ _FRONT_MATTER = re.compile(
     re.DOTALL,
 )
 _TITLE = re.compile(
-    r"^#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?(?:[ \t]*\{(?:[^{}]*#(?P<label>[\w-]+))?[^{}]*\})?[ \t]*$"
-    r"|(?:\A|(?<=\n\n)|(?<==\n))(?:(?P<line>[^\s#>].*)\n=+|"
+    r"^[ ]?#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?"
+    r"(?:[ \t]*\{(?:[^{}]*#(?P<label>[\w-]+))?[^{}]*\})?[ \t]*$"
+    r"|(?:\A\n*|(?<=\n\n)|(?<==\n))(?:(?P<line>[^\s#>].*)\n=+|"
     r"(?P<lines>[^\s#>$][^$\n]*(?>(?:\n(?!=+[ \t]*$)[^\s#>$][^$\n]*)+))\n==+)[ \t]*$",
     re.MULTILINE,
 )
@@ -112,7 +113,7 @@ def read_segments(text: str, name: str) -> ReadText:
         titles.append(_text_of(heading))
         if len(titles) == 1 and own_title in ("", titles[0]):
             return f"({heading['label']})=\n" if heading["label"] else ""
-        return f"## {_text_of(heading)}" if heading["text"] is None else f"#{heading[0]}"
+        return f"## {_text_of(heading)}" if heading["text"] is None else f"#{heading[0].strip()}"
 
     shifted = [
         replace(segment, text=_HEADING.sub(shift_heading, segment.text))

@@ -73,51 +73,38 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
     """
     from bibtexparser import middlewares
     from bibtexparser.entrypoint import parse_string
-    from bibtexparser.model import DuplicateBlockKeyBlock, ImplicitComment, MiddlewareErrorBlock
+    from bibtexparser.model import (
+        DuplicateBlockKeyBlock,
+        DuplicateFieldKeyBlock,
+        Entry,
+        ImplicitComment,
+        MiddlewareErrorBlock,
+    )
 
-    logging.getLogger("bibtexparser").disabled = True
     for name in (
-        *("bibtexparser.entrypoint", "bibtexparser.splitter"),
-        *("pylatexenc.latexwalker", "pylatexenc.latex2text"),
+        "bibtexparser",
+        "bibtexparser.entrypoint",
+        "bibtexparser.splitter",
+        "pylatexenc.latexwalker",
+        "pylatexenc.latex2text",
     ):
         logging.getLogger(name).disabled = True
     list_text = source.text.replace("\r\n", "\n").replace("\r", "\n")
-    library = parse_string(
-        list_text,
-        append_middleware=[
-            middlewares.NormalizeFieldKeys(),
-            middlewares.SeparateCoAuthors(),
-            middlewares.SplitNameParts(),
-        ],
-    )
+    library = parse_string(list_text, parse_stack=())
+    for block in library.failed_blocks:
+        entry = block.ignore_error_block
+        if not (isinstance(block, DuplicateFieldKeyBlock) and isinstance(entry, Entry)):
+            continue
+        if len({(f.key, f.value) for f in entry.fields}) == len(entry.fields_dict):
+            entry.fields = [*entry.fields_dict.values()]
+            library.replace(block, entry, fail_on_duplicate_key=False)
     diagnostics: list[Diagnostic] = []
 
-    def report(line: int, message: str, help: str, notes: tuple[Note, ...] = ()) -> None:
+    def report(line: int | None, message: str, help: str, notes: tuple[Note, ...] = ()) -> None:
         place = _line(source, line)
         diagnostics.append(diagnose("source-malformed", place, message, help=help, notes=notes))
 
-    for block in library.failed_blocks:
-        match = _KEY.match(block.raw or "")
-        name = f"`{match[1]}`" if match is not None and match[1] else "this entry"
-        if isinstance(block, DuplicateBlockKeyBlock):
-            first = _line(source, block.previous_block.start_line or 0)
-            notes = (Note("the first one is here", first),)
-            message, help = f"{name} is listed twice", "give one of the two another key"
-            report(block.start_line or 0, message, help, notes)
-        elif isinstance(block, MiddlewareErrorBlock):
-            reason = " ".join(str(block.error).split())
-            message, help = f"{name} cannot be read: {reason[:200]}", "mend the field"
-            report(block.start_line or 0, message, help)
-        else:
-            help = "close each value and each entry with the brace or quote that it opened"
-            report(block.start_line or 0, f"{name} is not whole", help)
-    for comment in library.blocks:
-        if not isinstance(comment, ImplicitComment):
-            continue
-        for match in _ENTRY.finditer(comment.comment or ""):
-            line = (comment.start_line or 0) + comment.comment[: match.start()].count("\n")
-            report(line, "no entry begins here", "an entry is `@article{key, title = {…}, …}`")
-    for entry in parse_string(list_text, parse_stack=()).entries:  # values as they are written
+    for entry in library.entries:  # values as they are written
         for field in entry.fields:
             if (swallowed := _find_swallowed(field.value)) is not None:
                 start, message, help = swallowed
@@ -128,6 +115,33 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
                     f"in `{entry.key}`, the value of `{field.key}` {message}",
                     help,
                 )
+    for middleware in (
+        *middlewares.default_parse_stack(),
+        middlewares.NormalizeFieldKeys(),
+        middlewares.SeparateCoAuthors(),
+        middlewares.SplitNameParts(),
+    ):
+        library = middleware.transform(library)
+    for block in library.failed_blocks:
+        match, notes = _KEY.match(block.raw or ""), tuple[Note, ...]()
+        name = f"`{match[1]}`" if match is not None and match[1] else "this entry"
+        message = f"{name} is not whole"
+        help = "close each value and each entry with the brace or quote that it opened"
+        if isinstance(block, DuplicateBlockKeyBlock):
+            notes = (Note("the first one is here", _line(source, block.previous_block.start_line)),)
+            message, help = f"{name} is listed twice", "give one of the two another key"
+        elif isinstance(block, DuplicateFieldKeyBlock):
+            message, help = f"{name} has `{min(block.duplicate_keys)}` twice", "keep one of them"
+        elif isinstance(block, MiddlewareErrorBlock):
+            reason = " ".join(str(block.error).split())
+            message, help = f"{name} cannot be read: {reason[:200]}", "mend the field"
+        report(block.start_line, message, help, notes)
+    for comment in library.blocks:
+        if not isinstance(comment, ImplicitComment):
+            continue
+        for match in _ENTRY.finditer(comment.comment or ""):
+            line = (comment.start_line or 0) + comment.comment[: match.start()].count("\n")
+            report(line, "no entry begins here", "an entry is `@article{key, title = {…}, …}`")
     works: list[Work] = []
     for entry in library.entries:
         fields: list[tuple[str, str]] = []
@@ -137,7 +151,7 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
                 people.append((field.key, tuple(map(_read_name, field.value))))
             else:
                 fields.append((field.key, _plain(str(field.value), field.key)))
-        kind, span = entry.entry_type.lower(), _line(source, entry.start_line or 0)
+        kind, span = entry.entry_type.lower(), _line(source, entry.start_line)
         works.append(Work(entry.key, kind, tuple(fields), tuple(people), span))
     return Parsed(tuple(works), tuple(diagnostics))
 
@@ -176,9 +190,9 @@ def _end_of_piece(value: str, start: int) -> int:
     return len(value)
 
 
-def _line(source: Source, index: int) -> Span:
-    """A line of the list, from 0, without the white space at its ends."""
-    line = min(index + 1, len(source.line_starts))
+def _line(source: Source, index: int | None) -> Span:
+    """A line of the list, from 0, without the white space at its ends; the first if unknown."""
+    line = min((index or 0) + 1, len(source.line_starts))
     text = source.line_text(line)
     start = source.line_start(line) + len(text) - len(text.lstrip())
     return source.span(start, start + len(text.strip()))

@@ -37,6 +37,7 @@ I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168
 \sum_{n=0}^{10} \frac{1}{n!} \approx 2.7182818, \quad \prod_{i=1}^{5} i = 5!
 2\times10^{-6} = 2\,\mathrm{ppm}, \quad 10^{-9} = 1\,\mathrm{ppb}
 \sum_{i=1}^{3} 2^i\ \mathrm{m} = 14\ \mathrm m, \quad \sum_{i=3}^{2} i = 0
+26! \approx 10^{26}, \quad 26^{25} \approx 10^{35}
 """
 SILENT = r"""
 e = 1
@@ -168,6 +169,7 @@ def test_what_can_be_meant_otherwise_is_not_judged() -> None:
         r"\tfrac34\cdot100 = 75\,\%": "its unit may be that of another part",
         r"2\cdot3000 = 6\,\mathrm{km/s}": base_units,
         r"1/(4\cdot10^{-4}) \approx 2.5\,\mathrm{kHz}": base_units,
+        r"-2\cdot96485\cdot1.10 = -212\ \mathrm{kJ/mol}": base_units,
         r"1.6\mathrm e{-19} = 1.6\times10^{-19}": "it may be a power of ten",
     }
     for tex, reason in reasons.items():
@@ -266,6 +268,7 @@ g\,(0.1\ \mathrm s)^2 = 0.0981\ \mathrm m
 (2 + 1)(0.5) = 1.5
 """
 WRONG = r"""
+26^{25} \approx 10^{34}
 T = 2\pi\sqrt{\ell/g} \approx 2.060
 2\pi\sqrt{\ell/g} = 2\pi\sqrt{1/9.91}
 T = 2\pi\sqrt{\ell/g} \approx 2.006\ \mathrm m

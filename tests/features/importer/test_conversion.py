@@ -33,6 +33,8 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
             f"{above}/meshes/m.obj": MESH,
             "other/arm.xml": "<mujoco model='other'/>",
             "loose/part.xml": "<mujocoinclude><asset/></mujocoinclude>",
+            "made/task.xml": "<mujoco><include file='made.xml'/><include file='a.xml'/></mujoco>",
+            "made/a.xml": "<mujoco><worldbody><geom material='m' size='1'/></worldbody></mujoco>",
             "loose/keys.xml": "<mujoco><keyframe><key qpos='1 2'/></keyframe></mujoco>",
         },
     )
@@ -44,9 +46,10 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
     assert sorted(model.nmesh for model in models) == [0, 1]
     account = account_of(course)
     assert "- fragment of a model: beside the models that include it (1 time)" in account
-    fragments = "a fragment of a model, which none includes: it is compiled with none\n"
-    assert f"{fragments}  - loose/keys.xml\n  - loose/part.xml\n" in account
-    assert not any("loose" in path or "keys" in path for path in course.files)
+    fragments = "a fragment of a model, which no whole one includes: it is compiled with none\n"
+    assert f"{fragments}  - loose/keys.xml\n  - loose/part.xml\n  - made/a.xml\n" in account
+    assert "a model that includes `made.xml`, which the folder does not hold" in account
+    assert not any(word in path for path in course.files for word in ("loose", "keys", "made"))
     assert "used by no text" not in account
 
 

@@ -205,3 +205,40 @@ def test_code_that_docusaurus_imports_and_colours(tmp_path: Path) -> None:
     assert course.files["content/lessons/1.1-a.md"].decode() == (
         "**gas.py**\n\n```python\nprint('gas')\n```\n\n```python\nx = 1\n```\n"
     )
+
+
+DOXYGEN = "See [Shape](@ref Shape::Get). As \\f$v_0\\f$, not `\\f$x`:\n\n\\f[\nv = 0\n\\f]\n"
+CALLOUT = "::: {.callout-note}\n### Norms {#iso}\nText.\n:::\n"
+TABLE = "| a | b |\n|---|---|\n| `{n}` | c |\n| `{n,}` | d |\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected"),
+    [
+        ("a.md", DOXYGEN, "See Shape. As $v_0$, not `\\f$x`:\n\n$$\nv = 0\n$$\n"),
+        (
+            "a.md",
+            "```{math}\n:label: e\na &= b \\\\\n&= c\n```\n",
+            "$$\n\\begin{aligned}\na &= b \\\\\n&= c\n\\end{aligned}\n$$ {#eq:e}\n",
+        ),
+        ("a.qmd", CALLOUT, '> [!note] Norms\n> <a id="iso"></a>\n> Text.\n'),
+        ("a.qmd", "A.\n\n---\neval: false\n---\n\nB.\n", "A.\n\n\n\nB.\n"),
+        ("a.md", "A.\n\n---\neval: false\n---\n\nB.\n", "A.\n\n---\neval: false\n---\n\nB.\n"),
+        ("a.md", TABLE, TABLE),
+        ("a.md", '## B { #b data-label="C \\"d\\"" }\n\nText.\n', "## B {#b}\n\nText.\n"),
+        ("a.md", "A.\n\n # B\n\nText.\n", "A.\n\n## B\n\nText.\n"),
+        ("a.md", "- A:\n\n  ```sh\n  # B\n  ```\n", "- A:\n\n  ```sh\n  # B\n  ```\n"),
+        ("a.md", "% Later.\n\n```{bibliography} b.bib\n```\n", "<!-- Later. -->\n"),
+    ],
+)
+def test_what_is_right_in_its_tool_is_right_here(
+    tmp_path: Path, name: str, text: str, expected: str
+) -> None:
+    assert lesson(tmp_path, name, f"\nOne\n===\n\n{text}") == expected
+
+
+def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
+    sources = ("x = 1\n", "from __future__ import division\nprint(x / 2)\n")
+    cells = [{"cell_type": "code", "source": source, "outputs": []} for source in sources]
+    notebook = json.dumps({"cells": cells, "metadata": {}, "nbformat": 4})
+    assert "__future__" not in lesson(tmp_path, "a.ipynb", notebook)
