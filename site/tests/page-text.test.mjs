@@ -56,6 +56,17 @@ test('labels, times, ratios', () => {
   assert.equal(superscript(-12), '⁻¹²')
 })
 
+test('numbers have the decimal sign of the page', async () => {
+  globalThis.document = { documentElement: { dataset: { decimal: ',' } } }
+  const page = await import('../js/lab/page/numbers.js?comma')
+  delete globalThis.document
+  assert.equal(page.formatNumber(-1.5, 2), '−1,50')
+  assert.equal(page.formatReadout('a 1.5', 2), 'a 1.5')
+  assert.equal(page.formatLabel(-2.5e-9), '−2,5·10⁻⁹')
+  assert.equal(page.formatTime(0.5), '0,50')
+  assert.equal(page.formatRatio(0.412), '0,4')
+})
+
 test('a slider shows as many digits as its steps need', () => {
   for (const [step, digits] of [
     [1, 0],

@@ -159,8 +159,8 @@ def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [grids.factor(row.realtime) for row in rows]),
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
-        (evaluations, [f"{row.evaluations:,}" if row.evaluations else "" for row in rows]),
-        (iterations, ["" if r.iterations is None else f"{r.iterations:,.0f}" for r in rows]),
+        (evaluations, [grids.grouped(row.evaluations) if row.evaluations else "" for row in rows]),
+        (iterations, ["" if r.iterations is None else grids.grouped(r.iterations) for r in rows]),
         (
             words("measured.parted", error=horizon_error_text(report.horizon_error)),
             ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
@@ -257,7 +257,7 @@ def stable_title(words: Strings, rows: Sequence[StableRow]) -> str:
     """Title a table of largest stable timesteps: it says which runs count as stable."""
     durations = sorted(row.duration for row in rows)
     times = (seconds_text(float(f"{time:.3g}")) for time in (durations[0], durations[-1]))
-    time, energy = " – ".join(dict.fromkeys(times)), rows[0].energy
+    time, energy = words.decimals(" – ".join(dict.fromkeys(times))), rows[0].energy
     if energy is None:
         return words("measured.stable", time=time)
     return words("measured.stable_energy", time=time, energy=grids.factor(energy))
@@ -271,7 +271,7 @@ def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
     if row.gain is not None:
         step, energy = row.gain
         bound = "≤ " if step <= row.searched[0] else ""  # the shortest that was tried gains too
-        time = bound + seconds_text(step, 2)
+        time = words.decimals(bound + seconds_text(step, 2))
         gain = words("measured.gained", time=time, energy=grids.factor(energy, 2))
     return (
         _reach(words, row.largest, row) if isinstance(row.largest, str) else row.shown,
@@ -413,7 +413,7 @@ def _cost_text(row: EngineRow, worlds: int) -> str:
     cost = next((cost for cost in row.costs if cost.worlds == worlds), BatchCost(worlds))
     if cost.seconds is None or cost.ratio is None:
         return "–" if cost.remark else ""
-    ratio = grids.factor(cost.ratio.value, 2)
+    ratio: str = grids.factor(cost.ratio.value, 2)
     if cost.ratio.half_width > _UNCERTAIN:
         ratio = f"{grids.factor(cost.ratio.low, 2)} – {grids.factor(cost.ratio.high, 2)}"
     return Markup("{} <br>×{}").format(seconds_text(cost.seconds.value, 3), ratio)

@@ -195,7 +195,8 @@ class LabTrials:
         if self._context.static and not reply.findings and reply.start is not None:
             from coursebuild.features.lab.picture.static import equation_record, plots_file
 
-            record = equation_record(lab, output.config, reply.start)
+            decimal = decimal_of(self._context, trial)
+            record = equation_record(lab, output.config, reply.start, decimal)
             output = replace(output, record=record, picture=plots_file(record.plots))
         findings = [finding.diagnostic(lab) for finding in reply.findings]
         return TrialResult(lab.span, line, output), findings
@@ -231,6 +232,12 @@ class LabTrials:
 def _in_english(key: str, values: dict[str, str]) -> str:
     """A text of pages in the language of messages."""
     return strings_for(template_texts(), "en")(key, **values) if key else ""
+
+
+def decimal_of(context: TrialContext, trial: Trial) -> str:
+    """The sign before decimals on the page of a trial."""
+    owner = next((o for o in context.course.owners if o.id == trial.owner), None)
+    return context.course.words_of(owner).decimal[0]
 
 
 def find_model(context: TrialContext, name: str) -> Source | None:
@@ -385,7 +392,8 @@ class _LabTrial(Struct, frozen=True):
             film = b""
             if main["film"]:
                 film = keep("films", picture_key, lambda: draw_film(self.lab, main))
-            output = replace(output, record=lab_record(lab, main), picture=picture, film=film)
+            record = lab_record(lab, main, decimal_of(self.context, self.trial))
+            output = replace(output, record=record, picture=picture, film=film)
         return _Evaluation(reply, failures, remarks, output)
 
     def _check_code(self, mjb: bytes) -> list[Diagnostic]:
