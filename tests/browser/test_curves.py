@@ -89,8 +89,8 @@ def test_lesson_in_another_language_has_its_decimal_sign_before_and_after_the_st
 ) -> None:
     address = "lessons/1.2-kurve.html"
     static = (curves.public / address).read_text()
-    for shown in (">0,5<", "x = 0,5", "<dd>0,75</dd>", "0,5 bis 2 in Schritten von 0,5"):
-        assert shown in static
+    for text in (">0,5<", "x = 0,5", "<dd>0,75</dd>", "0,5 bis 2 in Schritten von 0,5"):
+        assert text in static
     curve = lab(open_address(curves.url() + address), 0)
     live = curve.locator(".lab-live")
     expect(live).to_contain_text("x = 0,50\u00a0m")

@@ -45,15 +45,15 @@ class ColumnTitle(Struct, frozen=True):
         unit = unit_of_header(title.text)
         inlines = model.walk_inlines(cell.children)
         bindings = (i for i in inlines if isinstance(i, model.NumberBinding))
-        given = " ".join(i.text for i in bindings if i.source is not None)
+        excepted_text = " ".join(i.text for i in bindings if i.source is not None)
         text = title.text.replace(" ", "·")  # `J/(kg K)`
         at = text.rfind(unit.text.replace(" ", "·")) if unit else -1
-        if at < 0:
-            words = words_of(title.text) - words_of(given)
-            return cls(cell.span, title.text, words, unit, cell.span)
-        unit_span = Span(cell.span.source, *title.origin(at, at + len(unit.text)))
-        words = words_of(title.text[:at]) - words_of(given)
-        return cls(cell.span, title.text, words, NO_UNIT if given else unit, unit_span)
+        unit_span, words = cell.span, words_of(title.text)
+        if at >= 0:
+            unit_span = Span(cell.span.source, *title.origin(at, at + len(unit.text)))
+            words = words_of(title.text[:at])
+        words -= words_of(excepted_text)
+        return cls(cell.span, title.text, words, NO_UNIT if excepted_text else unit, unit_span)
 
     def has(self, word: str) -> bool:
         """Whether a printed word is one of the title, or a mere sign."""

@@ -23,7 +23,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.lesson_record import Address, ShownValue, shown_values
+from coursebuild.core.model.lesson_record import Address
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.column_titles import (
@@ -121,18 +121,6 @@ def compare_table(
         match.rivals,
         counts,
     )
-
-
-def row_values(
-    document: model.Document, recording: model.Recording, filters: Iterable[model.Filter] = ()
-) -> tuple[ShownValue, ...]:
-    """The rows of a recorded table as values that a lesson shows."""
-    if not isinstance(recording.body, model.Table) or recording.script is None:
-        return ()
-    number = model.output_numbers(document)[recording.span.start]
-    path, before = document.source.path, f"row of output {number}"
-    rows = table_rows(recording.body, filters)
-    return tuple(shown_values((path, recording.script, before, row_text(row)) for row in rows))
 
 
 class TableMatcher:

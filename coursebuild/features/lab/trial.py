@@ -44,6 +44,7 @@ from coursebuild.features.lab import verdict
 from coursebuild.features.lab.compile import (
     LabModule,
     compile_lab,
+    decimal_of,
     equation_inputs,
     inputs_of,
     pieces,
@@ -195,7 +196,7 @@ class LabTrials:
         if self._context.static and not reply.findings and reply.start is not None:
             from coursebuild.features.lab.picture.static import equation_record, plots_file
 
-            decimal = decimal_of(self._context, trial)
+            decimal = decimal_of(self._context.course, trial)
             record = equation_record(lab, output.config, reply.start, decimal)
             output = replace(output, record=record, picture=plots_file(record.plots))
         findings = [finding.diagnostic(lab) for finding in reply.findings]
@@ -232,12 +233,6 @@ class LabTrials:
 def _in_english(key: str, values: dict[str, str]) -> str:
     """A text of pages in the language of messages."""
     return strings_for(template_texts(), "en")(key, **values) if key else ""
-
-
-def decimal_of(context: TrialContext, trial: Trial) -> str:
-    """The sign before decimals on the page of a trial."""
-    owner = next((o for o in context.course.owners if o.id == trial.owner), None)
-    return context.course.words_of(owner).decimal[0]
 
 
 def find_model(context: TrialContext, name: str) -> Source | None:
@@ -392,7 +387,7 @@ class _LabTrial(Struct, frozen=True):
             film = b""
             if main["film"]:
                 film = keep("films", picture_key, lambda: draw_film(self.lab, main))
-            record = lab_record(lab, main, decimal_of(self.context, self.trial))
+            record = lab_record(lab, main, decimal_of(self.context.course, self.trial))
             output = replace(output, record=record, picture=picture, film=film)
         return _Evaluation(reply, failures, remarks, output)
 

@@ -154,7 +154,8 @@ def _describe(words: Strings, report: CaseReport) -> Iterator[str]:
         (least, best), (most, worst) = min(costs), max(costs)
         key = "cheapest" if most > 1.05 * least else "alike"
         key = f"numerics.{key if len(costs) > 1 else 'only'}"
-        cheapest, ratio = seconds_text(least, _DIGITS), grids.factor(most / least)
+        texts = seconds_text(least, _DIGITS), f"{most / least:.3g}"
+        cheapest, ratio = map(words.decimals, texts)
         yield words(key, best=best, cost=cheapest, worst=worst, factor=ratio)
     elif report.main:
         yield words("numerics.out_of_reach")

@@ -23,7 +23,7 @@ export function formatNumber(value, digits) {
   const size = Math.abs(value)
   let text
   if (digits === null || digits === undefined)
-    text = size === 0 || (size >= 1e-4 && size < 1e7) ? plain(size) : scientific(size, 4)
+    text = isPlain(size) ? String(Number(size.toPrecision(6))) : scientific(size, 4)
   else text = size < 1e9 ? size.toFixed(digits) : scientific(size, Math.max(2, digits))
   // A number that is rounded to zero has no sign.
   const sign = value < 0 && /[1-9]/.test(text) ? MINUS : FIGURE_SPACE
@@ -50,22 +50,20 @@ export const withUnit = (text, unit) => (unit ? `${text}${unit === '°' ? '' : '
 
 /** Simulated time, in hundredths of a second, or with more digits. */
 export function formatTime(seconds, digits = 2) {
-  return (seconds < 0 ? MINUS : '') + shown(Math.abs(seconds).toFixed(digits))
+  return formatNumber(seconds, digits).trim()
 }
 
-/** `0.4` for 0.412, `0.03` for 0.0312. */
-export function formatRatio(ratio) {
-  return shown(ratio >= 0.1 ? ratio.toFixed(1) : ratio.toPrecision(1))
+/** One figure: `0.4` for 0.412, `0.03` for 0.0312. */
+export function formatRough(value) {
+  return formatLabel(Number(value.toPrecision(1)))
 }
 
 const shown = (text) => text.replace('.', DECIMAL)
 
-function plain(size) {
-  return String(Number(size.toPrecision(6)))
-}
+const isPlain = (size) => size === 0 || (size >= 1e-4 && size < 1e7)
 
 function shortest(size) {
-  if (size === 0 || (size >= 1e-4 && size < 1e7)) return String(Number(size.toPrecision(10)))
+  if (isPlain(size)) return String(Number(size.toPrecision(10)))
   const [mantissa, exponent] = size.toExponential(3).split('e')
   const power = `10${superscript(Number(exponent))}`
   return Number(mantissa) === 1 ? power : `${Number(mantissa)}·${power}`

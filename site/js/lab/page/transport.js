@@ -1,7 +1,7 @@
 /** The rows under the picture: play and pause, a step, reset, speed, time, full screen; and the run as a bar. */
 
 import { h, icon, iconButton } from './dom.js'
-import { formatLabel, formatRatio, formatTime } from './numbers.js'
+import { formatLabel, formatRough, formatTime } from './numbers.js'
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5]
 const ON_TIME = 0.95
@@ -49,7 +49,7 @@ export function buildTransport(words, actions) {
       if (time.textContent !== text) time.textContent = text
     },
     setRatio(ratio) {
-      const text = ratio < ON_TIME ? words('lab.live.ratio', { ratio: formatRatio(ratio) }) : ''
+      const text = ratio < ON_TIME ? words('lab.live.ratio', { ratio: formatRough(ratio) }) : ''
       if (late.textContent !== text) late.textContent = text
     },
     setEnabled(isEnabled) {

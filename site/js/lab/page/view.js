@@ -7,7 +7,7 @@
 import { PerspectiveCamera } from 'three'
 import { ModelCamera, OrbitCamera } from './camera.js'
 import { h, outline } from './dom.js'
-import { formatLabel } from './numbers.js'
+import { formatRough } from './numbers.js'
 import { channels, resolve, watchTheme } from './palette.js'
 import { stage } from './stage.js'
 import { STUDIO_LAYER, roundLength } from './studio.js'
@@ -201,7 +201,7 @@ class ScaleBar {
     this.path = path
     this.svg.setAttribute('viewBox', `0 0 ${width} ${height}`)
     this.svg.firstElementChild.setAttribute('d', path)
-    const text = `${formatLabel(Number(length.toPrecision(1)))} m`
+    const text = `${formatRough(length)} m`
     if (text === this.length.textContent) return
     this.length.textContent = text
     this.element.setAttribute('aria-label', this.words('lab.scale', { length: text }))
