@@ -50,8 +50,7 @@ from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.printed_text import PrintedPlace, describe_line
-from coursebuild.core.scripts.table_cells import table_rows
-from coursebuild.core.scripts.tables import row_values
+from coursebuild.core.scripts.table_cells import row_values, table_rows
 from coursebuild.core.text.characters import printable
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.rules import RULES, Rule

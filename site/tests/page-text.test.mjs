@@ -10,8 +10,8 @@ import {
   digitsOfStep,
   formatLabel,
   formatNumber,
-  formatRatio,
   formatReadout,
+  formatRough,
   formatTime,
   superscript,
   withUnit,
@@ -51,9 +51,20 @@ test('labels, times, ratios', () => {
   assert.equal(formatLabel(-1e-9), '−10⁻⁹')
   assert.equal(formatTime(3.14159), '3.14')
   assert.equal(formatTime(-1), '−1.00')
-  assert.equal(formatRatio(0.412), '0.4')
-  assert.equal(formatRatio(0.0312), '0.03')
+  assert.equal(formatRough(0.412), '0.4')
+  assert.equal(formatRough(0.0312), '0.03')
   assert.equal(superscript(-12), '⁻¹²')
+})
+
+test('numbers have the decimal sign of the page', async () => {
+  globalThis.document = { documentElement: { dataset: { decimal: ',' } } }
+  const page = await import('../js/lab/page/numbers.js?comma')
+  delete globalThis.document
+  assert.equal(page.formatNumber(-1.5, 2), '−1,50')
+  assert.equal(page.formatReadout('a 1.5', 2), 'a 1.5')
+  assert.equal(page.formatLabel(-2.5e-9), '−2,5·10⁻⁹')
+  assert.equal(page.formatTime(0.5), '0,50')
+  assert.equal(page.formatRough(0.412), '0,4')
 })
 
 test('a slider shows as many digits as its steps need', () => {

@@ -84,6 +84,24 @@ def test_solution_that_ends_is_told_and_the_rest_stays_usable(page: Page) -> Non
     expect(ball.locator(".lab-time")).not_to_have_text("t = 0.00\u00a0s")
 
 
+def test_lesson_in_another_language_has_its_decimal_sign_before_and_after_the_start(
+    curves: Site, open_address: Callable[[str], Page]
+) -> None:
+    address = "lessons/1.2-kurve.html"
+    static = (curves.public / address).read_text()
+    for text in (">0,5<", "x = 0,5", "<dd>0,75</dd>", "0,5 bis 2 in Schritten von 0,5"):
+        assert text in static
+    curve = lab(open_address(curves.url() + address), 0)
+    live = curve.locator(".lab-live")
+    expect(live).to_contain_text("x = 0,50\u00a0m")
+    expect(live.locator("dd")).to_contain_text("0,75")
+    expect(live.locator("svg text", has_text="1,5").first).to_be_visible()
+    slider = curve.get_by_label("Steigung")
+    expect(slider).to_have_attribute("aria-valuetext", "1,5")
+    expect(slider).to_have_value("1.5")
+    expect(live.locator("svg text, output, dd", has_text=re.compile(r"\d\.\d"))).to_have_count(0)
+
+
 def test_link_leads_to_the_same_values_and_place(page: Page, curves: Site) -> None:
     plot = lab(page, PLOT)
     plot.get_by_label("damping").fill("0.3")

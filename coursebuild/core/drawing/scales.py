@@ -25,6 +25,8 @@ class Scale(Struct, frozen=True):
     high: float
     """The values at start and end; exponents of ten on a logarithmic scale."""
     logarithmic: bool = True
+    decimal: str = "."
+    """The sign before decimals."""
 
     def __call__(self, value: float) -> float:
         """The place of a value."""
@@ -35,10 +37,11 @@ class Scale(Struct, frozen=True):
     def ticks(self, count: int) -> list[tuple[float, str]]:
         """Places and texts of about `count` ticks, at most so many on a logarithmic scale."""
         if self.logarithmic:
-            pairs = log_ticks(self.low, self.high, count)
-            return [(self(10.0**exponent), text) for exponent, text in pairs]
-        values = ticks(self.low, self.high, count)
-        return [(self(v), text) for v, text in zip(values, tick_texts(values), strict=True)]
+            pairs = [(10.0**n, text) for n, text in log_ticks(self.low, self.high, count)]
+        else:
+            values = ticks(self.low, self.high, count)
+            pairs = list(zip(values, tick_texts(values), strict=True))
+        return [(self(value), text.replace(".", self.decimal)) for value, text in pairs]
 
 
 def log(value: float) -> float:
@@ -89,10 +92,10 @@ def _digits(values: Sequence[float], form: str, tolerance: float) -> list[str] |
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def typeset_number(text: str) -> str:
+def typeset_number(text: str, decimal: str = ".") -> str:
     """A formatted number as people write it: `−1.5·10⁻³` for `-1.5e-03`; zero has no sign."""
     mantissa, _, exponent = text.partition("e")
-    mantissa = mantissa.replace("-", "\u2212")
+    mantissa = mantissa.replace("-", "\u2212").replace(".", decimal)
     if float(text) == 0:
         return "0" if exponent else mantissa.lstrip("\u2212")
     return f"{mantissa}·10{str(int(exponent)).translate(_SUPERSCRIPTS)}" if exponent else mantissa

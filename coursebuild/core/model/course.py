@@ -50,7 +50,7 @@ class Words(Struct, frozen=True):
     conjunctions: tuple[str, ...] = ("and", "or", "to")
     """Between the numbers of lessons or levels."""
     decimal: tuple[str, ...] = (".",)
-    """The signs before the decimals of a number."""
+    """The signs before the decimals of a number; the first is shown."""
     range: tuple[str, ...] = ("to",)
     """Those of them that stand for all numbers between."""
 

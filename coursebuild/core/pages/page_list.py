@@ -38,7 +38,6 @@ from coursebuild.core.pages.document_inputs import (
 from coursebuild.core.pages.frame import course_data, page_title, place_of
 from coursebuild.core.pages.graph import level_graph
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.typography import number
 from coursebuild.core.registry import added_pages, kind_of_block, model_parts, page_kind
 
 
@@ -309,8 +308,8 @@ def model_inputs(library: Library, model: MjcfModel) -> PageInputs:
             (words("model.coordinates"), str(facts.nq)),
             (words("model.freedom"), str(facts.nv)),
             (words("model.actuators"), str(facts.nu)),
-            (words("model.mass"), f"{number(facts.total_mass)} kg"),
-            (words("model.timestep"), f"{number(facts.timestep)} s"),
+            (words("model.mass"), f"{words.number(facts.total_mass)} kg"),
+            (words("model.timestep"), f"{words.number(facts.timestep)} s"),
             (words("model.integrator"), facts.integrator),
             (words("model.keyframes"), words.join(name or unnamed for name in facts.keyframes)),
             (words("model.sites"), words.join(name or unnamed for name in facts.sites)),

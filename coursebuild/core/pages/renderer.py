@@ -60,7 +60,7 @@ class Strings(Struct, frozen=True):
     language: str = DEFAULT_LANGUAGE
 
     def __call__(self, key: str, **values: str | int | float) -> str:
-        """The text of a key, with values inserted."""
+        """The text of a key, with values inserted; numbers as the language writes them."""
         text = self.texts.get(key)
         if text is None and "n" in values:
             n = values["n"]
@@ -68,7 +68,8 @@ class Strings(Struct, frozen=True):
             text = self.texts.get(f"{key}.{form}", self.texts.get(f"{key}.other"))
         if text is None:
             raise KeyError(f"no interface text {key!r}")
-        text = text.format_map(values) if values else text
+        texts = {k: self.number(v) if isinstance(v, float) else v for k, v in values.items()}
+        text = text.format_map(texts) if values else text
         if not values or direction(self.language) == "ltr":
             return text
         return "".join(
@@ -85,6 +86,15 @@ class Strings(Struct, frozen=True):
     def join(self, items: Iterable[str]) -> str:
         """The items one after the other, with the comma of the language between them."""
         return f"{self('site.comma')} ".join(items)
+
+    def number(self, value: float, digits: int | None = None) -> str:
+        """A number as people write it: no trailing zeros, a real minus, the decimal sign."""
+        text = f"{value:.{digits}f}" if digits is not None else f"{value:.12g}"
+        return self.decimals(text.replace("-", "\u2212"))
+
+    def decimals(self, number: str) -> str:
+        """A number, or markup of one, with the language's sign before its decimals."""
+        return number.replace(".", self("words.decimal")[0])
 
     def has(self, key: str) -> bool:
         """Whether there is a text of this key."""

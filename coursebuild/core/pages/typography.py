@@ -246,9 +246,3 @@ def split_quantities(text: str) -> Iterator[tuple[str, bool]]:
         position = match.end()
     if position < len(text):
         yield text[position:], False
-
-
-def number(value: float, digits: int | None = None) -> str:
-    """A number as people write it: no trailing zeros, a real minus sign."""
-    text = f"{value:.{digits}f}" if digits is not None else f"{value:.12g}"
-    return text.replace("-", "\u2212")

@@ -38,7 +38,7 @@ from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body, recording_key
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, describe_line
-from coursebuild.core.scripts.tables import row_values
+from coursebuild.core.scripts.table_cells import row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose, did_you_mean
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.numbers import Number, difference, join_thousands

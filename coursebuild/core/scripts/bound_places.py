@@ -28,7 +28,7 @@ from coursebuild.core.scripts.column_titles import ColumnTitle
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, masked
-from coursebuild.core.scripts.tables import row_values
+from coursebuild.core.scripts.table_cells import row_values
 from coursebuild.core.text.diagnostics import Edit, Note
 from coursebuild.core.text.quantities import unit_behind, unit_of_label
 

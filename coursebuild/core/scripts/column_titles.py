@@ -35,7 +35,7 @@ class ColumnTitle(Struct, frozen=True):
     text: str
     words: frozenset[str]
     unit: UnitText
-    """None where its source is said, as in `` τ (`s`{given="a guess"}) ``."""
+    """None where its source is said, as in `` τ (`s`{given="a guess"}) ``; so with words."""
     unit_span: Span
 
     @classmethod
@@ -43,40 +43,43 @@ class ColumnTitle(Struct, frozen=True):
         """The words and the unit of a cell of a header."""
         title = cell_text(cell, ())
         unit = unit_of_header(title.text)
+        inlines = model.walk_inlines(cell.children)
+        bindings = (i for i in inlines if isinstance(i, model.NumberBinding))
+        excepted_text = " ".join(i.text for i in bindings if i.source is not None)
         text = title.text.replace(" ", "·")  # `J/(kg K)`
         at = text.rfind(unit.text.replace(" ", "·")) if unit else -1
-        if at < 0:
-            return cls(cell.span, title.text, _words(title.text), unit, cell.span)
-        inlines = model.walk_inlines(cell.children)
-        is_given = any(isinstance(i, model.NumberBinding) and i.source is not None for i in inlines)
-        unit_span = Span(cell.span.source, *title.origin(at, at + len(unit.text)))
-        words = _words(title.text[:at])
-        return cls(cell.span, title.text, words, NO_UNIT if is_given else unit, unit_span)
+        unit_span, words = cell.span, words_of(title.text)
+        if at >= 0:
+            unit_span = Span(cell.span.source, *title.origin(at, at + len(unit.text)))
+            words = words_of(title.text[:at])
+        words -= words_of(excepted_text)
+        return cls(cell.span, title.text, words, NO_UNIT if excepted_text else unit, unit_span)
 
     def has(self, word: str) -> bool:
         """Whether a printed word is one of the title, or a mere sign."""
-        return not _words(word) or _words(word) <= self.words
+        return not words_of(word) or words_of(word) <= self.words
 
     def is_printed_as(self, printed: str) -> bool:
         """Whether a printed title has the same words, whatever its unit."""
-        words, unit = _words(printed), _words(unit_of_header(printed).text)
+        words, unit = words_of(printed), words_of(unit_of_header(printed).text)
         return bool(self.words) and self.words <= words and words - self.words <= unit
 
     def best_places(self, labels: Iterable[str]) -> list[int]:
         """The numbers of a line, by index, in whose labels most of the title's words are."""
-        shared = [len(self.words & _words(label)) for label in labels]
+        shared = [len(self.words & words_of(label)) for label in labels]
         most = max(shared, default=0)
         return [at for at, count in enumerate(shared) if count == most] if most else []
 
     def names(self, labels: Sequence[str], at: int, unit: UnitText) -> bool | None:
         """Whether number `at` of a line is what the title says; `None` where nothing tells.
 
-        `labels` are those of all numbers of the line, and `unit` the unit of this one.
+        `labels` are those of all numbers of the line, and `unit` the unit of this one. A word
+        behind a number without a label is a name of both numbers between which it stands.
         """
         if are_different(self.unit, unit):
             return False
         if best := self.best_places(labels):
-            return at in best
+            return at in best or (best == [at + 1] and not words_of(labels[at]))
         return True if is_same_unit(self.unit, unit) else None
 
 
@@ -121,10 +124,10 @@ def misnamed_columns(
             at
             for at, number in enumerate(numbers)
             if (own_names.above and title.is_printed_as(number.above))
-            or (title.words <= _words(number.label) and _has_unit_alone(title, number, own_names))
+            or (title.words <= words_of(number.label) and _has_unit_alone(title, number, own_names))
         ]
         is_told = len(candidates) == 1 and candidates[0] not in places.values()
-        if is_told and title.words and not title.words & _words(own_names.label):
+        if is_told and title.words and not title.words & words_of(own_names.label):
             columns.append(column)
     return columns
 
@@ -143,7 +146,7 @@ def _returns(target: Mapping[int, int], start: int) -> bool:
 
 
 @lru_cache(maxsize=4096)
-def _words(text: str) -> frozenset[str]:
+def words_of(text: str) -> frozenset[str]:
     """The words of a title, in one notation: `T\u2080` is `t0`, and `\u03c4` is `tau`."""
     plain = "".join(map(_spell, unicodedata.normalize("NFKD", text.casefold())))
     return frozenset(word for word in _WORD.findall(plain) if not word.isdecimal())

@@ -27,7 +27,8 @@ from coursebuild.core.scripts.diff import (
 )
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
-from coursebuild.core.scripts.tables import RowAddresses, compare_table, row_values
+from coursebuild.core.scripts.table_cells import row_values
+from coursebuild.core.scripts.tables import RowAddresses, compare_table
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 

@@ -168,7 +168,8 @@ def _judge_table(verdict: Verdict) -> Iterator[Diagnostic]:
     if verdict.rivals:
         message = f"`{verdict.recording.script}` printed the rows of this table in several ways"
         notes = [Note(f"`{line}`") for line in verdict.rivals[:_MAX_NOTES]]
-        help = "write the words and units that are printed with the numbers into the header"
+        help = "write the words and units that are printed with the numbers into the header; where "
+        help += 'a word is not of the number behind it, mark it: `` `error`{given="…"} ``'
         place = verdict.recording.caption_span
         yield diagnose("output-ambiguous", place, message, help=help, notes=notes)
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from msgspec import Struct
 
 from coursebuild.core import model
+from coursebuild.core.model.lesson_record import ShownValue, shown_values
 from coursebuild.core.scripts.lines import (
     CanonicalText,
     MappedText,
@@ -86,6 +87,18 @@ def elides_rows(table: model.Table) -> bool:
 def row_text(row: Iterable[RowCell]) -> str:
     """The cells of a row as one line."""
     return "  ".join(cell.mapped.text for cell in row)
+
+
+def row_values(
+    document: model.Document, recording: model.Recording, filters: Iterable[model.Filter] = ()
+) -> tuple[ShownValue, ...]:
+    """The rows of a recorded table as values that a lesson shows."""
+    if not isinstance(recording.body, model.Table) or recording.script is None:
+        return ()
+    number = model.output_numbers(document)[recording.span.start]
+    path, before = document.source.path, f"row of output {number}"
+    rows = table_rows(recording.body, filters)
+    return tuple(shown_values((path, recording.script, before, row_text(row)) for row in rows))
 
 
 def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:

@@ -23,7 +23,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core import model
-from coursebuild.core.model.lesson_record import Address, ShownValue, shown_values
+from coursebuild.core.model.lesson_record import Address
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.column_titles import (
@@ -31,6 +31,7 @@ from coursebuild.core.scripts.column_titles import (
     PrintedNames,
     misnamed_columns,
     swapped_columns,
+    words_of,
 )
 from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
@@ -107,7 +108,9 @@ def compare_table(
             if not cell_matches(old, new, comparison):
                 span = cell.span(old)
                 changes.append(number_change(span, span.text, new.text, (old, new)))
-    changes += [] if changes else matcher.header_changes(match)
+    if all(row.line >= 0 and row.certain for row in match.rows):
+        # Below a title of another column, or unit, numbers differ for that reason.
+        changes = [*matcher.header_changes(match)] or changes
     counts = (len(match.rows), 0 if elides_rows(table) else match.printed)
     return Verdict(
         recording,
@@ -118,18 +121,6 @@ def compare_table(
         match.rivals,
         counts,
     )
-
-
-def row_values(
-    document: model.Document, recording: model.Recording, filters: Iterable[model.Filter] = ()
-) -> tuple[ShownValue, ...]:
-    """The rows of a recorded table as values that a lesson shows."""
-    if not isinstance(recording.body, model.Table) or recording.script is None:
-        return ()
-    number = model.output_numbers(document)[recording.span.start]
-    path, before = document.source.path, f"row of output {number}"
-    rows = table_rows(recording.body, filters)
-    return tuple(shown_values((path, recording.script, before, row_text(row)) for row in rows))
 
 
 class TableMatcher:
@@ -226,12 +217,19 @@ class TableMatcher:
         places = [
             (cell, PrintedPlace(self.text, fit.line, (n,))) for cell, _, n in pairs if n in numbers
         ]
+        labels = [self._own_label(0, label) for label in self._labels(fit.line)]
         verdicts = [
-            self.titles[cell.column].names(self._labels(fit.line), place.first, place.units[0])
+            self.titles[cell.column].names(labels, place.first, place.units[0])
             for cell, place in places
         ]
         share = len(pairs) / max(1, len(numbers))
         return self._right_rows(layout), verdicts.count(True), -verdicts.count(False), share
+
+    def _own_label(self, row: int, label: str) -> str:
+        """A label; empty where it is what another cell of the row holds, under its title."""
+        cells = [cell for cell in self.rows[row] if not cell.canonical.numbers]
+        texts = (text for c in cells for text in (c.mapped.text, self.titles[c.column].text))
+        return "" if words_of(label) <= words_of(" ".join(texts)) else label
 
     def _labels(self, line: int) -> tuple[str, ...]:
         """The labels of the numbers of a line; wide gaps tell its titles of several words apart."""

@@ -128,12 +128,13 @@ def percent(value: float | None) -> Markup:
 def phrase(words: Strings, key: str, **values: str) -> Markup:
     """Put values into a text of the interface; no line end breaks the numbers among them."""
     unbroken_values = {
-        name: unbroken(text) if isinstance(text, Markup) else text for name, text in values.items()
+        name: unbroken(words.decimals(text)) if isinstance(text, Markup) else text
+        for name, text in values.items()
     }
     return Markup(escape(words(key)).format(**unbroken_values))
 
 
-def unbroken(number: Markup) -> Markup:
+def unbroken(number: str) -> Markup:
     """Mark a number so that no line end breaks it."""
     return Markup('<span class="whole">{}</span>').format(number)
 
@@ -143,7 +144,12 @@ def factor(value: float | None, digits: int = 3) -> str:
     if value is None:
         return ""
     value = float(f"{value:.{digits}g}")
-    return f"{value:,.0f}".replace(",", _THIN) if value >= 100 else f"{value:g}"
+    return whole_number(value) if value >= 100 else f"{value:g}"
+
+
+def whole_number(value: float) -> str:
+    """Write a whole number in groups of three digits, as it is understood in every language."""
+    return f"{value:,.0f}".replace(",", _THIN)
 
 
 def size(count: int) -> str:
@@ -151,7 +157,7 @@ def size(count: int) -> str:
     amount, unit = count / 1e6, "MB"
     if count < 1e7:
         amount, unit = (count, "B") if count < 1e4 else (count / 1e3, "kB")
-    return f"{amount:,.0f} {unit}".replace(",", _THIN)
+    return f"{whole_number(amount)} {unit}"
 
 
 def machine_text(words: Strings, machine: Machine) -> str:

@@ -255,7 +255,11 @@ def measurement_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, st
     scene: SceneReport | None = library.reports.scenes.get(model.name)
 
     def speed(times: float | None) -> str:
-        return "" if times is None else words("measured.times", factor=grids.factor(times))
+        return (
+            ""
+            if times is None
+            else words("measured.times", factor=words.decimals(grids.factor(times)))
+        )
 
     native = browser = None
     if scene is not None and scene.scenarios:
@@ -292,12 +296,12 @@ def _finding(words: Strings, finding: Finding) -> FindingView:
     label, saving = escape(finding.label), finding.saving
     if finding.difference:  # a figure alone where its words were not recorded
         label += Markup(" ({})").format(
-            finding.shown or grids.unbroken(grids.power(finding.difference, 2))
+            finding.shown or grids.unbroken(words.decimals(grids.power(finding.difference, 2)))
         )
     label += "; in what is left" if finding.in_rest else ""
     parts = []
     if saving.time is not None:
-        text = words("measured.saves_time", factor=f"{saving.time:.3g}")
+        text = words("measured.saves_time", factor=words.decimals(grids.factor(saving.time)))
         parts.append(text if saving.certain else words("measured.saves_none"))
     if saving.memory:
         parts.append(words("measured.saves_memory", size=grids.size(saving.memory)))

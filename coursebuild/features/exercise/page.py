@@ -12,7 +12,6 @@ from markupsafe import Markup
 from coursebuild.api import IndexReader, MarkdownWriter, PageContext
 from coursebuild.core.pages.marks import escape_line, escape_marks, fence, link, table
 from coursebuild.core.pages.renderer import Strings
-from coursebuild.core.pages.typography import number
 from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.exercise.model import FORMULA, LANGUAGES, Exercise, PublishedExercise
 from coursebuild.features.exercise.schema import HiddenTrial
@@ -55,7 +54,7 @@ def draw_exercise(page: PageContext, block: Exercise) -> Markup:
         picture=picture,
         size=() if record is None else record.size,
         arrows=0 if record is None else record.arrows,
-        alt=words("lab.picture", title=title, t=number(0)),
+        alt=words("lab.picture", title=title, t=0),
         task=page.blocks(block.task),
         subject=_subject(words, block),
         start=code(block.start.text),
@@ -78,13 +77,13 @@ def _subject(words: Strings, block: Exercise) -> str:
 def _bounds(words: Strings, trial: HiddenTrial) -> str:
     """The values that a trial accepts, with the time at which it looks, in words."""
     if trial.max is None:
-        bounds = words("exercise.least", value=number(trial.min or 0))
+        bounds = words("exercise.least", value=trial.min or 0)
     elif trial.min is None:
-        bounds = words("exercise.most", value=number(trial.max))
+        bounds = words("exercise.most", value=trial.max)
     else:
-        bounds = words("exercise.between", min=number(trial.min), max=number(trial.max))
+        bounds = words("exercise.between", min=trial.min, max=trial.max)
     bounds = with_unit(bounds, trial.unit)
-    return words("exercise.at", bounds=bounds, t=number(trial.t)) if trial.t else bounds
+    return words("exercise.at", bounds=bounds, t=trial.t) if trial.t else bounds
 
 
 def exercise_markdown(writer: MarkdownWriter, block: Exercise) -> str:

@@ -41,7 +41,6 @@ from coursebuild.core.pages.marks import (
     table,
 )
 from coursebuild.core.pages.renderer import Strings
-from coursebuild.core.pages.typography import number
 from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
@@ -168,7 +167,7 @@ def lab_view(words: Strings, place: Place, block: Lab, live: PublishedLab | None
         model=fields.model,
         model_href="",
         start=None,
-        stop=number(fields.stopAt) if fields.stopAt is not None else None,
+        stop=words.number(fields.stopAt) if fields.stopAt is not None else None,
         still=fields.still,
         controls=tuple((control.label, _values(words, control)) for control in fields.controls),
         readouts=tuple(readout.label for readout in fields.readouts),
@@ -216,9 +215,9 @@ def _recorded_view(
         at = words("lab.at_place", place=record.place)
         verification = words("lab.computed", tried=count, parity=parity)
     else:
-        alt = words("lab.picture", title=title, t=number(record.time, 4))
-        length = f"{number(record.scale[0])} m"
-        at = words("lab.at", t=number(round(record.end, 3)))
+        alt = words("lab.picture", title=title, t=words.number(record.time, 4))
+        length = f"{words.number(record.scale[0])} m"
+        at = words("lab.at", t=round(record.end, 3))
         verification = words("lab.proven", engine=LAB_ENGINE, tried=count, parity=parity)
     return RecordedView(record, place.href(live.picture), alt, length, at, verification)
 
@@ -226,12 +225,10 @@ def _recorded_view(
 def _values(words: Strings, control: Control) -> str:
     match control:
         case Slider():
-            ends = words("lab.between", min=number(control.min), max=number(control.max))
+            ends = words("lab.between", min=control.min, max=control.max)
             ends = with_unit(ends, control.unit)
-            values = (
-                words("lab.step", range=ends, step=number(control.step)) if control.step else ends
-            )
-            initial = with_unit(number(control.value, control.digits), control.unit)
+            values = words("lab.step", range=ends, step=control.step) if control.step else ends
+            initial = with_unit(words.number(control.value, control.digits), control.unit)
         case Select():
             values = words.join(label for label, _ in control.options)
             initial = next(label for label, value in control.options if value == control.start)
@@ -246,7 +243,7 @@ def _plot(words: Strings, plot: Plot) -> tuple[str, tuple[str, ...]]:
         ylabel=plot.ylabel or words("lab.value"),
         xlabel=plot.xlabel or words("lab.time"),
     )
-    lines = ((line.label, number(line.y)) for line in plot.refLines)
+    lines = ((line.label, words.number(line.y)) for line in plot.refLines)
     marks = (f"{label} ({y})" if label else y for label, y in lines)
     return title, (*(trace.label for trace in plot.traces), *marks)
 

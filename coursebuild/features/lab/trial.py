@@ -44,6 +44,7 @@ from coursebuild.features.lab import verdict
 from coursebuild.features.lab.compile import (
     LabModule,
     compile_lab,
+    decimal_of,
     equation_inputs,
     inputs_of,
     pieces,
@@ -195,7 +196,8 @@ class LabTrials:
         if self._context.static and not reply.findings and reply.start is not None:
             from coursebuild.features.lab.picture.static import equation_record, plots_file
 
-            record = equation_record(lab, output.config, reply.start)
+            decimal = decimal_of(self._context.course, trial)
+            record = equation_record(lab, output.config, reply.start, decimal)
             output = replace(output, record=record, picture=plots_file(record.plots))
         findings = [finding.diagnostic(lab) for finding in reply.findings]
         return TrialResult(lab.span, line, output), findings
@@ -385,7 +387,8 @@ class _LabTrial(Struct, frozen=True):
             film = b""
             if main["film"]:
                 film = keep("films", picture_key, lambda: draw_film(self.lab, main))
-            output = replace(output, record=lab_record(lab, main), picture=picture, film=film)
+            record = lab_record(lab, main, decimal_of(self.context.course, self.trial))
+            output = replace(output, record=record, picture=picture, film=film)
         return _Evaluation(reply, failures, remarks, output)
 
     def _check_code(self, mjb: bytes) -> list[Diagnostic]:

@@ -154,7 +154,8 @@ def _describe(words: Strings, report: CaseReport) -> Iterator[str]:
         (least, best), (most, worst) = min(costs), max(costs)
         key = "cheapest" if most > 1.05 * least else "alike"
         key = f"numerics.{key if len(costs) > 1 else 'only'}"
-        cheapest, ratio = seconds_text(least, _DIGITS), f"{most / least:.3g}"
+        texts = seconds_text(least, _DIGITS), f"{most / least:.3g}"
+        cheapest, ratio = map(words.decimals, texts)
         yield words(key, best=best, cost=cheapest, worst=worst, factor=ratio)
     elif report.main:
         yield words("numerics.out_of_reach")
@@ -200,7 +201,7 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
         notes.append(words("numerics.theory", sources="; ".join(formulas)))
     softened_steps = sorted({line.timestep for line in report.errors if line.refsafe})
     if softened_steps:
-        times = ", ".join(seconds_text(step) for step in softened_steps)
+        times = words.decimals(", ".join(map(seconds_text, softened_steps)))
         notes.append(words("measured.refsafe", settings=times))
     runs = ((f"{run.integrator} at {seconds_text(run.timestep)}", run) for run in report.errors)
     return [*notes, *scenario_view.lost_runs(runs)]

@@ -50,6 +50,14 @@ def test_a_regional_language_takes_the_general_one_first(assets: Assets) -> None
     assert words("code.copy") == "Copy"
 
 
+def test_numbers_that_are_inserted_have_the_decimal_sign_of_the_language(assets: Assets) -> None:
+    arabic, german = (strings_for(assets.templates, language) for language in ("ar", "de"))
+    assert german("lab.at", t=-1.5).endswith("t = −1,5 s")
+    assert german("lab.at", t="-1.5").endswith("t = -1.5 s"), "as it was written"
+    assert german.decimals("2.5 ms") == "2,5 ms"
+    assert arabic.number(0.5) == "0.5", "the digits are not Arabic ones"
+
+
 def test_lists_and_pairs_have_the_marks_of_the_language(assets: Assets) -> None:
     arabic, french = (strings_for(assets.templates, language) for language in ("ar", "fr"))
     assert arabic.join(["1.1", "1.2"]) == "1.1، 1.2"

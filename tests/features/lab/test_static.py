@@ -168,24 +168,24 @@ def test_readouts_and_plots_belong_to_the_run(bench: Bench) -> None:
             {"ylabel": "u", "traces": [{"label": "b", "expr": "0"}, {"label": "c", "expr": "1"}]},
         ],
     )
-    form = lab_record(lab, main)
+    form = lab_record(lab, main, ",")
     assert form.size == (640, 320)
     assert (form.time, form.end) == (0, pytest.approx(0.5))
-    assert form.readouts == (("t", "0.50"), ("word", "<late>"))
+    assert form.readouts == (("t", "0,50"), ("word", "<late>"))
     assert [svg.count("lab-trace ") for svg in form.plots] == [1, 2]
 
 
 VALUES = [
-    (1.0, 3, "1.000"),
-    (-1.5, 1, "−1.5"),
-    (-0.0004, 3, "0.000"),
+    (1.0, 3, "1,000"),
+    (-1.5, 1, "−1,5"),
+    (-0.0004, 3, "0,000"),
     (-0.5, 0, "0"),
-    (0.0005, 3, "0.001"),
-    (1e9, 0, "1.00·10⁹"),
-    (-2.5e300, 3, "−2.500·10³⁰⁰"),
-    (999999999.0, 1, "999999999.0"),
+    (0.0005, 3, "0,001"),
+    (1e9, 0, "1,00·10⁹"),
+    (-2.5e300, 3, "−2,500·10³⁰⁰"),
+    (999999999.0, 1, "999999999,0"),
     (None, 3, "–"),
-    ("-1", 3, "-1"),
+    ("-1.5", 3, "-1.5"),
 ]
 
 
@@ -199,7 +199,7 @@ def test_record_has_values_as_text_and_a_picture_whose_size_follows_the_lab() ->
     }
     readouts = [{"label": "r", "expr": "1", "digits": digits} for _, digits, _ in VALUES]
     heights = (80, 260, 480, 2000, 300)
-    records = [lab_record(make_lab(height=h, readouts=readouts), main) for h in heights]
+    records = [lab_record(make_lab(height=h, readouts=readouts), main, ",") for h in heights]
     assert records[0].readouts == tuple(("r", text) for _, _, text in VALUES)
     sizes = [(640, 160), (640, 347), (640, 480), (640, 480), (640, 400)]
     assert [record.size for record in records] == sizes

@@ -25,6 +25,7 @@ from msgspec import Struct
 from coursebuild.api import Lesson, Store, Trial, TrialContext
 from coursebuild.core.text.source import unique_name
 from coursebuild.core.values import fingerprint
+from coursebuild.features.lab.compile import owner_of
 from coursebuild.features.lab.engines.native import (
     LAB_ENGINE,
     EngineDescription,
@@ -293,7 +294,7 @@ def export_metadata(
     context: TrialContext, trial: Trial, kind: str, name: str, seconds: float
 ) -> ExportMetadata:
     """Say where a script comes from, of a `kind` such as `a lab`."""
-    owner = next((o for o in context.course.owners if o.id == trial.owner), None)
+    owner = owner_of(context.course, trial)
     origin = f"{kind} of the page “{trial.owner if owner is None else owner.title}”"
     if isinstance(owner, Lesson):
         origin = f"{kind} of lesson {owner.id}, “{owner.title}”"

@@ -86,16 +86,16 @@ def _size(lab: Lab) -> tuple[int, int]:
     return (_WIDTH, max(160, min(round(_WIDTH * lab.fields.height / 480), 480)))
 
 
-def lab_record(lab: Lab, main: MainRun) -> LabRecord:
-    """Make the record of a lab from the main run of its trial."""
+def lab_record(lab: Lab, main: MainRun, decimal: str) -> LabRecord:
+    """Make the record of a lab from the main run of its trial; `decimal`: the sign in numbers."""
     first, last = main["pictures"][0], main["pictures"][-1]
     recorded = main["plots"]
     plots = tuple(
-        Markup(plot_svg(plot, recorded["times"], traces, narrow=lab.fields.dock))
+        Markup(plot_svg(plot, recorded["times"], traces, decimal, narrow=lab.fields.dock))
         for plot, traces in zip(lab.fields.plots, recorded["plots"], strict=True)
     )
     readouts = tuple(
-        (readout.label, _format_value(value, readout.digits))
+        (readout.label, _format_value(value, readout.digits, decimal))
         for readout, value in zip(lab.fields.readouts, last["readouts"] or (), strict=False)
     )
     camera = _camera(lab, main["scene"]["camera"])
@@ -107,7 +107,7 @@ def lab_record(lab: Lab, main: MainRun) -> LabRecord:
     return LabRecord(_size(lab), scale, first["time"], readouts, last["time"], plots, arrows=arrows)
 
 
-def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun) -> LabRecord:
+def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun, decimal: str) -> LabRecord:
     """Make the record of a lab without an engine from what follows from its start."""
     plots = []
     for plot, data, source in zip(lab.fields.plots, run.plots, config["plots"], strict=True):
@@ -119,14 +119,17 @@ def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun) -> LabRecor
             for line in data["traces"]
         ]
         points = (source["points"] or {"data": ()})["data"]
-        svg = plot_svg(plot, horizontal, lines, narrow=lab.fields.dock, ends=ends, marks=points)
+        svg = plot_svg(
+            plot, horizontal, lines, decimal, narrow=lab.fields.dock, ends=ends, marks=points
+        )
         plots.append(Markup(svg))
     readouts = tuple(
-        (readout.label, _format_value(value, readout.digits))
+        (readout.label, _format_value(value, readout.digits, decimal))
         for readout, value in zip(lab.fields.readouts, run.readouts, strict=True)
     )
     axis, at = config["axis"], run.end if lab.kind == ODE else config["axis"]["at"]
-    place = f"{axis['name']} = {with_unit(typeset_number(f'{at:.4g}'), axis['unit'])}"
+    number = typeset_number(f"{at:.4g}", decimal)
+    place = f"{axis['name']} = {with_unit(number, axis['unit'])}"
     size = (round(_WIDE), round(_HEIGHT) * len(plots))
     return LabRecord(size, None, at, readouts, run.end, tuple(plots), place)
 
@@ -155,13 +158,13 @@ def plots_file(plots: Sequence[Markup]) -> bytes:
     ).encode()
 
 
-def _format_value(value: Any, digits: int) -> str:
+def _format_value(value: Any, digits: int, decimal: str) -> str:
     if isinstance(value, str):
         return value
     if not isinstance(value, int | float):
         return "\u2013"
     form = f".{max(2, digits)}e" if abs(value) >= _LARGE else f".{digits}f"
-    return typeset_number(f"{value:{form}}")
+    return typeset_number(f"{value:{form}}", decimal)
 
 
 _WIDE, _NARROW, _HEIGHT = 480.0, 340.0, 210.0
@@ -180,6 +183,7 @@ def plot_svg(
     plot: Plot,
     times: Sequence[float],
     traces: Sequence[Sequence[float | None]],
+    decimal: str = ".",
     *,
     narrow: bool = False,
     ends: tuple[float | None, float | None] = (None, None),
@@ -203,7 +207,7 @@ def plot_svg(
     low, high = _range(values, plot.ymin, plot.ymax)
     labels = [trace.label for trace in plot.traces]
     last_t = high_t if high_t > low_t else low_t + 1.0
-    frame = _Frame.of(low_t, last_t, low, high, labels, narrow=narrow)
+    frame = _Frame.of(low_t, last_t, low, high, labels, decimal, narrow=narrow)
     paths: list[str] = []
     names: list[tuple[float, str, int]] = []
     for n, (trace, points) in enumerate(zip(plot.traces, lines, strict=True)):
@@ -258,15 +262,17 @@ class _Frame(Struct, frozen=True):
         low: float,
         high: float,
         labels: Sequence[str],
+        decimal: str,
         *,
         narrow: bool,
     ) -> _Frame:
         width = _NARROW if narrow else _WIDE
-        y = Scale(_HEIGHT - _BOTTOM, _TOP, low, high, logarithmic=False)
+        y = Scale(_HEIGHT - _BOTTOM, _TOP, low, high, logarithmic=False, decimal=decimal)
         longest = max(len(text) for _, text in y.ticks(_TICKS))
         left = min(8.0 + _LETTER * longest, 0.35 * width)
         room = min(14.0 + _LETTER * max((len(label) for label in labels), default=0), 0.35 * width)
-        return cls(Scale(left, width - room, low_t, high_t, logarithmic=False), y, width)
+        x = Scale(left, width - room, low_t, high_t, logarithmic=False, decimal=decimal)
+        return cls(x, y, width)
 
     def axes(self, plot: Plot) -> list[str]:
         left, right, bottom = self.x.start, self.x.end, self.y.start

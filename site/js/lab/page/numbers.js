@@ -1,5 +1,6 @@
-/** Formats numbers for readers: with a real minus sign, fixed digits, and a width that does not depend on the sign. */
+/** Formats numbers for readers: with a real minus sign, the page's decimal sign, fixed digits, and a width that does not depend on the sign. */
 
+const DECIMAL = globalThis.document?.documentElement.dataset.decimal ?? '.' // what is typed, exported and linked keeps the point
 const FIGURE_SPACE = '\u2007'
 const MINUS = '\u2212'
 
@@ -22,16 +23,16 @@ export function formatNumber(value, digits) {
   const size = Math.abs(value)
   let text
   if (digits === null || digits === undefined)
-    text = size === 0 || (size >= 1e-4 && size < 1e7) ? plain(size) : scientific(size, 4)
+    text = isPlain(size) ? String(Number(size.toPrecision(6))) : scientific(size, 4)
   else text = size < 1e9 ? size.toFixed(digits) : scientific(size, Math.max(2, digits))
   // A number that is rounded to zero has no sign.
   const sign = value < 0 && /[1-9]/.test(text) ? MINUS : FIGURE_SPACE
-  return sign + text
+  return sign + shown(text)
 }
 
 /** A number without padding, for a label: `−0.5`. */
 export function formatLabel(value) {
-  return (value < 0 ? MINUS : '') + shortest(Math.abs(value))
+  return (value < 0 ? MINUS : '') + shown(shortest(Math.abs(value)))
 }
 
 /** The digits after the point that are needed to tell the values of a slider apart. */
@@ -49,20 +50,20 @@ export const withUnit = (text, unit) => (unit ? `${text}${unit === '°' ? '' : '
 
 /** Simulated time, in hundredths of a second, or with more digits. */
 export function formatTime(seconds, digits = 2) {
-  return `${seconds < 0 ? MINUS : ''}${Math.abs(seconds).toFixed(digits)}`
+  return formatNumber(seconds, digits).trim()
 }
 
-/** `0.4` for 0.412, `0.03` for 0.0312. */
-export function formatRatio(ratio) {
-  return ratio >= 0.1 ? ratio.toFixed(1) : ratio.toPrecision(1)
+/** One figure: `0.4` for 0.412, `0.03` for 0.0312. */
+export function formatRough(value) {
+  return formatLabel(Number(value.toPrecision(1)))
 }
 
-function plain(size) {
-  return String(Number(size.toPrecision(6)))
-}
+const shown = (text) => text.replace('.', DECIMAL)
+
+const isPlain = (size) => size === 0 || (size >= 1e-4 && size < 1e7)
 
 function shortest(size) {
-  if (size === 0 || (size >= 1e-4 && size < 1e7)) return String(Number(size.toPrecision(10)))
+  if (isPlain(size)) return String(Number(size.toPrecision(10)))
   const [mantissa, exponent] = size.toExponential(3).split('e')
   const power = `10${superscript(Number(exponent))}`
   return Number(mantissa) === 1 ? power : `${Number(mantissa)}·${power}`

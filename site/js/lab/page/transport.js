@@ -1,7 +1,7 @@
 /** The rows under the picture: play and pause, a step, reset, speed, time, full screen; and the run as a bar. */
 
 import { h, icon, iconButton } from './dom.js'
-import { formatRatio, formatTime } from './numbers.js'
+import { formatLabel, formatRough, formatTime } from './numbers.js'
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5]
 const ON_TIME = 0.95
@@ -21,7 +21,7 @@ export function buildTransport(words, actions) {
   const step = actions.step === null ? null : iconButton('step', words('lab.live.step'), actions.step)
   const reset = iconButton('reset', words('lab.live.reset'), actions.reset)
   const speed = h('select', { class: 'lab-speed', 'aria-label': words('lab.live.speed'), title: words('lab.live.speed') })
-  speed.append(...SPEEDS.map((factor) => h('option', { value: String(factor), selected: factor === 1 }, `${factor} ×`)))
+  speed.append(...SPEEDS.map((factor) => h('option', { value: String(factor), selected: factor === 1 }, `${formatLabel(factor)} ×`)))
   speed.addEventListener('change', () => actions.speed(Number(speed.value)))
   const full = actions.full === null ? null : iconButton('full', words('lab.live.full'), actions.full)
   const time = h('output', { class: 'lab-time' })
@@ -52,7 +52,7 @@ export function buildTransport(words, actions) {
       if (time.textContent !== text) time.textContent = text
     },
     setRatio(ratio) {
-      const text = ratio < ON_TIME ? words('lab.live.ratio', { ratio: formatRatio(ratio) }) : ''
+      const text = ratio < ON_TIME ? words('lab.live.ratio', { ratio: formatRough(ratio) }) : ''
       if (late.textContent !== text) late.textContent = text
     },
     setEnabled(isEnabled) {

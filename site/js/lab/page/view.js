@@ -7,6 +7,7 @@
 import { PerspectiveCamera } from 'three'
 import { ModelCamera, OrbitCamera } from './camera.js'
 import { h, outline } from './dom.js'
+import { formatRough } from './numbers.js'
 import { channels, resolve, watchTheme } from './palette.js'
 import { stage } from './stage.js'
 import { STUDIO_LAYER, roundLength } from './studio.js'
@@ -203,7 +204,7 @@ class ScaleBar {
     this.path = path
     this.svg.setAttribute('viewBox', `0 0 ${width} ${height}`)
     this.svg.firstElementChild.setAttribute('d', path)
-    const text = `${Number(length.toPrecision(1))} m`
+    const text = `${formatRough(length)} m`
     if (text === this.length.textContent) return
     this.length.textContent = text
     this.element.setAttribute('aria-label', this.words('lab.scale', { length: text }))
