@@ -88,8 +88,8 @@ def find_losses(texts: Path, paths: Iterable[str], root: Path) -> Losses:
     on_pages, nowhere = _Index(), {*_words(account.partition("## Words that are nowhere")[2])}
     for page in _pages(root):
         on_pages.add(_runs(page))
-    told = _Index(on_pages.rows)
-    told.add(_runs(account.replace("`", " ").replace("*", " ")))
+    with_account = _Index(on_pages.rows)
+    with_account.add(_runs(account.replace("`", " ").replace("*", " ")))
     words, silent, runs = 0, 0, []
     for path in paths:
         if (root / "content/files" / path).is_file():  # a text that is linked, and no lesson
@@ -99,7 +99,7 @@ def find_losses(texts: Path, paths: Iterable[str], root: Path) -> Losses:
             for is_there, group in groupby(zip(on_pages.find(run), run, strict=True), _first):
                 if not is_there:
                     runs.append((path, " ".join(word for _, word in group)))
-            pairs = zip(told.find(run), run, strict=True)
+            pairs = zip(with_account.find(run), run, strict=True)
             silent += sum(not is_told and word not in nowhere for is_told, word in pairs)
     return Losses(words, sorted(runs, key=lambda run: -len(run[1].split())), silent)
 
@@ -121,11 +121,11 @@ class _Index:
 
     def find(self, run: Run) -> list[bool]:
         """Say of each word whether it is here, with neighbours."""
-        size, found = min(_NEIGHBOURS, len(run)), [False] * len(run)
+        size, marks = min(_NEIGHBOURS, len(run)), [False] * len(run)
         for at in range(len(run) - size + 1):
             if tuple(run[at : at + size]) in self.rows:
-                found[at : at + size] = [True] * size
-        return found
+                marks[at : at + size] = [True] * size
+        return marks
 
 
 def _words(text: str) -> Run:
@@ -175,7 +175,7 @@ def _read(text: str) -> Iterator[str]:
     text = _FORMULA.sub(_EDGE, _NAMES.sub(_EDGE, _MARKS.sub("", text)))
     for token in _READER.parse(text):
         if token.type == "inline":
-            yield "".join(map(_shown, token.children or ()))
+            yield "".join(map(_text_of, token.children or ()))
         elif token.type == "html_block":
             yield _plain(token.content)
         elif token.type == "code_block" or (
@@ -184,11 +184,11 @@ def _read(text: str) -> Iterator[str]:
             yield from _read(token.content)
 
 
-def _shown(token: Token) -> str:
+def _text_of(token: Token) -> str:
     if token.type in ("softbreak", "hardbreak"):
         return "\n"
     if token.type == "image":
-        return "".join(map(_shown, token.children or ()))
+        return "".join(map(_text_of, token.children or ()))
     if token.type == "html_inline":
         return _plain(token.content)
     return _LANGUAGE.sub("", token.content)

@@ -95,12 +95,12 @@ class Account:
         for leftover in left:
             groups[leftover.kind, _NAMES.sub("", leftover.message)].append(leftover)
         for alike in groups.values():
-            shown = alike if len(alike) <= _MOST_ALIKE else alike[:1]
-            lines += [f"left: {leftover.position}: {leftover.message}" for leftover in shown]
-            if rest := alike[len(shown) :]:
+            examples = alike if len(alike) <= _MOST_ALIKE else alike[:1]
+            lines += [f"left: {leftover.position}: {leftover.message}" for leftover in examples]
+            if rest := alike[len(examples) :]:
                 places = "; ".join(leftover.position for leftover in rest[:_MOST_ALIKE])
-                more = "; …" * (len(rest) > _MOST_ALIKE)
-                lines.append(f"left: {len(rest)} more like this: {places}{more}")
+                ellipsis = "; …" * (len(rest) > _MOST_ALIKE)
+                lines.append(f"left: {len(rest)} more like this: {places}{ellipsis}")
         yield from lines[:_MOST_LINES]
         if lines[_MOST_LINES:]:
             yield f"left: {len(lines) - _MOST_LINES} more lines, which are in IMPORT.md"

@@ -21,6 +21,7 @@ from coursebuild.features.importer.roles import (
     convert_substitution,
     convert_tag,
     convert_wiki_link,
+    tell_emoji,
     write_link,
 )
 from coursebuild.features.importer.source_files import title_of_file
@@ -71,8 +72,7 @@ _LINE = re.compile(
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:)"
-    r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))"
-    r"|(?P<block>(?:^|(?<=\s))\^(?P<block_id>[\w-]+)$)"
+    r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     r"|(?P<tag><(?i:a|img|source|video)[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
@@ -237,8 +237,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
 
 
 _MARKDOWN_FIGURE = re.compile(
-    r"^(?P<indent>[ \t]*)<figure\b[^<>]*>\s*(?P<picture>!\[[^\]\n]*\]\([^()\n]*\))"
-    r"(?:\{[^{}\n]*\})?\s*"
+    r"^(?P<lead>[ \t]*)<figure[^<>]*>\s*(?P<picture>!\[[^\]\n]*\]\([^()\n]*\))(?:\{[^{}\n]*\})?\s*"
     r"(?:<figcaption\b[^<>]*>\s*(?P<caption>[^<>]*?)\s*</figcaption>\s*)?</figure>[ \t]*$",
     re.MULTILINE,
 )
@@ -249,7 +248,7 @@ def _write_captioned(match: re.Match[str]) -> str:
     """Return a picture with its caption, in as many lines."""
     caption = " ".join((match["caption"] or "").split())
     new = f"Figure: {match['picture']} {caption}" if caption else match["picture"]
-    return match["indent"] + new + "\n" * match[0].count("\n")
+    return match["lead"] + new + "\n" * match[0].count("\n")
 
 
 def _write_comment(match: re.Match[str]) -> str:
@@ -415,12 +414,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
         case "emoji":
-            if "mkdocs.yml" in context.files or "docusaurus.config.js" in context.files:
-                message = f"`{whole}`, shown as written: write the sign, if its tool draws one"
-                context.leave("emoji", message)
-            return whole
+            return tell_emoji(whole, context)
         case "block" if (context.files.folder / ".obsidian").is_dir():
-            return f'<a id="{to_anchor(match["block_id"])}"></a>'
+            return f'<a id="{to_anchor(match["id"])}"></a>'
         case "keys":
             keys = re.findall(r"[^+\"]+", match["stroke"])
             return "+".join(key.capitalize() if key.islower() else key for key in keys)

@@ -62,13 +62,11 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             return words or f"{name.upper()} {body}"
         case "index":
             return words or ("" if ":" in body or "!" in body else body)
-        case "download":
+        case "download" | "button":
             return write_link(words or target, context.resolve_link(target))
         case "kbd" | "sub" | "sup" | "u" | "underline" | "del" | "strike":
             tag = {"underline": "u", "strike": "del"}.get(name, name)
             return f"<{tag}>{body}</{tag}>"
-        case "button":
-            return write_link(words or target, context.resolve_link(target))
         case _ if name.rpartition(":")[2] in _CODE_ROLES:
             return f"`{words or target}`"
         case _ if name in _WORD_ROLES:
@@ -153,6 +151,13 @@ def convert_substitution(whole: str, context: LessonContext) -> str:
     message = f"`{whole}`, which its tool replaces; it is code now: write what it stands for"
     context.leave("substitution", message)
     return f"`{whole}`"
+
+
+def tell_emoji(name: str, context: LessonContext) -> str:
+    """Return the name of a sign between colons as it is, and note it where its tool draws signs."""
+    if "mkdocs.yml" in context.files or "docusaurus.config.js" in context.files:
+        context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
+    return name
 
 
 def convert_wiki_link(whole: str, page: str, part: str, words: str, context: LessonContext) -> str:

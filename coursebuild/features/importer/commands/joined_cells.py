@@ -51,9 +51,9 @@ def end_before_failure(script: model.Script, script_run: ScriptRun) -> Iterator[
         yield Edit(Span(source, *cell.span()), new.replace("\n", f"\n{cell['lead']}"))
         reason = "a cell above fails"
     head = script.span.first_line().text
-    kept = script.code.text.split("\n")[: int(cells[first]["first"]) - 1]
-    if kept:
-        yield Edit(script.span, marks.fence(head.lstrip("`~ "), "\n".join(kept)))
+    kept_lines = script.code.text.split("\n")[: int(cells[first]["first"]) - 1]
+    if kept_lines:
+        yield Edit(script.span, marks.fence(head.lstrip("`~ "), "\n".join(kept_lines)))
     else:
         end = script.span.start + len(head)
         yield Edit(Span(source, end, end), " norun")
