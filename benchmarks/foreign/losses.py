@@ -47,12 +47,13 @@ _FORMULA = re.compile(
     re.DOTALL,
 )
 _NAMES = re.compile(
-    r"\{cite[\w:]*\}`[^`]+`|\{[a-z][\w:+.-]*\}`[^`\s]+`|\{[a-z][\w:+.-]*\}(?=`)|(?<=\S)\s<[^<>`\n]+>(?=`)"
-    r"|\{:?[ ]*[#.:][^{}\n]*\}|\{[ ]*[\w:-]+=[^{}\n]*\}|\[[^\[\]\n]*-?@[\w:.-]+[^\[\]\n]*\]"
-    r"|(?<![\w.])@\w+-[\w-]+|:[a-z]+-[\w-]+:|\{\{[^{}\n]*\}\}|\{%[^%\n]*%\}|<!--.*?-->",
+    r"\{cite[\w:]*\}`[^`]+`|\{[a-z][\w:+.-]*\}`[^`\s]+`|\{[a-z][\w:+.-]*\}(?=`)"
+    r"|(?<=\S)\s<[^<>`\n]+>(?=`)|\[[^\[\]\n]*-?@[\w:.-]+[^\[\]\n]*\](?!\()"
+    r"|(?<![\w.\[])@\w+-[\w-]+|:[a-z]+-[\w-]+:|\{\{[^{}\n]*\}\}|\{%[^%\n]*%\}|<!--.*?-->",
     re.DOTALL,
 )
 """Names by which other tools find what a page shows in their place, or how it looks."""
+_ATTRIBUTES = re.compile(r"\{:?[ ]*[#.:][^{}\n]*\}|\{[ ]*[\w:-]+=[^{}\n]*\}")
 _EDGE = "\ue000"
 """What no run goes across."""
 _SKIPPED = re.compile(r"<(script|style|math|svg|nav|template)\b.*?</\1>|<!--.*?-->", re.DOTALL)
@@ -172,7 +173,8 @@ def _prose(path: Path) -> str:
 
 def _read(text: str) -> Iterator[str]:
     """Yield the blocks of Markdown as plain text."""
-    text = _FORMULA.sub(_EDGE, _NAMES.sub(_EDGE, _MARKS.sub("", text)))
+    text = _ATTRIBUTES.sub("", _MARKS.sub("", text))
+    text = _FORMULA.sub(_EDGE, _NAMES.sub(_EDGE, text))
     for token in _READER.parse(text):
         if token.type == "inline":
             yield "".join(map(_text_of, token.children or ()))
