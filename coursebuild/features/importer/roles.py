@@ -83,7 +83,7 @@ _CODE_ROLES = frozenset(
 )
 _WORD_ROLES = frozenset("abbr chem dfn guilabel menuselection raw sc smallcaps span term".split())
 _INLINE_RUN = re.compile(r"`(?:\{(python|r|julia)\}|r)[ ]+([^`]+)`")
-_LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)\w+[ ]+")
+_LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)[\w-]+[ ]+")
 """The language of code in a line, as MkDocs marks it."""
 
 

@@ -214,7 +214,7 @@ def test_code_that_docusaurus_imports_and_colours(tmp_path: Path) -> None:
         ("[a][b]{ .button } [c]{.x}\n\n[b]: https://a.org", "[a][b] c\n\n[b]: https://a.org"),
         ('++"Go: To"+ctrl++', "Go: To+Ctrl"),
         ("[![](https://a.org/b.svg?c)](https://a.org)", "[b.svg](https://a.org)"),
-        ("Fig.~3 :smile:", "Fig.~3 :smile:"),
+        ("Fig.~3 :smile: `#!a-b c`", "Fig.~3 :smile: `c`"),
         ("- (at)=\n  A.\n\n[b](#at)", '- <a id="at"></a>\n  A.\n\n[b](#at)'),
         ("A. ^b-1\n\n[[#^b-1|c]]", 'A. <a id="b-1"></a>\n\n[c](#b-1)'),
         (
