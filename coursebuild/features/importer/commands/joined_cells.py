@@ -13,19 +13,21 @@ from msgspec.structs import replace
 
 from coursebuild.api import Edit, ScriptRun, Span, marks, model
 from coursebuild.core.scripts.extract import Extraction
-from coursebuild.features.importer.context import PRINTS
+from coursebuild.features.importer.context import PRINTS, script_path_of
 
 _MARK = "the next cell of this text"
 
 
 def find_cells(script: model.Script) -> Sequence[re.Match[str]]:
-    """Return the blocks that show a script's cells where they stood."""
+    """Return the blocks that show the cells of an imported script where they stood."""
     block = (
         rf"^(?P<lead>[> \t]*)(?P<mark>`{{3,}})(?P<language>\w+) show={re.escape(script.path)}"
         r"#L(?P<first>\d+)-L\d+\n(?P<code>(?:.*\n)*?)(?P=lead)(?P=mark)[ \t]*$"
     )
-    is_known = script.language in PRINTS
-    return [*re.finditer(block, script.span.source.text, re.MULTILINE)] if is_known else []
+    own_path = script_path_of(script.span.path).removesuffix(".py")
+    is_of_cells = script.path.startswith(own_path) and not script.is_python
+    blocks = re.finditer(block, script.span.source.text, re.MULTILINE)
+    return [*blocks] if is_of_cells and script.language in PRINTS else []
 
 
 def mark_cells(extraction: Extraction) -> Extraction:
