@@ -4,7 +4,8 @@ Run: python benchmarks/corpus.py [--bodies NAME …] [--cache DIR] [--record]
 
 The texts are those of packages (`corpus.toml`); they are fetched into `--cache`, and nothing of
 them is run. Each body is read twice: as `coursebuild import` makes it, and its Markdown files as
-lessons. Printed are errors, warnings and hints by rule.
+lessons. Printed are errors, warnings and hints by rule, and the words of prose that an import
+leaves on no page.
 
 Whether a message is true, somebody has to say. Up to fifteen lines of each rule and body that
 nobody has judged are written to `sample.txt` in the cache: put a letter before each of them, and
@@ -32,6 +33,7 @@ import tomllib
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from textwrap import shorten
 from typing import TypeAlias
 
 import msgspec
@@ -46,6 +48,7 @@ from benchmarks.foreign.courses import (  # noqa: E402
     import_course,
     write_plain_course,
 )
+from benchmarks.foreign.losses import Losses, find_losses  # noqa: E402
 from benchmarks.foreign.packages import texts_of  # noqa: E402
 from coursebuild.core.files.errors import UsageError  # noqa: E402
 from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
@@ -57,6 +60,8 @@ SEVERITIES = ("error", "warning", "hint")
 LETTERS = "rfow"
 SAMPLE = 15
 """Lines of a rule and body that are judged."""
+LONGEST = 10
+"""Runs of lost words that are printed."""
 SHARE = 10_000
 """Words to which counts are related."""
 
@@ -170,18 +175,19 @@ def read_bodies(names: Sequence[str]) -> list[Body]:
     return [b for b in bodies if not names or any(name in b.name for name in names)]
 
 
-def examine_body(body: Body, cache: Path) -> Iterator[tuple[str, Examination]]:
-    """What is said of a body, in the two ways."""
+def examine_body(body: Body, cache: Path) -> Iterator[tuple[str, Examination, Losses | None]]:
+    """What is said of a body, in the two ways; what is lost when it is imported."""
     with tempfile.TemporaryDirectory(prefix="corpus-") as folder:
         top = Path(folder)
         texts_of(body.packages, body.files, cache / "packages", top / "texts")
         try:
-            import_course(top / "texts", top / "imported")
-            yield "imported", examine(top / "imported")
+            paths = import_course(top / "texts", top / "imported")
+            losses = find_losses(top / "texts", paths, top / "imported")
+            yield "imported", examine(top / "imported"), losses
         except UsageError as error:
             print(f"{body.name} cannot be imported: {error}")
         if write_plain_course(top / "texts", top / "plain"):
-            yield "as it is", examine(top / "plain")
+            yield "as it is", examine(top / "plain"), None
 
 
 def table_of_rules(examination: Examination, judgements: Judgements) -> Iterator[str]:
@@ -193,6 +199,17 @@ def table_of_rules(examination: Examination, judgements: Judgements) -> Iterator
         verdicts = ", ".join(f"{letters[letter]} {letter}" for letter in LETTERS if letters[letter])
         rate = count * SHARE / max(examination.words, 1)
         yield f"  {first.severity:<8}{rule:<24}{count:>6}{rate:>9.1f}   {verdicts}"
+
+
+def lines_of_losses(losses: Losses) -> Iterator[str]:
+    """The share of the words that are on no page, and the longest runs of them."""
+    share = losses.lost / max(losses.words, 1)
+    yield (
+        f"  on no page: {losses.lost} of {losses.words} words of prose ({share:.2%}), "
+        f"{losses.silent} of them not in the account"
+    )
+    for path, words in losses.runs[:LONGEST]:
+        yield f"    {path}: {shorten(words, 200, placeholder=' …')}"
 
 
 def table(rows: Sequence[Row]) -> Iterator[str]:
@@ -228,12 +245,14 @@ def main() -> int:
     keep_judgements(judgements)
     rows, questions = [], []
     for body in read_bodies(arguments.bodies):
-        for way, examination in examine_body(body, cache):
+        for way, examination, losses in examine_body(body, cache):
             row = evaluate(body.name, way, examination, judgements)
             rows.append(row)
             questions += sample(f"{body.name}, {way}", examination.diagnostics, judgements)
             print(f"\n{body.name}, {way}: {row.files} files, {row.words} words")
             print(*table_of_rules(examination, judgements), sep="\n", flush=True)
+            if losses is not None:
+                print(*lines_of_losses(losses), sep="\n", flush=True)
     print("", *table(rows), sep="\n")
     (cache / "sample.txt").write_text("\n".join([*questions, ""]), encoding="utf-8")
     if questions:

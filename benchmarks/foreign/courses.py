@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.features.importer.convert import convert, write_course
-from coursebuild.features.importer.source_files import SourceFiles
+from coursebuild.features.importer.source_files import TEXTS, SourceFiles
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, open_store
@@ -22,9 +22,9 @@ from coursebuild.pipeline.scripts import extract_scripts
 from coursebuild.pipeline.verify import compile_models
 
 _FENCE = re.compile(r"^[ >]*(`{3,}|~{3,}).*?(?:^[ >]*\1|\Z)", re.MULTILINE | re.DOTALL)
-_WORDS = re.compile(r"[\u3040-\u30ff\u3400-\u9fff]{1,2}|[^\W\d_\u3040-\u30ff\u3400-\u9fff]+")
+WORDS = re.compile(r"[\u3040-\u30ff\u3400-\u9fff]{1,2}|[^\W\d_\u3040-\u30ff\u3400-\u9fff]+")
 """Words, and two signs each of Chinese and Japanese, which has no spaces."""
-_FRONT = re.compile(r"\A---\n.*?\n---\n", re.DOTALL)
+FRONT = re.compile(r"\A---\n.*?\n---\n", re.DOTALL)
 _TITLE = re.compile(r"\A\s*# .*\n")
 
 
@@ -38,10 +38,11 @@ class Examination(Struct, frozen=True):
     """Errors, warnings and hints."""
 
 
-def import_course(texts: Path, root: Path) -> None:
-    """Write texts as `coursebuild import` does, without trying their scripts."""
+def import_course(texts: Path, root: Path) -> list[str]:
+    """Write texts as `coursebuild import` does; return the paths of those that it takes."""
     files = SourceFiles(texts)
     write_course(convert(files), root, files, open_store(root, None, None))
+    return sorted(path for path in files.read_paths if path.endswith(TEXTS))
 
 
 def write_plain_course(texts: Path, root: Path) -> bool:
@@ -52,7 +53,7 @@ def write_plain_course(texts: Path, root: Path) -> bool:
     number = 0
     for path in sorted(texts.rglob("*.md")):
         text = path.read_text("utf-8", errors="replace")
-        text = _TITLE.sub("", _FRONT.sub("", text), count=1)
+        text = _TITLE.sub("", FRONT.sub("", text), count=1)
         if not text.strip():
             continue
         number += 1
@@ -77,5 +78,5 @@ def examine(root: Path) -> Examination:
         diagnostics += compile_models(course, options)[1]
     report = judge(course, diagnostics)
     texts = [path.read_text("utf-8") for path in (root / "content").rglob("*.md")]
-    words = sum(len(_WORDS.findall(_FENCE.sub("", text))) for text in texts)
+    words = sum(len(WORDS.findall(_FENCE.sub("", text))) for text in texts)
     return Examination(len(texts), words, (*report.diagnostics, *report.hints))

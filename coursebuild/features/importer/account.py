@@ -35,7 +35,11 @@ class Leftover(Struct, frozen=True, order=True):
 _MOST_PLACES = 12
 """Places of one sort of leftover that are named."""
 _MOST_LINES = 40
-"""Leftovers that a report of the command names one by one."""
+"""Lines on leftovers in a report of the command."""
+_MOST_ALIKE = 3
+"""Leftovers with the same words that it names one by one; else the first, and some places."""
+_NAMES = re.compile(r"`[^`]*`|\(.*\)")
+"""What differs in the messages on the same sort of thing."""
 
 
 class Account:
@@ -84,13 +88,22 @@ class Account:
 
     def summary(self) -> Iterator[str]:
         """Yield the lines of a report: counts, then what is left, the first of many."""
-        left = self.leftovers
+        left, lines = self.leftovers, []
         counts = f"{self.taken.total()} taken, {self.changed.total()} changed, {len(left)} left"
         yield f"{counts}: IMPORT.md lists them by kind"
-        for leftover in left[:_MOST_LINES]:
-            yield f"left: {leftover.position}: {leftover.message}"
-        if rest := left[_MOST_LINES:]:
-            yield f"left: {len(rest)} more, which are in IMPORT.md"
+        groups = defaultdict[tuple[str, str], list[Leftover]](list)
+        for leftover in left:
+            groups[leftover.kind, _NAMES.sub("", leftover.message)].append(leftover)
+        for alike in groups.values():
+            examples = alike if len(alike) <= _MOST_ALIKE else alike[:1]
+            lines += [f"left: {leftover.position}: {leftover.message}" for leftover in examples]
+            if rest := alike[len(examples) :]:
+                places = "; ".join(leftover.position for leftover in rest[:_MOST_ALIKE])
+                ellipsis = "; …" * (len(rest) > _MOST_ALIKE)
+                lines.append(f"left: {len(rest)} more like this: {places}{ellipsis}")
+        yield from lines[:_MOST_LINES]
+        if lines[_MOST_LINES:]:
+            yield f"left: {len(lines) - _MOST_LINES} more lines, which are in IMPORT.md"
 
     def text(self, name: str) -> str:
         """The text of IMPORT.md for a course that was called so."""

@@ -14,7 +14,9 @@ from coursebuild.features.importer.context import (
 from coursebuild.features.importer.displays import normalize_formulas
 
 TARGET = re.compile(
-    r"^\((?P<name>[\w:.-]+)\)=[ \t]*(?:\n+(?P<heading>#{1,6}[ \t].*))?$", re.MULTILINE
+    r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)\((?P<name>[\w:.-]+)\)=[ \t]*"
+    r"(?:\n+(?P<heading>#{1,6}[ \t].*))?$",
+    re.MULTILINE,
 )
 FIGURE = re.compile(
     r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"

@@ -16,7 +16,9 @@ from coursebuild.features.importer.context import LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment, read_yaml
 
-_OPTION = re.compile(r"^(?:(?:#|//|%%)\|(.*)|:([\w-]+):[ \t]*(.*))\n?", re.MULTILINE)
+_OPTION = re.compile(
+    r"^(?:(?:#|//|%%)(?:[ ](?=\|[ ]+[\w-]+:[ ]))?\|(.*)|:([\w-]+):[ \t]*(.*))\n?", re.MULTILINE
+)
 """A line of options of a cell: YAML of Quarto, or one option of MyST."""
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
 _TIMES = re.compile(r"^(?:CPU times|Wall time|.* per loop \(mean)\b.*\n?", re.MULTILINE)
@@ -28,7 +30,7 @@ _WINDOW = re.compile(
 _FIGURE = re.compile(r"\b(?:plt|pyplot|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
-_MAGIC = re.compile(r"^[ \t]*(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
+_MAGIC = re.compile(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
 def write_cell(cell: Segment, context: LessonContext) -> str:
@@ -72,12 +74,27 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     title = caption_of_code(options, context)
     label = re.sub("^lst-", "", options.get("lst-label", ""))
     word += how_shown(cell) + (f" {{#lst:{to_anchor(label)}}}" if label else "")
-    blocks = [*title, marks.fence(f"python file={context.script_path}{word}", code)]
+    head, end = f"python file={context.script_path}{word}", f"\n{_END} {len(context.parts)}"
+    blocks = [*title, marks.fence(head, code + end)]
     if output := recorded_output(cell, code):
         blocks.append(marks.fence("output", output))
         account.taken["output that is recorded"] += 1
         context.notebook_outputs.append((context.script_path, output))
     return "\n\n".join((*blocks, figure) if figure else blocks)
+
+
+_END = "#: end of part"
+"""What stands for the lines that a cell gets when the texts below it are read."""
+
+
+def print_values(text: str, context: LessonContext) -> str:
+    """Return a lesson whose cells print the values that its text shows."""
+
+    def lines(match: re.Match[str]) -> str:
+        prints = context.prints.get(int(match[2]), ())
+        return "".join(f"{match[1]}{line}\n" for line in prints)
+
+    return re.sub(rf"^(.*){_END} (\d+)\n", lines, text, flags=re.MULTILINE)
 
 
 _PYPLOT = re.compile(
@@ -322,7 +339,22 @@ def how_shown(cell: Segment) -> str:
 
 def code_for_readers(cell: Segment) -> str:
     """Return a cell's code without the lines that only its tool understands."""
-    return _MAGIC.sub("", _OPTION.sub("", _YAML_HEAD.sub("", cell.text, count=1))).strip("\n")
+    return _drop_magics(_OPTION.sub("", _YAML_HEAD.sub("", cell.text, count=1))).strip("\n")
+
+
+def _drop_magics(text: str) -> str:
+    """Return code without the lines of Jupyter; a block that holds only one stays a block."""
+    return _MAGIC.sub(lambda magic: magic[1] and f"{magic[1]}pass", text)
+
+
+def _find_fault(text: str) -> str:
+    """Return why a text is no Python; empty where it is."""
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            compile(text, "cell", "exec", dont_inherit=True)  # `await` outside functions too
+    except (SyntaxError, ValueError, RecursionError) as error:
+        return str(error)
+    return ""
 
 
 def runnable_code(cell: Segment, context: LessonContext) -> str:
@@ -343,19 +375,16 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
     elif first.startswith("%%"):
         context.leave("cell", f"a cell of `{first.split()[0]}` is shown and not run")
         return ""
-    for magic in _MAGIC.findall(text):
-        context.leave("magic", f"`{magic.strip()}`, which is for Jupyter alone")
-    text = _MAGIC.sub("", text)
+    if _find_fault(text):  # else a line that begins with `%` goes on from the one before
+        for magic in _MAGIC.finditer(text):
+            context.leave("magic", f"`{magic[0].strip()}`, which is for Jupyter alone")
+        text = _drop_magics(text)
     text = _without_host(_WINDOW.sub(r"\1pass", text), context)
-    try:
-        with warnings.catch_warnings(action="ignore"):
-            compile(text, "cell", "exec", dont_inherit=True)  # `await` outside functions too
-        tree = ast.parse(text)
-    except (SyntaxError, ValueError, RecursionError) as error:
-        context.leave("cell", f"a cell that is not Python is shown and not run: {error}")
+    if fault := _find_fault(text):
+        context.leave("cell", f"a cell that is not Python is shown and not run: {fault}")
         return ""
     if cell.shows_value is not False:
-        text = _print_last_value(cell, text, tree, context)
+        text = _print_last_value(cell, text, ast.parse(text), context)
     return text.strip()
 
 

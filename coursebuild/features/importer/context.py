@@ -90,6 +90,11 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     callouts: dict[str, str] = field(default_factory=dict)
     """Labels of kinds of callouts that coursebuild does not have, by kind."""
 
+    prints: dict[int, list[str]] = field(default_factory=dict)
+    """The lines of the lesson's script that print values for its text, by the number of parts."""
+    values: dict[str, tuple[int, str]] = field(default_factory=dict)
+    """The names that these values are printed with; each with its place, and what it is."""
+
     def at(self, place: str) -> LessonContext:
         """Return the context of a place in the lesson."""
         return replace(self, place=place)
@@ -102,6 +107,25 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     def leave(self, kind: str, message: str) -> None:
         """Note that something has no counterpart, why, and what to do."""
         self.files.leave(self.path, message, kind, self.place)
+
+    def print_value(self, language: str, code: str) -> str:
+        """Let the cells above print a value that the text shows, and return its name; or nothing.
+
+        The name is of words: by these a number of the text finds what was printed.
+        """
+        lines, place = self.prints.setdefault(len(self.parts), []), len(self.parts)
+        if language != "python":
+            lines = self.joined[language].lines if language in self.joined else []
+            place = len(lines)
+        if not place:
+            return ""
+        words = re.sub(r"\bf(?=[\"'])|:[^{}:]*(?=\})", "", code)
+        words = name = " ".join(re.findall(r"[^\W\d]\w*", words)) or "value"
+        while self.values.setdefault(name, (place, code)) != (place, code):
+            name = f"{words} {len(self.values)}"
+        if (line := PRINTS[language].format(name, code)) not in lines:
+            lines.append(line)
+        return name
 
     def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
         """Return what a part of the text becomes, which the account notes."""
@@ -229,6 +253,12 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         return posixpath.relpath(path, self.folder).replace(" ", "%20")
 
 
+PRINTS = {
+    "python": 'print("{}:", {})  # for the text',
+    "r": 'cat("{}:", format({}), "\\n")  # for the text',
+    "julia": 'println("{}: ", {})  # for the text',
+}
+"""What prints a value with a name, by the languages of cells."""
 PROOF_LABELS = {
     "thm": "theorem",
     "lem": "lemma",

@@ -24,6 +24,7 @@ from coursebuild.features.importer.absent_labs import lab_files
 from coursebuild.features.importer.account import Account
 from coursebuild.features.importer.anchors import find_anchors
 from coursebuild.features.importer.blocks import convert_segment
+from coursebuild.features.importer.cells import print_values
 from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.context import LessonContext, script_path_of, to_anchor
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
@@ -393,6 +394,8 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
         parts=[],
         scripts=[],
         joined={},
+        prints={},
+        values={},
         single_languages=languages_of_single_cells(text.segments),
         figures=[],
         notes=[],
@@ -400,6 +403,7 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     parts = [convert_segment(segment, context) for segment in text.segments]
     parts += write_joined_cells(context)
     new = "\n\n".join(part.strip("\n") for part in parts if part.strip()) + "\n"
+    new = print_values(new, context)
     if context.figures:  # the first part has the keys of the script
         head = f"python file={context.script_path}"
         new = new.replace(head, f"{head} figure={','.join(context.figures)}", 1)

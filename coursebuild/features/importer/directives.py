@@ -17,6 +17,7 @@ from coursebuild.features.importer.context import NUMBERED, LessonContext, label
 from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import rewrite_prose
+from coursebuild.features.importer.roles import write_link
 from coursebuild.features.importer.source_files import TOO_MUCH, read_yaml
 
 
@@ -205,6 +206,11 @@ def _write_figure(directive: Directive, context: LessonContext) -> str:
     if not picture.startswith("!["):  # it is on another host, or nowhere
         anchor = f'<a id="fig-{to_anchor(directive.label)}"></a>\n\n' if label else ""
         return anchor + (caption if picture == first else f"{picture}\n\n{caption}")
+    target = directive.options.get("target", "")
+    if target and label:
+        context.leave("figure", f"the link of a figure to `{target}`, which has a number here")
+    elif target:
+        picture = write_link(picture, context.resolve_link(target))
     if not first.strip() and not label:
         return picture
     return f"Figure: {picture} {first}{label}\n\n{rest}".strip()

@@ -158,15 +158,8 @@ def lines_of(text: str, options: Mapping[str, str]) -> str:
         at = next((n for n, line in enumerate(lines) if words and words in line), None)
         if at is None:
             continue
-        match option:
-            case "start-after":
-                lines = lines[at + 1 :]
-            case "start-at":
-                lines = lines[at:]
-            case "end-before":
-                lines = lines[:at]
-            case _:
-                lines = lines[: at + 1]
+        at += option in ("start-after", "end-at")
+        lines = lines[at:] if option.startswith("start") else lines[:at]
     if selection := options.get("lines", ""):
         numbers = list[int]()
         for part in selection.split(","):

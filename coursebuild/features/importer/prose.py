@@ -21,6 +21,7 @@ from coursebuild.features.importer.roles import (
     convert_substitution,
     convert_tag,
     convert_wiki_link,
+    tell_emoji,
     write_link,
 )
 from coursebuild.features.importer.source_files import title_of_file
@@ -71,12 +72,13 @@ _LINE = re.compile(
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:)"
-    r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>[a-z][a-z0-9-]*(?:\+[a-z0-9-]+)*)\+\+(?![\w+]))"
+    r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
+    r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     r"|(?P<tag><(?i:a|img|source|video)[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
     r"|(?P<markdown>(?P<before><[a-z]\w*(?:[ ][^<>\n]*?)?)[ ]markdown(?:=[\"'\w]+)?(?=[ >]))"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
-    rf"|(?P<span>\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
+    rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
@@ -163,6 +165,8 @@ _KINDS = {
     "route": ("link", "its new address"),
     "tail": ("link", "its new address"),
     "icon": ("icon", "dropped: it is a picture of its tool"),
+    "emoji": ("emoji", ""),
+    "block": ("block of Obsidian", "an anchor"),
     "keys": ("keys", "their names"),
     "definition": ("link by reference", "its new address"),
     "tag": ("tag of HTML", "its new address"),
@@ -179,7 +183,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     def write_target(match: re.Match[str]) -> str:
         anchor = to_anchor(match["name"])
         if match["heading"] is None:
-            return f'<a id="{anchor}"></a>'
+            return f'{match["lead"]}<a id="{anchor}"></a>'
         return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
     account = context.files.account
@@ -240,7 +244,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
 
 
 _MARKDOWN_FIGURE = re.compile(
-    r"^<figure\b[^<>]*>\s*(?P<picture>!\[[^\]\n]*\]\([^()\n]*\))(?:\{[^{}\n]*\})?\s*"
+    r"^(?P<lead>[ \t]*)<figure[^<>]*>\s*(?P<picture>!\[[^\]\n]*\]\([^()\n]*\))(?:\{[^{}\n]*\})?\s*"
     r"(?:<figcaption\b[^<>]*>\s*(?P<caption>[^<>]*?)\s*</figcaption>\s*)?</figure>[ \t]*$",
     re.MULTILINE,
 )
@@ -251,7 +255,7 @@ def _write_captioned(match: re.Match[str]) -> str:
     """Return a picture with its caption, in as many lines."""
     caption = " ".join((match["caption"] or "").split())
     new = f"Figure: {match['picture']} {caption}" if caption else match["picture"]
-    return new + "\n" * match[0].count("\n")
+    return match["lead"] + new + "\n" * match[0].count("\n")
 
 
 def _write_comment(match: re.Match[str]) -> str:
@@ -325,7 +329,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 context.leave("picture", message)
                 text, end = match.string, match.end()
                 is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
-                return (alt or source) if is_in_link else f"[{alt or source}]({source})"
+                alt = alt or source.partition("?")[0].rpartition("/")[2] or source
+                return alt if is_in_link else f"[{alt}]({source})"
             dressing, hover = match["dressing"] or "", match["hover"] or ""
             hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             label = dressing if dressing.startswith("{#fig-") else ""
@@ -415,8 +420,13 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
+        case "emoji":
+            return tell_emoji(whole, context)
+        case "block" if (context.files.folder / ".obsidian").is_dir():
+            return f'<a id="{to_anchor(match["id"])}"></a>'
         case "keys":
-            return "+".join(key.capitalize() for key in match["stroke"].split("+"))
+            keys = re.findall(r"[^+\"]+", match["stroke"])
+            return "+".join(key.capitalize() if key.islower() else key for key in keys)
         case "route":
             return context.resolve_link(whole) or whole
         case "tail":

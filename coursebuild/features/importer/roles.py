@@ -54,17 +54,19 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             message = f"`{body}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave(f"role `{{{name}}}`", message)
             return f"`{body}`"
+        case "glue:text" | "eval":
+            whole = f"`{body}`"
+            value = context.print_value("python", body) if name == "eval" else body
+            return _ask_value(f"role `{{{name}}}`", value, body, whole, context)
         case "pep" | "rfc":
             return words or f"{name.upper()} {body}"
         case "index":
             return words or ("" if ":" in body or "!" in body else body)
-        case "download":
+        case "download" | "button":
             return write_link(words or target, context.resolve_link(target))
         case "kbd" | "sub" | "sup" | "u" | "underline" | "del" | "strike":
             tag = {"underline": "u", "strike": "del"}.get(name, name)
             return f"<{tag}>{body}</{tag}>"
-        case "button":
-            return write_link(words or target, context.resolve_link(target))
         case _ if name.rpartition(":")[2] in _CODE_ROLES:
             return f"`{words or target}`"
         case _ if name in _WORD_ROLES:
@@ -80,8 +82,8 @@ _CODE_ROLES = frozenset(
     "attribute data const exc exception obj object type".split()
 )
 _WORD_ROLES = frozenset("abbr chem dfn guilabel menuselection raw sc smallcaps span term".split())
-_INLINE_RUN = re.compile(r"`(?:\{(?:python|r|julia)\}|r)[ ]+([^`]+)`")
-_LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)\w+[ ]+")
+_INLINE_RUN = re.compile(r"`(?:\{(python|r|julia)\}|r)[ ]+([^`]+)`")
+_LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)[\w-]+[ ]+")
 """The language of code in a line, as MkDocs marks it."""
 
 
@@ -95,10 +97,15 @@ def convert_code(whole: str, context: LessonContext) -> str:
     run = _INLINE_RUN.fullmatch(whole)
     if run is None:
         return _LANGUAGE.sub(r"\1", whole)
-    cure = "print it in a script, and bind the number by `{out}`"
-    message = f"{whole}, whose value its tool shows: {cure}"
-    context.leave("code in a line", message)
-    return f"`{run[1]}`"
+    name = context.print_value(run[1] or "r", run[2])
+    return _ask_value("code in a line", name, run[2], whole, context)
+
+
+def _ask_value(kind: str, name: str, code: str, whole: str, context: LessonContext) -> str:
+    """Return the place of a value that its tool shows, which a script prints with this name."""
+    cure = "`--prove` writes what its script prints" if name else "print it in a script, bind it"
+    context.leave(kind, f"{whole}, whose value its tool shows: {cure}")
+    return f"`{name} = ?`" if name else f"`{code}`"
 
 
 def convert_cross_reference(whole: str, kind: str, label: str, context: LessonContext) -> str:
@@ -144,6 +151,13 @@ def convert_substitution(whole: str, context: LessonContext) -> str:
     message = f"`{whole}`, which its tool replaces; it is code now: write what it stands for"
     context.leave("substitution", message)
     return f"`{whole}`"
+
+
+def tell_emoji(name: str, context: LessonContext) -> str:
+    """Return the name of a sign between colons as it is, and note it where its tool draws signs."""
+    if "mkdocs.yml" in context.files or "docusaurus.config.js" in context.files:
+        context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
+    return name
 
 
 def convert_wiki_link(whole: str, page: str, part: str, words: str, context: LessonContext) -> str:

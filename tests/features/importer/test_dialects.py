@@ -242,3 +242,50 @@ def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
     cells = [{"cell_type": "code", "source": source, "outputs": []} for source in sources]
     notebook = json.dumps({"cells": cells, "metadata": {}, "nbformat": 4})
     assert "__future__" not in lesson(tmp_path, "a.ipynb", notebook)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("`{a:b}` in code,\n`c`", "`{a:b}` in code,\n`c`"),
+        ("[a][b]{ .button } [c]{.x}\n\n[b]: https://a.org", "[a][b] c\n\n[b]: https://a.org"),
+        ('++"Go: To"+ctrl++', "Go: To+Ctrl"),
+        ("[![](https://a.org/b.svg?c)](https://a.org)", "[b.svg](https://a.org)"),
+        ("Fig.~3 :smile: `#!a-b c`", "Fig.~3 :smile: `c`"),
+        ("- (at)=\n  A.\n\n[b](#at)", '- <a id="at"></a>\n  A.\n\n[b](#at)'),
+        ("A. ^b-1\n\n[[#^b-1|c]]", 'A. <a id="b-1"></a>\n\n[c](#b-1)'),
+        (
+            "1. A\n\n   <figure markdown>\n     ![B](p.png)\n   </figure>",
+            "1. A\n\n   ![B](../files/p.png)",
+        ),
+        (
+            "```{image} p.png\n:alt: A\n:target: https://a.org\n```",
+            "[![A](../files/p.png)](https://a.org)",
+        ),
+        (
+            "```{code-cell}\n# | code-fold: true\ntry:\n    import os\nexcept ImportError:\n"
+            "    !pip install os\n```",
+            "```python file=examples/l1_1_a.py folded\ntry:\n    import os\nexcept ImportError:\n"
+            "    pass\n```",
+        ),
+        (
+            '```{code-cell}\nprint("%d"\n      % 3)\n```',
+            '```python file=examples/l1_1_a.py\nprint("%d"\n      % 3)\n```',
+        ),
+    ],
+)
+def test_what_stands_in_a_line_or_a_block(tmp_path: Path, text: str, expected: str) -> None:
+    (tmp_path / "old/.obsidian").mkdir(parents=True)
+    files = {"p.png": "\x89PNG", "mkdocs.yml": "site_name: A"}
+    new = lesson(tmp_path, "a.md", f"\nOne\n===\n\n{text}\n", **files)
+    assert new == f"{expected}\n"
+
+
+def test_links_and_signs_that_cannot_stay_are_told(tmp_path: Path) -> None:
+    figure = "```{figure} p.png\n:name: fig-a\n:target: https://a.org\nB\n```"
+    course = convert_files(
+        tmp_path, {"a.md": f"# One\n\n:smile:\n\n{figure}\n", "p.png": "", "mkdocs.yml": "{}"}
+    )
+    left = account_of(course).partition("## Left")[2]
+    assert "- `:smile:`, shown as written: write the sign, if its tool draws one\n" in left
+    assert "- the link of a figure to `https://a.org`, which has a number here\n" in left

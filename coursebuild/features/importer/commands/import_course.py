@@ -20,7 +20,6 @@ from coursebuild.api import (
     print_report,
 )
 from coursebuild.core.files.write import undo_changes
-from coursebuild.core.model.results import TrialLine
 from coursebuild.features.importer.commands.findings import Rank
 from coursebuild.features.importer.commands.proof import keep_notebook_outputs, prove
 from coursebuild.features.importer.convert import convert, write_course
@@ -33,7 +32,6 @@ from coursebuild.pipeline.outputs import unasked_lines
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.scripts import extract_scripts
 from coursebuild.pipeline.verify import compile_models
-from coursebuild.report import ScriptLine
 from coursebuild.report.values import plural
 
 EXAMPLES = """\
@@ -140,15 +138,14 @@ def _examine(options: Options, remarks: tuple[str, ...]) -> Report:
     began = time.monotonic()
     with Reader(options) as reader:
         parsed_course = load(options.root, reader, code="refuse")
-    scripts: tuple[ScriptLine, ...] = ()
-    labs: tuple[TrialLine, ...] = ()
     course, diagnostics = parsed_course.value, [*parsed_course.diagnostics]
-    if course is not None:
-        extracted = extract_scripts(course, options)
-        diagnostics += [*extracted.diagnostics, *compile_models(course, options)[1]]
-        reason = "import runs nothing before --prove"
-        scripts, labs = unasked_lines(course, extracted.extractions, None, reason)
-        if scripts:
-            proof = f"run `coursebuild -C {options.root.name} import --prove`"
-            remarks += (f"{plural(len(scripts), 'script')} not run: {proof}",)
+    if course is None:
+        return judge(course, diagnostics, began, remarks=remarks)
+    extracted = extract_scripts(course, options)
+    diagnostics += [*extracted.diagnostics, *compile_models(course, options)[1]]
+    reason = "import runs nothing before --prove"
+    scripts, labs = unasked_lines(course, extracted.extractions, None, reason)
+    if scripts:
+        proof = f"run `coursebuild -C {options.root.name} import --prove`"
+        remarks += (f"{plural(len(scripts), 'script')} not run: {proof}",)
     return judge(course, diagnostics, began, scripts=scripts, labs=labs, remarks=remarks)

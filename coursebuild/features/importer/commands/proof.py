@@ -36,6 +36,7 @@ from coursebuild.api import (
     marks,
     model,
 )
+from coursebuild.core.files.examples import write_examples
 from coursebuild.core.model.results import Change, EffectKind, Sign
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body
@@ -43,6 +44,11 @@ from coursebuild.core.scripts.extract import Extraction, jobs
 from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.chain import Chain, name_package
 from coursebuild.features.importer.commands.findings import Findings, Rank
+from coursebuild.features.importer.commands.joined_cells import (
+    end_before_failure,
+    find_cells,
+    mark_cells,
+)
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.recordings import record_runs, write_figures
 from coursebuild.pipeline.scripts import extract_scripts, recorded_outputs
@@ -73,6 +79,15 @@ def prove(options: Options, most_seconds: float) -> Findings:
     for extraction in scripts:
         script, script_run = extraction.script, first_runs[extraction.path]
         keys = [*_missing_keys(script, script_run, most_seconds)]
+        if find_cells(script) and script_run.outcome in (Outcome.OK, Outcome.FAILED):
+            changed_paths.add(script.path)
+            if script_run.outcome is Outcome.FAILED:
+                edits[script.span.source] += end_before_failure(script, script_run)
+                message = f"{script.path} ends before the first cell that cannot run"
+                findings.add(Rank.FAILED, message)
+            else:
+                edits[script.span.source] += _add_keys(script, keys, findings)
+            continue
         cells, cell_edits = _show_failing_cells(script, script_run, course, keys, findings)
         if cell_edits:
             changed_paths.add(script.path)
@@ -85,9 +100,11 @@ def prove(options: Options, most_seconds: float) -> Findings:
         for module in cells.modules:
             findings.add(Rank.MISSING, f"{script.path}: {name_package(module, options)}")
         if cell_edits or script_run.outcome is Outcome.OK:
+            failing_parts = cells.failures if cell_edits else ()
             edits[script.span.source] += _record_outputs(
-                script, script_run, course, options, findings, cells.failures if cell_edits else ()
+                script, script_run, course, options, findings, failing_parts
             )
+            edits[script.span.source] += _write_values(script, script_run, failing_parts)
     findings.write(edits)
     _run_again(first_runs, changed_paths, options, findings)
     return findings
@@ -107,6 +124,8 @@ def _run_first(
         else replace(extraction, script=replace(extraction.script, timeout=_LONG_TIMEOUT))
         for extraction in scripts
     ]
+    patient = [mark_cells(extraction) for extraction in patient]
+    write_examples(options.root, {extraction.path: extraction.data for extraction in patient})
     runs = run_scripts(course, patient, options, known_runs=known_runs, keeps_going=True)
     return {run.path: run for run in runs}
 
@@ -170,6 +189,7 @@ def _run_again(
             end = min(cells.failures, default=None)
             later = range(end, len(cells.parts)) if end is not None else ()
             changes += _record_outputs(script, script_run, course, options, findings, later)
+            changes += _write_values(script, script_run, later)
     findings.write(edits)
     record_runs(again, runs, options)
     _draw(course, runs, options, findings)
@@ -289,6 +309,27 @@ def _record_outputs(
             below = textwrap.indent(f"\n\n{text}", block.prefix, lambda line: True)
             yield Edit(Span(block.span.source, end, end), below.removeprefix(block.prefix))
             keep_notebook_outputs([(script.path, printed)], options.store)
+
+
+_VALUE_PLACE = re.compile(r"`(?P<name>[^`:\n]+)(?::(?P<format>[^`\n]+))? = \?`")
+"""Where a text shows a value that its tool computed, as the first pass has left it."""
+
+
+def _write_values(
+    script: model.Script, script_run: ScriptRun, failing_parts: Container[int]
+) -> Iterator[Edit]:
+    """Yield the edits that write a value which a script printed where its text asks for it."""
+    source, parts = script.span.source, range(len(script.parts or (script,)))
+    printed = "".join(script_run.output_of(part) for part in parts if part not in failing_parts)
+    for place in _VALUE_PLACE.finditer(source.text):
+        line = re.search(rf"^{re.escape(place['name'])}:[ ]*([^`\n]*\S)", printed, re.MULTILINE)
+        if line is not None:
+            value, words = line[1], ""
+            if _NUMBER.fullmatch(value):
+                value, words = format(float(value), place["format"] or ""), f' "{place["name"]}"'
+                value = value if place["format"] else line[1]
+            new = f"`{value}`{{out={script.path}{words}}}"
+            yield Edit(Span(source, *place.span()), new)
 
 
 def _describe_changes(changes: Sequence[Change]) -> str:
