@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import atexit
 import hashlib
-import re
-import runpy
 import shutil
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -17,14 +13,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
-import mujoco
 
 from mjbench import bench, diet, text
 from mjbench.bench import CannotMeasureError, Subject
 from mjbench.cases import measure_case
 from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measure_engines
 from mjbench.host import LocalHost
-from mjbench.loop import LoopError, program_output, read_loop
+from mjbench.loop import LoopError, read_loop
 from mjbench.machine import one_processor, package_version, this_machine
 from mjbench.parts import Parts
 from mjbench.problems import all_problems
@@ -47,6 +42,7 @@ from mjbench.reports.records import (
 from mjbench.reports.scene_report import ScenarioReport
 from mjbench.reports.terminal import Style
 from mjbench.schemas import schema_text
+from mjbench.subjects import UsageError, read_subject
 from mjbench.work_precision import StoppedError
 
 _COMMANDS = ("bench", "stability", "diet", "show", "schema", "jobs")
@@ -57,10 +53,6 @@ timestep, and what a model could do without. `mjbench MODEL.xml` is `mjbench ben
 _T = TypeVar("_T")
 _STOPPED = 130
 """The exit status of a command that the user stopped."""
-
-
-class _UsageError(Exception):
-    """The command cannot be done as it is given."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -78,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         place = f"{error.filename}: " if error.filename else ""
         print(f"mjbench: error: {place}{error.strerror}", file=sys.stderr)
         return 2
-    except (_UsageError, LoopError, UnknownEngineError) as error:
+    except (UsageError, LoopError, UnknownEngineError) as error:
         print(f"mjbench: error: {error}", file=sys.stderr)
         return 2
     except CannotMeasureError as error:
@@ -153,82 +145,6 @@ def _add_report_options(command: argparse.ArgumentParser, *, check: bool = True)
         command.add_argument("--check", type=Path, metavar="FILE", help=help)
 
 
-def read_subject(file: Path) -> Subject:
-    """A model file, with the declarations and the exact motion that lie beside it."""
-    if not file.is_file():
-        raise _UsageError(f"there is no file {file}")
-    if file.suffix == ".py":
-        return _subject_of_python(file)
-    folder, data = file.parent.resolve(), file.read_bytes()
-    declarations, exact = file.with_suffix(".toml"), file.with_suffix(".exact.py")
-    digest, parts = hashlib.sha256(data), 0
-    for file_beside in (declarations, exact):
-        if file_beside.is_file():
-            digest.update(file_beside.read_bytes())
-    for part in _dependencies(folder / file.name) if file.suffix == ".xml" else ():
-        if part.exists() and not part.samefile(file):
-            digest.update(part.read_bytes())
-            parts += part.stat().st_size
-    return Subject(
-        folder=str(folder),
-        path=file.name,
-        mjcf="" if file.suffix == ".mjb" else _source(file, data),
-        name=file.stem,
-        digest=digest.hexdigest(),
-        declarations_path=declarations.name if declarations.is_file() else "",
-        declarations=declarations.read_text("utf-8") if declarations.is_file() else "",
-        exact=exact.name if exact.is_file() else "",
-        parts=parts,
-        fair=True,
-    )
-
-
-def _source(file: Path, data: bytes) -> str:
-    """The text of a model; in URDF, packages are the folders of their names beside it or above."""
-
-    def folder(match: re.Match[str]) -> str:
-        for parent in file.resolve().parents:
-            if (parent / match[1]).is_dir():
-                return f"{parent.as_posix()}/{match[1]}/"
-        message = f"{file} takes files from the package `{match[1]}`, and no folder of that name"
-        raise _UsageError(f"{message} lies beside it or above it: put the package there")
-
-    text = data.decode("utf-8", "surrogatepass")
-    return re.sub(r"package://([^/\s\"'<>]+)/", folder, text) if file.suffix == ".urdf" else text
-
-
-def _dependencies(file: Path) -> list[Path]:
-    """The files that a MJCF pulls in; none where it cannot be read, which compiling it tells."""
-    try:
-        return [Path(path) for path in mujoco.mju_getXMLDependencies(str(file))]
-    except mujoco.FatalError:
-        return []
-
-
-def _subject_of_python(file: Path) -> Subject:
-    """The model that a program makes: its `spec` or `model`, or what a function so called gives."""
-    try:
-        with program_output():
-            names = runpy.run_path(str(file))
-            product = names.get("spec", names.get("model"))
-            product = product() if callable(product) else product
-        if isinstance(product, mujoco.MjSpec):
-            product = product.compile()
-    except (Exception, SystemExit) as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise _UsageError(f"{file} fails: {reason}") from error
-    if not isinstance(product, mujoco.MjModel):
-        raise _UsageError(f"{file} defines no `spec` or `model` of MuJoCo's")
-    folder = tempfile.TemporaryDirectory(prefix="mjbench-")
-    atexit.register(folder.cleanup)
-    binary = Path(folder.name, f"{file.stem}.mjb")
-    mujoco.mj_saveModel(product, str(binary))
-    table = file.with_suffix(".toml")
-    if table.is_file():
-        binary.with_suffix(".toml").write_bytes(table.read_bytes())
-    return read_subject(binary)
-
-
 def _host(subject: Subject) -> LocalHost:
     def tell(line: str) -> None:
         if sys.stderr.isatty():
@@ -241,22 +157,22 @@ def _bench(arguments: argparse.Namespace) -> int:
     subject = read_subject(arguments.model)
     host, quick = _host(subject), arguments.quick
     if quick and (arguments.record or arguments.check):
-        raise _UsageError("--quick measures only a part, which is not recorded or compared")
+        raise UsageError("--quick measures only a part, which is not recorded or compared")
     loop, options = None, (arguments.period, arguments.delay, arguments.noise)
     if arguments.control is not None:
         loop = read_loop(arguments.control, options[0], options[1] or 0.0, options[2] or 0.0)
         code = f"{subject.digest} {options}".encode() + arguments.control.read_bytes()
         subject = msgspec.structs.replace(subject, digest=hashlib.sha256(code).hexdigest())
     elif options != (None, None, None):
-        raise _UsageError("--period, --delay and --noise are of a controller: --control FILE")
+        raise UsageError("--period, --delay and --noise are of a controller: --control FILE")
     if arguments.profile and arguments.check:
-        raise _UsageError("--check compares no times, and --profile is of nothing else")
+        raise UsageError("--check compares no times, and --profile is of nothing else")
     if arguments.engines is not None:
         if loop or arguments.task or arguments.profile:
             message = "other engines are measured without controller, task and profile"
-            raise _UsageError(message)
+            raise UsageError(message)
         if arguments.check:
-            raise _UsageError("32 bits do not repeat from one device to the next: no --check")
+            raise UsageError("32 bits do not repeat from one device to the next: no --check")
         names = [name.strip() for name in arguments.engines.split(",") if name.strip()]
         engines, remarks = chosen_engines(names)
         report = measure_engines(subject, engines, host, quick=quick)
@@ -338,7 +254,7 @@ def _show(arguments: argparse.Namespace) -> int:
         sys.stdout.write(text.report_text(report, _style()))
         return 0
     if not isinstance(report, SceneReport):
-        raise _UsageError(f"{arguments.report} is no report on a model in scenarios: no page")
+        raise UsageError(f"{arguments.report} is no report on a model in scenarios: no page")
     arguments.html.write_text(scene_page(report), "utf-8")
     return 0
 
@@ -348,7 +264,7 @@ def _read(file: Path, decode: Callable[[bytes], _T]) -> _T:
     try:
         return decode(file.read_bytes())
     except RecordError as error:
-        raise _UsageError(f"{file} {error}") from None
+        raise UsageError(f"{file} {error}") from None
 
 
 def _stability(arguments: argparse.Namespace) -> int:
@@ -357,7 +273,7 @@ def _stability(arguments: argparse.Namespace) -> int:
     for name in arguments.problems:
         matches = {n: p for n, p in problems.items() if n == name or n.startswith(f"{name}-")}
         if not matches:
-            raise _UsageError(f"no hard case is called `{name}`: {', '.join(problems)}")
+            raise UsageError(f"no hard case is called `{name}`: {', '.join(problems)}")
         cases |= matches
     recorded = None
     if arguments.check is not None:
@@ -382,7 +298,7 @@ def _stability(arguments: argparse.Namespace) -> int:
 
 def _diet(arguments: argparse.Namespace) -> int:
     if arguments.quick and arguments.record:
-        raise _UsageError("--quick looks only at a part, which is not recorded")
+        raise UsageError("--quick looks only at a part, which is not recorded")
     readers = [
         diet.ReaderSource(file.name, file.read_text("utf-8", "replace")) for file in arguments.code
     ]
@@ -390,7 +306,7 @@ def _diet(arguments: argparse.Namespace) -> int:
     while True:
         subject = read_subject(arguments.model)
         if subject.is_binary:
-            raise _UsageError("the diet edits the source of a model, and this one has none")
+            raise UsageError("the diet edits the source of a model, and this one has none")
         keeps = tuple(_keeps(subject))
         result = diet.look_at(
             subject,

@@ -424,45 +424,27 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
     reference = find_reference(model, pilot, quick=quick)
     if not pilot.contact:
         return {"": Cone(reference, None, 0.0)}
-    motions = {"": reference}
+    limits = {}
     for cone, number in CONES.items():
-        motions[cone] = reference
+        limits[cone] = reference
         if reference.kind != "self" or model.opt.cone != number:
             variant = with_integrator(model, Integrator.EULER, scene.timestep)
             variant.opt.cone = number
-            motions[cone] = self_reference(variant, pilot, quick=quick)
-    count = min(len(motion.states.times) for motion in motions.values())
-    limits = {cone: _until(model, motion, count) for cone, motion in motions.items()}
-    reference, cones = limits.pop(""), {}
-    is_closed = reference.kind == "closed"
-    truth = reference if is_closed else limits["elliptic"]
+            limits[cone] = self_reference(variant, pilot, quick=quick)
+    cones = {}
     for cone, limit in limits.items():
+        truth = reference if reference.kind == "closed" else limits["elliptic"]
         sticks = find_sticks(model, scene, limit.states)
         is_held = friction_holds(model, scene, limit.states, sticks)
-        if limit is truth:
+        if cone == "elliptic" and truth is limit:
             cones[cone] = Cone(limit, None, 0.0, sticks, is_held)
             continue
-        gap = _gap(model, limit.states, truth.states).place
+        count = min(len(limit.states.times), len(truth.states.times))
+        limit_states, true_states = limit.states.head(count), truth.states.head(count)
+        gap = _gap(model, limit_states, true_states).place
         least = FLOORS * max(limit.floor.place, truth.floor.place)
-        visible = 0.0
-        if not is_closed and gap > least:
-            visible = visible_error(model, scene, limit.states, truth.states)
-        known = reference if is_closed else limit
-        cones[cone] = Cone(known, max(gap, least), visible, sticks, is_held)
+        is_apart = truth is not reference and gap > least
+        visible = visible_error(model, scene, limit_states, true_states) if is_apart else 0.0
+        motion = reference if truth is reference else limit
+        cones[cone] = Cone(motion, max(gap, least), visible, sticks, is_held)
     return cones
-
-
-def _until(model: Any, motion: KnownMotion, count: int) -> KnownMotion:
-    """So many samples of a motion: errors of settings are compared over the same time."""
-    if count == len(motion.states.times):
-        return motion
-    states, second_states = motion.states.head(count), motion.second_states.head(count)
-    gap = _gap(model, states, second_states)
-    return replace(
-        motion,
-        states=states,
-        second_states=second_states,
-        floor=gap.at_least(ROUNDING) if motion.kind == "self" else motion.floor,
-        agreement=gap.largest,
-        horizon=float(states.times[-1]),
-    )

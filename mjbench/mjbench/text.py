@@ -5,7 +5,7 @@ The JSON has all of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from mjbench.machine import Machine
 from mjbench.reports import Interval
@@ -176,12 +176,6 @@ def _again(row: StableRow) -> str:
 
 def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
     rows = report.rows
-    statuses = [
-        ""
-        if row.status == "ok"
-        else "; ".join(filter(None, (status_text(row.status), *row.reasons)))
-        for row in rows
-    ]
     columns = [
         ("", [">" if row.own else "" for row in rows]),
         ("parameter", [row.parameter for row in rows]),
@@ -193,7 +187,7 @@ def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
     columns += [
         ("cost", [_interval(row.cost) for row in rows]),
         ("× real time", [_interval(row.throughput) for row in rows]),
-        ("status", statuses),
+        ("status", [_lost(row.status, row.reasons) for row in rows]),
     ]
     yield from fitted_table(columns, style.width - 4)
 
@@ -224,6 +218,10 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
 def _cost(cost: BatchCost) -> str:
     time = cost.seconds
     return f"{cost.worlds}: {cost.remark if time is None else seconds_text(time.value, 3)}"
+
+
+def _lost(status: str, reasons: Iterable[str]) -> str:
+    return "" if status == "ok" else "; ".join(filter(None, (status_text(status), *reasons)))
 
 
 def case_text(report: CaseReport, style: Style = _PLAIN) -> str:

@@ -292,18 +292,15 @@ def _nearby_ratios(
         nudged_scenario = replace(scenario, **start)
         setup = replace(pilot.setup, scenario=nudged_scenario)
         near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
-        motions = {}
+        cones = {}
         for name in {basis.baseline.cone, rival.cone}:
             base = with_setting(model, replace(basis.baseline, cone=name))
-            reference = basis.cones[name].reference
-            exact = known_motion.find_nearby(base, near, reference, quick=quick)
+            cone = basis.cones[name]
+            exact = known_motion.find_nearby(base, near, cone.reference, quick=quick)
             if exact is None:
                 return None
-            motions[name] = exact
-        count, cones = min(len(exact.times) for exact in motions.values()), {}
-        for name, exact in motions.items():
-            reference = replace(basis.cones[name].reference, states=exact.head(count))
-            cones[name] = replace(basis.cones[name], reference=reference, sticks=None)
+            reference = replace(cone.reference, states=exact)
+            cones[name] = replace(cone, reference=reference, sticks=None)
         near_basis, pair = replace(basis, pilot=near, cones=cones), []
         for setting in (basis.baseline, rival):
             row, _ = measure_setting(near_basis, setting)

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from mjbench.cli import read_subject
 from mjbench.engines.engine_run import (
     ChosenEngine,
     UnknownEngineError,
@@ -17,6 +16,7 @@ from mjbench.engines.engine_run import (
 )
 from mjbench.host import LocalHost
 from mjbench.reports.engine_report import EngineRow
+from mjbench.subjects import read_subject
 from samples.fake_engines import ENGINES as FAKE_ENGINES
 
 FAKES = ("samples.fake_engines",)

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from mjbench.bench import CannotMeasureError, compile_subject, run_scenario
-from mjbench.cli import read_subject
 from mjbench.host import LocalHost
 from mjbench.reports.scene_report import ScenarioReport
+from mjbench.subjects import read_subject
 
 pytestmark = pytest.mark.long
 

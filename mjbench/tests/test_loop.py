@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mjbench.bench import CompiledModel, compile_subject
-from mjbench.cli import main, read_subject
+from mjbench.cli import main
 from mjbench.delays import loop_note
 from mjbench.host import LocalHost
 from mjbench.known_motion import find_references
@@ -21,6 +21,7 @@ from mjbench.pilot import run_pilot
 from mjbench.problem import Array, Integrator, Scenario, Setup
 from mjbench.simulation import simulate, with_integrator
 from mjbench.stability import stable_rows
+from mjbench.subjects import read_subject
 
 CART = """<mujoco>
   <option timestep="0.01" integrator="RK4" gravity="0 0 0"/>

@@ -85,8 +85,8 @@ def stiff(step: float, start: float, stiffness: float = 1e5) -> Any:
 
 def test_a_scene_that_blows_up_at_its_timesteps_is_measured_at_shorter_ones() -> None:
     """Without `autoreset="disable"` such a run ends where it began, with error 0."""
-    declared = parse_declared(f"{FROM_KEYFRAME}duration = 2\ntimesteps = [0.05]\n")
-    (scene,) = scenes(stiff(0.1, 0.01), declared, quick=True)
+    declarations = parse_declared(f"{FROM_KEYFRAME}duration = 2\ntimesteps = [0.05]\n")
+    (scene,) = scenes(stiff(0.1, 0.01), declarations, quick=True)
     report = measure_scenario(stiff(0.1, 0.01), scene, quick=True, clock=None)
     steps = {row.setting.timestep for row in report.rows}
     assert steps == {0.1, 0.05, 0.00625, 0.003125}, "0.05 s over 8 is the first below 2/ω = 6.3 ms"

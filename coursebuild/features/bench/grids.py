@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 from msgspec import Struct
 
 from coursebuild.core.model.results import Machine
-from coursebuild.core.pages.renderer import Strings
+from coursebuild.core.pages.renderer import NumberText, Strings
 
 _MINUS = "\u2212"
 _THIN = "\u2009"
@@ -127,11 +127,11 @@ def percent(value: float | None) -> Markup:
 
 def phrase(words: Strings, key: str, **values: str) -> Markup:
     """Put values into a text of the interface; no line end breaks the numbers among them."""
-    unbroken_values = {
-        name: unbroken(words.decimals(text)) if isinstance(text, Markup) else text
+    texts = {
+        name: unbroken(words.decimals(text)) if isinstance(text, Markup) else words.shown(text)
         for name, text in values.items()
     }
-    return Markup(escape(words(key)).format(**unbroken_values))
+    return Markup(escape(words(key)).format(**texts))
 
 
 def unbroken(number: str) -> Markup:
@@ -139,15 +139,15 @@ def unbroken(number: str) -> Markup:
     return Markup('<span class="whole">{}</span>').format(number)
 
 
-def factor(value: float | None, digits: int = 3) -> str:
+def factor(value: float | None, digits: int = 3) -> NumberText:
     """Write in so many digits how many times as fast, or as slow, something is."""
     if value is None:
-        return ""
+        return NumberText()
     value = float(f"{value:.{digits}g}")
-    return whole_number(value) if value >= 100 else f"{value:g}"
+    return NumberText(grouped(value) if value >= 100 else f"{value:g}")
 
 
-def whole_number(value: float) -> str:
+def grouped(value: float) -> str:
     """Write a whole number in groups of three digits, as it is understood in every language."""
     return f"{value:,.0f}".replace(",", _THIN)
 
@@ -157,7 +157,7 @@ def size(count: int) -> str:
     amount, unit = count / 1e6, "MB"
     if count < 1e7:
         amount, unit = (count, "B") if count < 1e4 else (count / 1e3, "kB")
-    return f"{whole_number(amount)} {unit}"
+    return f"{grouped(amount)} {unit}"
 
 
 def machine_text(words: Strings, machine: Machine) -> str:

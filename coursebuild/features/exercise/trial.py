@@ -45,6 +45,7 @@ from coursebuild.features.exercise.model import (
     exercise_inputs,
 )
 from coursebuild.features.lab.compile import LabModule, compile_lab, trial_data
+from coursebuild.features.lab.course_models import files_of, find_model, save_model
 from coursebuild.features.lab.engines.native import (
     LAB_ENGINE,
     NativeEngine,
@@ -60,7 +61,7 @@ from coursebuild.features.lab.export.script import (
     kept_export,
 )
 from coursebuild.features.lab.model import Test, Writing
-from coursebuild.features.lab.trial import Engines, files_of, find_model, save_model
+from coursebuild.features.lab.trial import Engines
 from coursebuild.features.lab.verdict import play_text
 
 

@@ -70,3 +70,11 @@ def find_anchors(text: str) -> set[str]:
         kind, name = match["kind"].removeprefix("prf:"), to_anchor(match["name"])
         anchors = anchors - {name} | {f"{kind if kind in NUMBERED else 'lst'}:{name}"}
     return anchors
+
+
+def write_figure(match: re.Match[str]) -> str:
+    """Return a labelled picture in a paragraph of its own, as Quarto has it, with its caption."""
+    alt = match["alternative"] or match["alt"]
+    return (
+        f"Figure: ![{alt}]({match['source']}) {match['alt']} {{#fig:{to_anchor(match['label'])}}}"
+    )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import textwrap
 
-from coursebuild.features.importer.anchors import FIGURE, TARGET
+from coursebuild.features.importer.anchors import FIGURE, TARGET, write_figure
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.displays import WORDS, normalize_formulas
 from coursebuild.features.importer.pandoc_tables import rewrite_tables
@@ -240,7 +240,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         elif edge is not None and edge[1].startswith(mark):
             mark = "" if mark else edge[1]
         out.append(line)
-    return FIGURE.sub(_write_figure, "\n".join(out))
+    return FIGURE.sub(write_figure, "\n".join(out))
 
 
 _MARKDOWN_FIGURE = re.compile(
@@ -276,14 +276,6 @@ def _write_meanings(match: re.Match[str]) -> str:
     parts = (textwrap.dedent(f"    {part.lstrip()}").strip() for part in meanings)
     lines = (re.sub(r"^[ ]{2,4}", "", part, flags=re.MULTILINE) for part in parts)
     return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
-
-
-def _write_figure(match: re.Match[str]) -> str:
-    """Return a labelled picture in a paragraph of its own, as Quarto has it, with its caption."""
-    alt = match["alternative"] or match["alt"]
-    return (
-        f"Figure: ![{alt}]({match['source']}) {match['alt']} {{#fig:{to_anchor(match['label'])}}}"
-    )
 
 
 def _rewrite_line(line: str, context: LessonContext) -> str:

@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 from msgspec import Struct, to_builtins
 
-from coursebuild.api import Course, Inputs, Lesson, Page, Trial, find_blocks
+from coursebuild.api import Course, Inputs, Trial, find_blocks
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.script_environment import package_version
 from coursebuild.core.text.source import key_of
@@ -198,16 +198,6 @@ def lab_trials(course: Course) -> Iterator[Trial]:
             yield Trial(f"{owner.id}-lab-{number}", owner.id, lab)
     for model, lab in gallery_labs(course):
         yield Trial(f"model-{model.name.replace('/', '-')}", model.name, lab)
-
-
-def owner_of(course: Course, trial: Trial) -> Lesson | Page | None:
-    """Return the lesson or page of a trial."""
-    return next((owner for owner in course.owners if owner.id == trial.owner), None)
-
-
-def decimal_of(course: Course, trial: Trial) -> str:
-    """Return the sign before decimals on the page of a trial."""
-    return course.words_of(owner_of(course, trial)).decimal[0]
 
 
 def trial_inputs(trial: Trial) -> Inputs | None:

@@ -36,7 +36,7 @@ from coursebuild.core.model import Limits
 from coursebuild.core.model.results import TrialLine
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.run.child import LIMITS
-from coursebuild.core.run.mjcf import model_files, model_key
+from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.run.sandbox import Sandbox
 from coursebuild.core.text.source import key_of
 from coursebuild.core.values import fingerprint
@@ -44,12 +44,12 @@ from coursebuild.features.lab import verdict
 from coursebuild.features.lab.compile import (
     LabModule,
     compile_lab,
-    decimal_of,
     equation_inputs,
     inputs_of,
     pieces,
     trial_data,
 )
+from coursebuild.features.lab.course_models import files_of, find_model, save_model
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError, lab_digest
 from coursebuild.features.lab.equations.equation_trial import (
@@ -196,7 +196,7 @@ class LabTrials:
         if self._context.static and not reply.findings and reply.start is not None:
             from coursebuild.features.lab.picture.static import equation_record, plots_file
 
-            decimal = decimal_of(self._context.course, trial)
+            decimal = decimal_of(self._context, trial)
             record = equation_record(lab, output.config, reply.start, decimal)
             output = replace(output, record=record, picture=plots_file(record.plots))
         findings = [finding.diagnostic(lab) for finding in reply.findings]
@@ -235,30 +235,10 @@ def _in_english(key: str, values: dict[str, str]) -> str:
     return strings_for(template_texts(), "en")(key, **values) if key else ""
 
 
-def find_model(context: TrialContext, name: str) -> Source | None:
-    """A model of the course by its name, if there is one that compiles."""
-    compilation = context.models.get(name)
-    if compilation is None or not compilation.facts:
-        return None
-    return next((m.source for m in context.course.models if m.name == name), None)
-
-
-def save_model(context: TrialContext, native: NativeEngine, model: Source) -> bytes:
-    """The MJB file of a model, made now or before; a `NativeError` if it cannot be."""
-    store, key = context.run_store.store, model_key(context.root, model.path, model.text)
-    mjb = store.get("mjb", key, bytes)
-    if mjb is None:
-        mjb = native.save(model.path, model.text)
-        if model_key(context.root, model.path, model.text) == key:  # it was not edited meanwhile
-            store.put("mjb", key, mjb)
-    return mjb
-
-
-def files_of(root: Path, model: Source) -> dict[str, bytes]:
-    """A model and the files that it includes, by path."""
-    paths = model_files(root, model.path, model.text)
-    included = {path: read_bytes(root, path) for path in paths if (root / path).is_file()}
-    return {model.path: model.text.encode(), **included}
+def decimal_of(context: TrialContext, trial: Trial) -> str:
+    """The sign before decimals on the page of a trial."""
+    owner = next((o for o in context.course.owners if o.id == trial.owner), None)
+    return context.course.words_of(owner).decimal[0]
 
 
 class _Evaluation(Struct, frozen=True):
@@ -387,7 +367,7 @@ class _LabTrial(Struct, frozen=True):
             film = b""
             if main["film"]:
                 film = keep("films", picture_key, lambda: draw_film(self.lab, main))
-            record = lab_record(lab, main, decimal_of(self.context.course, self.trial))
+            record = lab_record(lab, main, decimal_of(self.context, self.trial))
             output = replace(output, record=record, picture=picture, film=film)
         return _Evaluation(reply, failures, remarks, output)
 

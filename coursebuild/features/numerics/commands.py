@@ -139,12 +139,10 @@ def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], t
     models = tuple(name for name in names if (options.root / f"models/{name}.xml").is_file())
     for scene in find_scenes(options.root, models).value if models else ():
         has_theory = any(
-            scenario.expected or scenario.limits or scenario.closed_form
-            for scenario in scene.declarations.scenarios
+            scenario.expected or scenario.closed_form for scenario in scene.declarations.scenarios
         )
         if not has_theory and not (options.root / exact_file(scene.name)).is_file():
-            help = f"give its motion in {exact_file(scene.name)}, "
-            help += "or `expected` or `limits` of a scenario"
+            help = f"give its motion in {exact_file(scene.name)}, or `expected` of a scenario"
             raise UsageError(f"no theory is known for `{scene.name}`", help=help)
     return models, tuple(name for name in names if name not in models)
 

@@ -25,7 +25,6 @@ from msgspec import Struct
 from coursebuild.api import Lesson, Store, Trial, TrialContext
 from coursebuild.core.text.source import unique_name
 from coursebuild.core.values import fingerprint
-from coursebuild.features.lab.compile import owner_of
 from coursebuild.features.lab.engines.native import (
     LAB_ENGINE,
     EngineDescription,
@@ -294,7 +293,7 @@ def export_metadata(
     context: TrialContext, trial: Trial, kind: str, name: str, seconds: float
 ) -> ExportMetadata:
     """Say where a script comes from, of a `kind` such as `a lab`."""
-    owner = owner_of(context.course, trial)
+    owner = next((o for o in context.course.owners if o.id == trial.owner), None)
     origin = f"{kind} of the page “{trial.owner if owner is None else owner.title}”"
     if isinstance(owner, Lesson):
         origin = f"{kind} of lesson {owner.id}, “{owner.title}”"
