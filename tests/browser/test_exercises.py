@@ -127,7 +127,7 @@ def test_trials_run_by_pytest_on_a_file_of_the_page(
     assert text.startswith("# /// script\n") and start in text
     path.write_text(text.replace(start, solution))
     assert pytest_of(path)[0] == 0
-    assert f"python {name}" in element.inner_text()
+    expect(element).to_contain_text(f"python {name}")
     command = [sys.executable, "-I", name]  # as `uv run` does
     process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert (process.returncode, "failed:" in process.stdout) == (0, False), process.stdout

@@ -72,8 +72,8 @@ class Strings(Struct, frozen=True):
             text = self.texts.get(f"{key}.{form}", self.texts.get(f"{key}.other"))
         if text is None:
             raise KeyError(f"no interface text {key!r}")
-        shown = {name: self.shown(value) for name, value in values.items()}
-        text = text.format_map(shown) if values else text
+        texts = {name: self.value_text(value) for name, value in values.items()}
+        text = text.format_map(texts) if values else text
         if not values or direction(self.language) == "ltr":
             return text
         return "".join(
@@ -100,7 +100,7 @@ class Strings(Struct, frozen=True):
         """A number, or markup of one, with the language's sign before its decimals."""
         return number.replace(".", self("words.decimal")[0])
 
-    def shown(self, value: str | float) -> str | int:
+    def value_text(self, value: str | float) -> str | int:
         """A value as it is inserted in a text."""
         if isinstance(value, NumberText):
             return self.decimals(value)

@@ -128,7 +128,7 @@ def percent(value: float | None) -> Markup:
 def phrase(words: Strings, key: str, **values: str) -> Markup:
     """Put values into a text of the interface; no line end breaks the numbers among them."""
     texts = {
-        name: unbroken(words.decimals(text)) if isinstance(text, Markup) else words.shown(text)
+        name: unbroken(words.decimals(text)) if isinstance(text, Markup) else words.value_text(text)
         for name, text in values.items()
     }
     return Markup(escape(words(key)).format(**texts))
@@ -144,10 +144,10 @@ def factor(value: float | None, digits: int = 3) -> NumberText:
     if value is None:
         return NumberText()
     value = float(f"{value:.{digits}g}")
-    return NumberText(grouped(value) if value >= 100 else f"{value:g}")
+    return NumberText(whole_number(value) if value >= 100 else f"{value:g}")
 
 
-def grouped(value: float) -> str:
+def whole_number(value: float) -> str:
     """Write a whole number in groups of three digits, as it is understood in every language."""
     return f"{value:,.0f}".replace(",", _THIN)
 
@@ -157,7 +157,7 @@ def size(count: int) -> str:
     amount, unit = count / 1e6, "MB"
     if count < 1e7:
         amount, unit = (count, "B") if count < 1e4 else (count / 1e3, "kB")
-    return f"{grouped(amount)} {unit}"
+    return f"{whole_number(amount)} {unit}"
 
 
 def machine_text(words: Strings, machine: Machine) -> str:

@@ -159,8 +159,14 @@ def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [grids.factor(row.realtime) for row in rows]),
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
-        (evaluations, [grids.grouped(row.evaluations) if row.evaluations else "" for row in rows]),
-        (iterations, ["" if r.iterations is None else grids.grouped(r.iterations) for r in rows]),
+        (
+            evaluations,
+            [grids.whole_number(row.evaluations) if row.evaluations else "" for row in rows],
+        ),
+        (
+            iterations,
+            ["" if r.iterations is None else grids.whole_number(r.iterations) for r in rows],
+        ),
         (
             words("measured.parted", error=horizon_error_text(report.horizon_error)),
             ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
