@@ -101,7 +101,7 @@ class Checker:
         self.session.read()
         course = self._course
         self.verification = verification
-        self.session.take_results(course, verification)
+        self.session.take_results(course, verification, self.session.runs.addresses)
         report = judge(course, self.session.diagnostics())
         findings = report.diagnostics
         self.hints = Counter(map(_identity, report.hints))
