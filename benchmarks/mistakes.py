@@ -155,7 +155,7 @@ class Checker:
             self.session.open_texts = {}
             if self.session.edit([change.path], is_saved=False) is None:
                 self.session.read(is_saved=False)
-            self.session.take_results(self._course, self.verification)
+            self.session.take_results(self._course, self.verification, self.session.runs.addresses)
         return verdict_of_remarks or Outcome(change, "silent" if verdict == "other" else verdict)
 
     def _tell(self, change: Change) -> Outcome | None:
@@ -194,7 +194,7 @@ class Checker:
         if is_alone:
             results = replace(self.verification.results, trials=verification.results.trials)
             verification = replace(verification, results=results)
-        session.take_results(course, verification)
+        session.take_results(course, verification, session.runs.addresses)
         return self._new(course, session.diagnostics())
 
     def _new(self, course: Course | None, diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
