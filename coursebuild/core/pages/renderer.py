@@ -53,10 +53,6 @@ CATEGORIES: tuple[Category, ...] = ("zero", "one", "two", "few", "many", "other"
 """All categories; every language has the last."""
 
 
-class NumberText(str):
-    """A number as Python writes it, maybe with its unit; an interface text has its own sign."""
-
-
 class Strings(Struct, frozen=True):
     """The interface texts in one language."""
 
@@ -72,7 +68,7 @@ class Strings(Struct, frozen=True):
             text = self.texts.get(f"{key}.{form}", self.texts.get(f"{key}.other"))
         if text is None:
             raise KeyError(f"no interface text {key!r}")
-        texts = {name: self.value_text(value) for name, value in values.items()}
+        texts = {k: self.number(v) if isinstance(v, float) else v for k, v in values.items()}
         text = text.format_map(texts) if values else text
         if not values or direction(self.language) == "ltr":
             return text
@@ -99,12 +95,6 @@ class Strings(Struct, frozen=True):
     def decimals(self, number: str) -> str:
         """A number, or markup of one, with the language's sign before its decimals."""
         return number.replace(".", self("words.decimal")[0])
-
-    def value_text(self, value: str | float) -> str | int:
-        """A value as it is inserted in a text."""
-        if isinstance(value, NumberText):
-            return self.decimals(value)
-        return self.number(value) if isinstance(value, float) else value
 
     def has(self, key: str) -> bool:
         """Whether there is a text of this key."""

@@ -10,7 +10,7 @@ from markupsafe import Markup, escape
 from msgspec import Struct
 
 from coursebuild.core.model.results import Machine
-from coursebuild.core.pages.renderer import NumberText, Strings
+from coursebuild.core.pages.renderer import Strings
 
 _MINUS = "\u2212"
 _THIN = "\u2009"
@@ -128,7 +128,7 @@ def percent(value: float | None) -> Markup:
 def phrase(words: Strings, key: str, **values: str) -> Markup:
     """Put values into a text of the interface; no line end breaks the numbers among them."""
     texts = {
-        name: unbroken(words.decimals(text)) if isinstance(text, Markup) else words.value_text(text)
+        name: unbroken(words.decimals(text)) if isinstance(text, Markup) else text
         for name, text in values.items()
     }
     return Markup(escape(words(key)).format(**texts))
@@ -139,17 +139,17 @@ def unbroken(number: str) -> Markup:
     return Markup('<span class="whole">{}</span>').format(number)
 
 
-def factor(value: float | None, digits: int = 3) -> NumberText:
+def factor(value: float | None, digits: int = 3) -> str:
     """Write in so many digits how many times as fast, or as slow, something is."""
     if value is None:
-        return NumberText()
+        return ""
     value = float(f"{value:.{digits}g}")
-    return NumberText(whole_number(value) if value >= 100 else f"{value:g}")
+    return whole_number(value) if value >= 100 else f"{value:g}"
 
 
-def whole_number(value: float) -> str:
+def whole_number(value: float | None) -> str:
     """Write a whole number in groups of three digits, as it is understood in every language."""
-    return f"{value:,.0f}".replace(",", _THIN)
+    return "" if value is None else f"{value:,.0f}".replace(",", _THIN)
 
 
 def size(count: int) -> str:

@@ -255,7 +255,11 @@ def measurement_facts(library: Library, model: MjcfModel) -> tuple[tuple[str, st
     scene: SceneReport | None = library.reports.scenes.get(model.name)
 
     def speed(times: float | None) -> str:
-        return "" if times is None else words("measured.times", factor=grids.factor(times))
+        return (
+            ""
+            if times is None
+            else words("measured.times", factor=words.decimals(grids.factor(times)))
+        )
 
     native = browser = None
     if scene is not None and scene.scenarios:
@@ -297,7 +301,7 @@ def _finding(words: Strings, finding: Finding) -> FindingView:
     label += "; in what is left" if finding.in_rest else ""
     parts = []
     if saving.time is not None:
-        text = words("measured.saves_time", factor=grids.factor(saving.time))
+        text = words("measured.saves_time", factor=words.decimals(grids.factor(saving.time)))
         parts.append(text if saving.certain else words("measured.saves_none"))
     if saving.memory:
         parts.append(words("measured.saves_memory", size=grids.size(saving.memory)))

@@ -114,17 +114,21 @@ def scenario_view(
 
 
 def _describe(words: Strings, report: ScenarioReport) -> list[str]:
-    sentences: list[str] = [words("measured.duration", time=seconds_text(report.duration))]
+    sentences: list[str] = [
+        words("measured.duration", time=words.decimals(seconds_text(report.duration)))
+    ]
     if report.horizon < report.duration:
-        sentences.append(words("measured.horizon", time=seconds_text(report.horizon)))
+        sentences.append(
+            words("measured.horizon", time=words.decimals(seconds_text(report.horizon)))
+        )
         if report.lyapunov is not None and report.horizons is not None:
-            first, last = map(seconds_text, report.horizons)
+            texts = (*map(seconds_text, report.horizons), horizon_error_text(report.horizon_error))
+            first, last, error = map(words.decimals, texts)
             rate = grids.power(report.lyapunov)
-            error = horizon_error_text(report.horizon_error)
             values = {"first": first, "last": last, "rate": rate, "error": error}
             sentences.append(grids.phrase(words, "measured.chaotic", **values))
     if report.hold:
-        sentences.append(words("measured.hold", time=seconds_text(report.hold)))
+        sentences.append(words("measured.hold", time=words.decimals(seconds_text(report.hold))))
     parts = [] if report.own_setting is None else solving_parts(report.own_setting)
     if parts:
         sentences.append(words("measured.usual", setting=", ".join(parts)))
@@ -159,16 +163,12 @@ def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [grids.factor(row.realtime) for row in rows]),
         (time, ["" if r.seconds is None else seconds_text(r.seconds.value, 3) for r in rows]),
+        (evaluations, [grids.whole_number(row.evaluations or None) for row in rows]),
+        (iterations, [grids.whole_number(row.iterations) for row in rows]),
         (
-            evaluations,
-            [grids.whole_number(row.evaluations) if row.evaluations else "" for row in rows],
-        ),
-        (
-            iterations,
-            ["" if r.iterations is None else grids.whole_number(r.iterations) for r in rows],
-        ),
-        (
-            words("measured.parted", error=horizon_error_text(report.horizon_error)),
+            words(
+                "measured.parted", error=words.decimals(horizon_error_text(report.horizon_error))
+            ),
             ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
         ),
         *(error_column(quantity) for quantity in report.quantities if quantity.resolved),
@@ -266,7 +266,7 @@ def stable_title(words: Strings, rows: Sequence[StableRow]) -> str:
     time, energy = words.decimals(" – ".join(dict.fromkeys(times))), rows[0].energy
     if energy is None:
         return words("measured.stable", time=time)
-    return words("measured.stable_energy", time=time, energy=grids.factor(energy))
+    return words("measured.stable_energy", time=time, energy=words.decimals(grids.factor(energy)))
 
 
 def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
@@ -277,7 +277,7 @@ def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
     if row.gain is not None:
         step, energy = row.gain
         bound = "≤ " if step <= row.searched[0] else ""  # the shortest that was tried gains too
-        time = words.decimals(bound + seconds_text(step, 2))
+        time = bound + seconds_text(step, 2)
         gain = words("measured.gained", time=time, energy=grids.factor(energy, 2))
     return (
         _reach(words, row.largest, row) if isinstance(row.largest, str) else row.shown,
@@ -315,7 +315,8 @@ def stable_again(words: Strings, row: StableRow) -> str:
     """Say where larger timesteps are stable again; empty if none is."""
     if row.islands is None:
         return ""
-    first, last = (seconds_text(float(f"{step:.3g}")) for step in row.islands)
+    texts = (seconds_text(float(f"{step:.3g}")) for step in row.islands)
+    first, last = map(words.decimals, texts)
     if first == last:
         return words("measured.island", time=first)
     return words("measured.islands", first=first, last=last)
@@ -347,10 +348,12 @@ def engine_view(words: Strings, scenario: EngineScenario, report: EngineReport) 
     title = scenario.title or scenario.name
     description = [
         words("measured.usual", setting=setting_text(scenario.setting)),
-        words("measured.duration", time=seconds_text(scenario.duration)),
+        words("measured.duration", time=words.decimals(seconds_text(scenario.duration))),
     ]
     if scenario.horizon < scenario.duration:
-        description.append(words("measured.horizon", time=seconds_text(scenario.horizon)))
+        description.append(
+            words("measured.horizon", time=words.decimals(seconds_text(scenario.horizon)))
+        )
     key, floor = f"measured.reference_{scenario.reference}", grids.power(scenario.floor, 1)
     description.append(grids.phrase(words, key, source=scenario.source, floor=floor))
     description.append(words("measured.engines_cost"))
@@ -419,7 +422,7 @@ def _cost_text(row: EngineRow, worlds: int) -> str:
     cost = next((cost for cost in row.costs if cost.worlds == worlds), BatchCost(worlds))
     if cost.seconds is None or cost.ratio is None:
         return "–" if cost.remark else ""
-    ratio: str = grids.factor(cost.ratio.value, 2)
+    ratio = grids.factor(cost.ratio.value, 2)
     if cost.ratio.half_width > _UNCERTAIN:
         ratio = f"{grids.factor(cost.ratio.low, 2)} – {grids.factor(cost.ratio.high, 2)}"
     return Markup("{} <br>×{}").format(seconds_text(cost.seconds.value, 3), ratio)

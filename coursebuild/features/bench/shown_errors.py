@@ -7,25 +7,22 @@ from collections.abc import Mapping
 
 from coursebuild.core.drawing.scales import tick_texts
 from coursebuild.core.model.measurements import EngineRow, Interval, MeasuredSetting, SweepRow
-from coursebuild.core.pages.renderer import NumberText
 
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are shown, which also sets their colour and mark."""
 
 
-def seconds_text(value: float, digits: int = 6) -> NumberText:
+def seconds_text(value: float, digits: int = 6) -> str:
     """A short time with its unit."""
     for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")):
         if value >= size * 0.9999995:
-            value = float(f"{value / size:.{digits}g}")
-            return NumberText(f"{value:.{max(digits, 6)}g} {unit}")
-    return NumberText(f"{value:.{digits}g} s")
+            return f"{float(f'{value / size:.{digits}g}'):.{max(digits, 6)}g} {unit}"
+    return f"{value:.{digits}g} s"
 
 
-def horizon_error_text(errors: Mapping[str, float]) -> NumberText:
+def horizon_error_text(errors: Mapping[str, float]) -> str:
     """The errors at which predictions end."""
-    texts = (f"{error:.3g} {unit}" for unit, error in errors.items())
-    return NumberText(" / ".join(texts) or "0.1")
+    return " / ".join(f"{error:.3g} {unit}" for unit, error in errors.items()) or "0.1"
 
 
 def interval_text(value: Interval) -> str:

@@ -16,7 +16,7 @@ from mjbench.reports.case_report import StepCost
 from samples.reports import interval
 from support.bench_reports import awkward, swing
 from support.model_reports import box, case, diet, reports, row, run, scenario, scene
-from support.rendered_course import Make
+from support.rendered_course import MAP, Make
 
 TEXTS: dict[Callable[[Any], str], dict[Any, str]] = {
     power: {
@@ -113,6 +113,16 @@ def test_a_scenario_has_its_plots_tables_and_figures_as_a_file(site: dict[str, s
     assert "coursebuild" not in words, "a page for readers names no command of authors"
     assert 'href="../files/reports/box.bench.json"' in page
     assert "MuJoCo 3.14.0, Python 3.11.7, NumPy 2.3.0; Linux x86_64, A Processor @ 2 GHz." in words
+
+
+def test_what_was_measured_has_the_decimal_sign_of_the_language(make: Make) -> None:
+    course = MAP.replace('language = "en"', 'language = "de"')
+    german = make("## A\n\nText.\n", course=course)
+    brief = replace(reports().scenes["box"], scenarios=(scenario(swing().rows, duration=2.5),))
+    files = german.site(reports=Reports({"box": brief}))
+    words = text(files["models/box.html"].decode())
+    assert "Das Szenario dauert 2,5 s." in words
+    assert re.search(r"RK4 at 20 ms 0,39 ", words)
 
 
 def test_where_the_duration_ended_the_search_for_stable_timesteps(make: Make) -> None:
