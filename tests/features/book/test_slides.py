@@ -117,7 +117,7 @@ def test_right_to_left_courses_have_their_words_and_their_direction(make_course:
     folder = make_course("## نص\n\nنص.\n")
     folder.replace(MAP, "[course]\n", '[course]\nlanguage = "ar"\n')
     page = slides(folder)
-    assert '<html lang="ar" dir="rtl">' in page
+    assert '<html lang="ar" dir="rtl"' in page
     assert 'aria-label="الشريحة 2 من 2"' in page and ">الشريحة التالية</span>" in page
 
 
