@@ -73,13 +73,12 @@ class ColumnTitle(Struct, frozen=True):
     def names(self, labels: Sequence[str], at: int, unit: UnitText) -> bool | None:
         """Whether number `at` of a line is what the title says; `None` where nothing tells.
 
-        `labels` are those of all numbers of the line, and `unit` the unit of this one. A word
-        behind a number without a label is a name of both numbers between which it stands.
+        `labels` are those of all numbers of the line, and `unit` the unit of this one.
         """
         if are_different(self.unit, unit):
             return False
         if best := self.best_places(labels):
-            return at in best or (best == [at + 1] and not words_of(labels[at]))
+            return at in best
         return True if is_same_unit(self.unit, unit) else None
 
 
