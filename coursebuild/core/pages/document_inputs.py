@@ -292,6 +292,11 @@ def _common(library: Library, place: urls.Place, lesson: Lesson) -> dict[str, ob
     return {
         "lesson": lesson_link(library, place, lesson, whole=True),
         "level": level_view(library, place, library.levels[lesson.level]),
+        # Lessons of other levels stay out: a new lesson would change every page of the course.
+        "levels": tuple(
+            (level.id, level.title, place.href(urls.level_path(level)))
+            for level in library.course.levels
+        ),
         "home": place.href(urls.HOME),
         "leads": tuple(
             lesson_link(library, place, follower) for follower in library.leads[lesson.id]

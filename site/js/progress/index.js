@@ -6,7 +6,7 @@
  * `document.dispatchEvent(new CustomEvent('coursebuild:reader', { detail: start }))`.
  */
 
-import { followLesson, showLesson } from './lesson.js'
+import { followLesson, showLesson, tickLessons } from './lesson.js'
 
 /** The function of the page's own script. */
 let start = null
@@ -23,7 +23,11 @@ export function showProgress(document, words, progress, improve) {
   const id = document.querySelector('main')?.dataset.lesson
   const begin = () => ends.push(start(document, { words, progress, improve }))
   if (lesson && id) {
-    const draw = () => showLesson(lesson, id, words, progress)
+    const beside = document.querySelectorAll('.level-nav [data-lesson]')
+    const draw = () => {
+      showLesson(lesson, id, words, progress)
+      tickLessons(beside, words, progress)
+    }
     draw()
     ends.push(progress.onChange(draw), followLesson(document, id, progress))
   } else if (!document.querySelector(':is([data-mark], [data-progress])')) return () => {}

@@ -1,4 +1,4 @@
-/** On a lesson's page: records how far it is read, and shows at its end whether it counts as read. */
+/** On a lesson's page: records how far it is read, shows at its end whether it counts as read, and ticks the lessons beside it. */
 
 import { h } from '../lab/page/dom.js'
 import { currentHeading } from '../page/contents.js'
@@ -79,4 +79,15 @@ export function showLesson(place, id, words, progress) {
   }
   const problem = progress.trouble()
   trouble.textContent = problem ? say(words, `progress.trouble.${problem}`) : ''
+}
+
+/** Tick the lessons that are read, in the list beside the text; called again after each change. */
+export function tickLessons(links, words, progress) {
+  const lessons = progress.lessons()
+  for (const link of links) {
+    const read = lessons.get(link.dataset.lesson)?.read ?? false
+    const tick = link.querySelector('.tick')
+    if (!read) tick?.remove()
+    else if (!tick) link.append(h('span', { class: 'tick' }, sign('read'), h('span', { class: 'unseen' }, ` ${words('progress.map.read')}`)))
+  }
 }
