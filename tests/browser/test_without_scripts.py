@@ -36,7 +36,10 @@ EXPECTED_TEXTS = {
 """What pages that need a script say."""
 
 
-@pytest.mark.parametrize("name", [pytest.param("real", marks=pytest.mark.slow), "full"])
+NAMES = ("full", "exercises", pytest.param("real", marks=pytest.mark.slow))
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_everything_can_be_read(sites: Mapping[str, Site], page: Page, name: str) -> None:
     """And no control does nothing."""
     site = sites[name]
