@@ -231,19 +231,3 @@ def test_an_exercise_and_a_first_lab_come_alive_in_the_room_that_was_kept_for_th
                 expect(element).to_have_class(re.compile("lab-on"))
                 expect(element.get_by_role("button", name="Play")).to_be_visible()
                 assert element.evaluate("e => e.offsetHeight") == height
-
-
-def test_an_exercise_is_read_without_scripts(
-    browsers: Mapping[str, Browser], sites: Mapping[str, Site]
-) -> None:
-    with browsers["plain"].new_context(java_script_enabled=False) as context:
-        page = context.new_page()
-        page.goto(sites["exercises"].url(ADDRESS))
-        hold = page.locator(".exercise").nth(1)
-        expect(hold.get_by_text("Hold the pendulum at 0.5 rad.")).to_be_visible()
-        expect(hold.get_by_text("data.qfrc_applied[0] = 0")).to_be_visible()
-        expect(hold.get_by_role("row").last).to_contain_text("0.4 to 0.6 rad at t = 5 s")
-        solution = hold.get_by_text("50 * (0.5")
-        expect(solution).to_be_hidden()
-        hold.get_by_text("Solution").click()
-        expect(solution).to_be_visible()

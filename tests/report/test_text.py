@@ -108,15 +108,6 @@ def test_a_long_line_without_width_is_cut_too() -> None:
     assert len(lines[3]) < 200 and lines[3].endswith("WRONG")
 
 
-def test_a_file_without_text_has_no_frame() -> None:
-    diagnostic = diagnose(
-        "map-missing", Source("content/course.toml", "").span(), "there is no content/course.toml"
-    )
-    assert render(diagnostic) == (
-        "error[map-missing]: there is no content/course.toml\n  --> content/course.toml:1:1"
-    )
-
-
 def test_report_lists_scripts_and_ends_with_a_summary() -> None:
     scripts = (
         ScriptLine("examples/a.py", "1.1", "ok", 0.25, False),

@@ -2,8 +2,8 @@
 
 Entry points: `check_cases(path, render)`, `read_cases(path)` and `rewrite(path, cases)`. Lines
 before a title that are empty or begin with `#` are for readers of the file. `check_lines(path,
-convert)` is for inputs of a line each, with what becomes of them indented below; short cases, of a
-line each, may be rows of tables (`fixture_tables`).
+convert)` is for inputs of a line each, which stand in the expected part alone, with what becomes of
+them indented below; short cases, of a line each, may be rows of tables (`fixture_tables`).
 """
 
 from __future__ import annotations
@@ -55,10 +55,11 @@ def check_lines(path: Path, convert: Callable[[str], Iterable[str]], *, rewritin
 
     def render(case: Case) -> str:
         lines: list[str] = []
-        for line in case.input.splitlines():
-            text = ast.literal_eval(line) if line[0] in "'\"" else line
-            outputs = (r if r.isprintable() else repr(r) for r in convert(text))
-            lines += [line, *(f"  {output}".rstrip() for output in outputs)]
+        for line in case.expected.splitlines():
+            if line and not line.startswith(" "):
+                text = ast.literal_eval(line) if line[0] in "'\"" else line
+                outputs = (r if r.isprintable() else repr(r) for r in convert(text))
+                lines += [line, *(f"  {output}".rstrip() for output in outputs)]
         return "".join(f"{line}\n" for line in lines)
 
     check_cases(path, render, rewriting=rewriting)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
@@ -24,7 +23,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Excerpt, Source
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.quiz.model import Quiz
-from support.fixture_cases import check_cases
+from support.fixture_cases import check_lines
 
 FOLDER = Path(__file__).parents[1] / "fixtures" / "texts"
 
@@ -33,19 +32,11 @@ Reader = Callable[[str], tuple[object, tuple[Diagnostic, ...]]]
 
 
 def check_texts(name: str, read: Reader, *, rewriting: bool) -> None:
-    check_cases(
-        FOLDER / f"{name}.md", lambda case: _format_case(case.input, read), rewriting=rewriting
-    )
+    def convert(text: str) -> list[str]:
+        value, diagnostics = read(text)
+        return format_diagnostics(diagnostics) + ["and it is read"] * (value is not None)
 
-
-def _format_case(texts: str, read: Reader) -> str:
-    lines = []
-    for line in texts.splitlines():
-        value, diagnostics = read(ast.literal_eval(line))
-        lines += [line, *(f"  {message}" for message in format_diagnostics(diagnostics))]
-        if value is not None:
-            lines.append("  and it is read")
-    return "".join(f"{line}\n" for line in lines)
+    check_lines(FOLDER / f"{name}.md", convert, rewriting=rewriting)
 
 
 def format_diagnostics(diagnostics: tuple[Diagnostic, ...]) -> list[str]:

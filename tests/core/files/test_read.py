@@ -83,14 +83,6 @@ def test_odd_names(root: Path) -> None:
     assert unreadable(root) == {escaped_path: "has a name that is not UTF-8"}
 
 
-def test_missing_map(tmp_path: Path) -> None:
-    parsed_course = read_course(tmp_path)
-    assert parsed_course.value.map is None
-    assert [(d.rule, d.span.path, d.message) for d in parsed_course.diagnostics] == [
-        ("map-missing", "content/course.toml", "there is no content/course.toml")
-    ]
-
-
 # --- text
 
 

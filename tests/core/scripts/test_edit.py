@@ -64,10 +64,6 @@ def test_what_varies_is_written_with_the_rest_of_its_line_only() -> None:
     assert new.body_span.text == "a 7 s, E 3\nb 1 s\n"
 
 
-def test_an_output_that_would_close_its_fence_is_refused() -> None:
-    assert "would close this fence, or begin another" in refusal_text("a", " ```x\nb")
-
-
 # ------------------------------------------------------------------------------------- refusals
 
 

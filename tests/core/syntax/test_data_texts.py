@@ -342,7 +342,10 @@ def place(span: Span) -> str:
 
 
 def describe(value: object, depth: int = 0) -> str:
-    """A value in lines: its fields but for empty ones, and places as what stands there."""
+    """A value in lines: its fields but for empty ones, and places as what stands there.
+
+    Of Markdown its place: what stands in it is shown in `tests/fixtures/syntax`.
+    """
     match value:
         case Source():
             return f" {value.path}\n"
@@ -357,6 +360,8 @@ def describe(value: object, depth: int = 0) -> str:
             head = f" {place(value.span)} {value.mark.text}\n"
         case StringNode() | NumberNode() | BoolNode() | DateNode():
             return describe(value.span)
+        case Struct(span=Span() as span, children=_):
+            return f" {type(value).__name__} {place(span)} {span.first_line().text}\n"
         case Struct():
             pairs = [(f"{f.name}:", getattr(value, f.name), f.default) for f in fields(value)]
             head = f" {type(value).__name__}\n"

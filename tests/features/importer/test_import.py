@@ -25,10 +25,12 @@ GENERATED = ("public", "examples", ".coursebuild")
 
 
 def texts(folder: Path) -> dict[str, bytes]:
+    """Files by path; of a figure that a cell drew, only that it is there."""
+    paths = (path for path in sorted(folder.rglob("*")) if path.is_file())
     return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.relative_to(folder).parts[0] not in GENERATED
+        name.as_posix(): b"" if name.match("lessons/*.svg") else (folder / name).read_bytes()
+        for name in (path.relative_to(folder) for path in paths)
+        if name.parts[0] not in GENERATED
     }
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import json
 import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -308,7 +309,8 @@ TRANSLATORS: dict[str, Callable[[EngineDescription, str], str]] = {
 
 def test_code_becomes_python_or_is_refused(engine: EngineDescription, rewriting: bool) -> None:
     def translate_pieces(case: Case) -> str:
-        pieces = case.input.rstrip("\n").split("\n\n")
+        blocks = re.split(r"\n\n(?=\S)", case.expected.rstrip("\n"))
+        pieces = [re.sub(r"\n(    .*|)(?=\n|$)", "", block) for block in blocks]
         translate = TRANSLATORS[case.title]
         return "\n".join(f"{code}\n{indent(translate(engine, code), '    ')}\n" for code in pieces)
 

@@ -1,3 +1,0 @@
-print("exactly   this")
-print()
-print("trailing white space   ")

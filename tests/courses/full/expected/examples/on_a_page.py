@@ -1,1 +1,0 @@
-print("a page may have scripts")

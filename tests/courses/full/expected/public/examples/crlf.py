@@ -1,7 +1,0 @@
-# /// script
-# requires-python = ">=3.11"
-# dependencies = []
-# ///
-text = """one
-two"""
-print(repr(text))

@@ -1,5 +1,0 @@
-# /// script
-# requires-python = ">=3.11"
-# dependencies = []
-# ///
-raise SystemExit("this is never run")
