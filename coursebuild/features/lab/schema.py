@@ -241,6 +241,15 @@ class Verify(Struct, frozen=True, forbid_unknown_fields=True):
     deep: Annotated[bool, Meta(description="whether bodies are meant to overlap deeply")] = False
 
 
+class LegendEntry(Struct, frozen=True, forbid_unknown_fields=True):
+    """What an overlay shows, and the symbol that lights with it."""
+
+    overlay: Annotated[Overlay, Meta(description="the overlay")]
+    text: Annotated[
+        Inlines, Meta(description="what it shows, a line of Markdown that begins with its symbol")
+    ]
+
+
 class CommonLab(Struct, frozen=True):
     """What labs of every kind have; a kind's own code reads the rest."""
 
@@ -263,6 +272,9 @@ class SimLab(CommonLab, frozen=True, forbid_unknown_fields=True):
     toggles: Annotated[tuple[Overlay, ...], Meta(description="overlays that can be switched")] = ()
     overlays: Annotated[
         tuple[Overlay, ...] | Overlays, Meta(description="overlays that start on")
+    ] = ()
+    legend: Annotated[
+        tuple[LegendEntry, ...], Meta(description="the symbols of what overlays show")
     ] = ()
     forceScale: Annotated[Positive | None, Meta(description="of drawn forces, in m/N")] = None  # noqa: N815
     autoplay: Annotated[bool, Meta(description="starts running")] = False
