@@ -108,26 +108,25 @@ def test_a_symbol_in_a_formula_lights_what_a_lab_draws_for_it(
     context: BrowserContext, base: str
 ) -> None:
     page, console = watch_page(context)
-    page.set_viewport_size(
-        {"width": 1000, "height": 2000}
-    )  # a picture that scrolls loses a pointer
+    # High enough for the lab and the formula: a picture that has to scroll loses the pointer.
+    page.set_viewport_size({"width": 1000, "height": 2000})
     page.goto(base + PAGE)
-    everything = lab(page, ALL, None)
-    press(everything, "One step")
+    zoo = lab(page, ALL, None)
+    press(zoo, "One step")
     reach(page, ALL, "paused")
-    view, entry = everything.locator(".lab-view"), everything.locator(".lab-legend > li")
+    view, entry = zoo.locator(".lab-view"), zoo.locator(".lab-legend > li")
     bare = wait_until_still(page, view)
-    symbol, other = (
+    symbol, base_symbol = (
         page.locator(f"p:has-text('are no') {tag} > mi").first for tag in ("msup", "msub")
     )
     symbol.hover()
-    for lit in (symbol, entry, everything.locator("label", has_text="body frames")):
+    for lit in (symbol, entry, zoo.locator("label", has_text="body frames")):
         expect(lit).to_have_attribute("data-lit", "")
     wait_for_change(page, view, bare)
-    other.hover()
+    base_symbol.hover()
     expect(page.locator("[data-lit]")).to_have_count(0)
     wait_for_condition(page, lambda: view.screenshot() == bare)
-    everything.get_by_label("body frames").focus()
+    zoo.get_by_label("body frames").focus()
     expect(symbol).to_have_attribute("data-lit", "")
     assert console == []
 
