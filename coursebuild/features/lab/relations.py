@@ -264,8 +264,8 @@ def check_legends(document: Document, mathml: Mathml) -> Parsed[None]:
         return iter(()) if root is None else parts(root[0])
 
     formulas = (f for _, f in model.find_formulas(document) if f not in symbols) if symbols else ()
-    known = {b"", *(symbol for formula in formulas for symbol in symbols_of(formula))}
-    unused = [s.tex for s in symbols if next(symbols_of(s), b"") not in known]
+    vocabulary = {b"", *(symbol for formula in formulas for symbol in symbols_of(formula))}
+    unused = [s.tex for s in symbols if next(symbols_of(s), b"") not in vocabulary]
     message = "no other formula of this text has `${}$`"
     return Parsed(
         None, tuple(diagnose("lab-name", s.span(), message.format(s.text)) for s in unused)
