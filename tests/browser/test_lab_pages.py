@@ -12,6 +12,7 @@ from playwright.sync_api import Browser, BrowserContext, Route, expect
 from support.axe import violations
 from support.built_sites import Site
 from support.lab_page import (
+    ALL,
     AUTO,
     MOUNT,
     PAGE,
@@ -26,7 +27,9 @@ from support.lab_page import (
     reach,
     state_of,
     time_of,
+    wait_for_change,
     wait_for_condition,
+    wait_until_still,
     watch_page,
 )
 
@@ -99,6 +102,33 @@ def test_on_a_desk_picture_curves_and_controls_share_a_screen(
         plot = swing.locator(".lab-live .lab-plot").first.bounding_box()
         view_below = swing.locator(".lab-view").bounding_box()
         assert plot and view_below and plot["y"] > view_below["y"] + view_below["height"]
+
+
+def test_a_symbol_in_a_formula_lights_what_a_lab_draws_for_it(
+    context: BrowserContext, base: str
+) -> None:
+    page, console = watch_page(context)
+    # High enough for the lab and the formula: a picture that has to scroll loses the pointer.
+    page.set_viewport_size({"width": 1000, "height": 2000})
+    page.goto(base + PAGE)
+    zoo = lab(page, ALL, None)
+    press(zoo, "One step")
+    reach(page, ALL, "paused")
+    view, entry = zoo.locator(".lab-view"), zoo.locator(".lab-legend > li")
+    bare = wait_until_still(page, view)
+    symbol, base_symbol = (
+        page.locator(f"p:has-text('are no') {tag} > mi").first for tag in ("msup", "msub")
+    )
+    symbol.hover()
+    for lit in (symbol, entry, zoo.locator("label", has_text="body frames")):
+        expect(lit).to_have_attribute("data-lit", "")
+    wait_for_change(page, view, bare)
+    base_symbol.hover()
+    expect(page.locator("[data-lit]")).to_have_count(0)
+    wait_for_condition(page, lambda: view.screenshot() == bare)
+    zoo.get_by_label("body frames").focus()
+    expect(symbol).to_have_attribute("data-lit", "")
+    assert console == []
 
 
 def test_page_keeps_its_place_while_a_picture_arrives_late(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Iterator
 from typing import TypeAlias
@@ -45,6 +46,8 @@ class Lab(FeatureBlock, frozen=True):
     """What the author wrote; for a course's own kind, only the fields that all labs have."""
     note: tuple[Block, ...] = ()
     goal: tuple[Inline, ...] = ()
+    legend: tuple[tuple[Inline, ...], ...] = ()
+    """The text of each entry."""
     xml: Excerpt | None = None
     starts: tuple[str, ...] = ()
     """Names of the models with which a reader may also begin to edit."""
@@ -78,8 +81,8 @@ class Lab(FeatureBlock, frozen=True):
         return self.note
 
     def child_inlines(self) -> tuple[Inline, ...]:
-        """The text of the goal."""
-        return self.goal
+        """The texts of the goal and the legend."""
+        return (*self.goal, *itertools.chain.from_iterable(self.legend))
 
     def progress_keys(self) -> tuple[str, tuple[str, ...]] | None:
         """The key of the goal, which changes with the goal's condition."""
@@ -92,7 +95,7 @@ class Lab(FeatureBlock, frozen=True):
 
     def summary(self) -> Lab:
         """The lab without its Markdown."""
-        return replace(self, note=(), goal=())
+        return replace(self, note=(), goal=(), legend=())
 
     def models(self) -> tuple[str, ...]:
         """The name of its model, if it names one."""

@@ -114,6 +114,10 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
         code=qr_svg(address, words("lab.code")) if address else "",
         goal=page.inlines(block.goal),
         goal_key=(block.progress_keys() or ("",))[0],
+        legend=[
+            (entry.overlay, page.inlines(text))
+            for entry, text in zip(block.fields.legend, block.legend, strict=True)
+        ],
         source=source,
         note=page.blocks(block.note),
     )
@@ -191,7 +195,8 @@ def lab_picture(block: Lab, lab: Struct | None) -> Picture | None:
 def index_lab(reader: IndexReader, lab: Lab) -> None:
     """Give the search a lab's title, note, labels and model."""
     reader.add("text", lab.fields.title)
-    reader.add("text", reader.text(lab.goal))
+    for text in (lab.goal, *lab.legend):
+        reader.add("text", reader.text(text))
     reader.blocks(lab.note)
     labels = [control.label for control in lab.fields.controls]
     labels += [readout.label for readout in lab.fields.readouts]
@@ -311,6 +316,7 @@ def draw_model(renderer: Renderer, view: LabView) -> Markup:
         source="",
         note="",
         goal="",
+        legend=(),
     )
 
 
@@ -372,5 +378,6 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     parts.append(
         "\n".join(f"- {escape_marks(n)}: {escape_marks(', '.join(p))}" for n, p in displays)
     )
+    parts += ["\n".join(f"- {writer.inlines(text)}" for text in lab.legend)]
     parts += [writer.blocks(lab.note), link(words("exports.run_lab"), writer.live)]
     return "\n\n".join(filter(None, parts))

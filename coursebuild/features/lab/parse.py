@@ -131,6 +131,7 @@ def sim_lab(
         fields=fields,
         note=prose.blocks(node.get("note")),
         goal=prose.inlines(goal.get("text") if isinstance(goal, ObjectNode) else None),
+        legend=tuple(prose.inlines(entry.get("text")) for entry in node.objects("legend")),
         xml=xml.excerpt if isinstance(xml, StringNode) else None,
         places=tuple((path, value.mark) for path, value in values_in(node, ())),
         code=tuple(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from xml.etree.ElementTree import Element, tostring
 
 from msgspec import Struct
 
@@ -16,12 +17,15 @@ from coursebuild.api import (
     Diagnostic,
     Document,
     FeatureBlock,
+    Mathml,
     ModelFacts,
+    Parsed,
     diagnose,
     did_you_mean,
     find_blocks,
+    model,
 )
-from coursebuild.core.model import NumberBinding
+from coursebuild.core.checks.formulas import parse_mathml
 from coursebuild.core.run.mjcf import read_tags
 from coursebuild.core.syntax.decode import check_unique, require_one_of
 from coursebuild.core.syntax.fence import with_units
@@ -239,6 +243,35 @@ def _is_editable(model: str) -> bool:
     return len(model) <= LONGEST_MODEL and "file" not in names
 
 
+_SCRIPTED = ("msub", "msubsup", "mover", "munder", "munderover")
+"""Elements whose first part is no symbol by itself; site/js/lab/page/legend.js has them too."""
+
+
+def check_legends(document: Document, mathml: Mathml) -> Parsed[None]:
+    """Report symbols of legends that stand in no other formula of the text."""
+    texts = [text for lab in find_blocks(document, Lab) for text in lab.legend]
+    firsts = (next((i for i in text if isinstance(i, model.Math)), None) for text in texts)
+    symbols = [symbol for symbol in firsts if symbol is not None]
+
+    def parts(element: Element) -> Iterator[bytes]:
+        for i, part in enumerate(element):
+            if i > 0 or element.tag not in _SCRIPTED:
+                yield tostring(part)
+            yield from parts(part)
+
+    def symbols_of(formula: model.Math | model.MathBlock) -> Iterator[bytes]:
+        root = parse_mathml(mathml(formula.tex.text, formula.display))
+        return iter(()) if root is None else parts(root[0])
+
+    formulas = (f for _, f in model.find_formulas(document) if f not in symbols) if symbols else ()
+    vocabulary = {b"", *(symbol for formula in formulas for symbol in symbols_of(formula))}
+    unused = [s.tex for s in symbols if next(symbols_of(s), b"") not in vocabulary]
+    message = "no other formula of this text has `${}$`"
+    return Parsed(
+        None, tuple(diagnose("lab-name", s.span(), message.format(s.text)) for s in unused)
+    )
+
+
 def check_model_names(
     course: Course, facts_of: Callable[[FeatureBlock], ModelFacts | None]
 ) -> Iterator[Diagnostic]:
@@ -261,7 +294,9 @@ def check_model_names(
                     yield diagnose("lab-name", lab.place((field,)), message, help=help)
 
 
-def plotted_numbers(numbers: Iterable[NumberBinding], lab: ObjectNode) -> tuple[NumberBinding, ...]:
+def plotted_numbers(
+    numbers: Iterable[model.NumberBinding], lab: ObjectNode
+) -> tuple[model.NumberBinding, ...]:
     """The bound numbers of a lab; heights of lines have the unit of the axis, as `v (m/s)`."""
     heights = (
         (height, unit_of_header(label.value).text)

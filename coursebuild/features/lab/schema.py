@@ -241,6 +241,13 @@ class Verify(Struct, frozen=True, forbid_unknown_fields=True):
     deep: Annotated[bool, Meta(description="whether bodies are meant to overlap deeply")] = False
 
 
+class LegendEntry(Struct, frozen=True, forbid_unknown_fields=True):
+    """What an overlay shows, and the symbol that lights with it."""
+
+    overlay: Annotated[Overlay, Meta(description="the overlay")]
+    text: Annotated[Inlines, Meta(description="a line of Markdown that begins with its symbol")]
+
+
 class CommonLab(Struct, frozen=True):
     """What labs of every kind have; a kind's own code reads the rest."""
 
@@ -264,6 +271,7 @@ class SimLab(CommonLab, frozen=True, forbid_unknown_fields=True):
     overlays: Annotated[
         tuple[Overlay, ...] | Overlays, Meta(description="overlays that start on")
     ] = ()
+    legend: Annotated[tuple[LegendEntry, ...], Meta(description="symbols of what is drawn")] = ()
     forceScale: Annotated[Positive | None, Meta(description="of drawn forces, in m/N")] = None  # noqa: N815
     autoplay: Annotated[bool, Meta(description="starts running")] = False
     grab: Annotated[

@@ -10,6 +10,7 @@ const PART = 0.3 // length of a typical arrow, in heights of the picture
 const THICK = 0.009 // radius of an arrow, in heights of the picture
 const AXIS = 0.42 // how far an axis reaches to either side, in the same
 const NOTHING = 1e-9 // relative: a smaller angular momentum counts as zero
+export const THICKER = 2 // times, at which a reader points
 export const ARROW = 100 // mjtGeom
 const CYLINDER = 5
 export const IN_FRONT = -2 // in place of a data id: drawn over everything, as an arrow begins inside a body
@@ -102,20 +103,21 @@ export class ArrowScales {
   }
 }
 
-/** The rows of a frame (see `frame.js`) that draw the quantities called `names`, with lengths by `scales`. */
-export function arrowRows(quantities, names, scales) {
+/** The rows of a frame (see `frame.js`) that draw the quantities called `names`, with lengths by `scales`; the `pointed` one is thicker. */
+export function arrowRows(quantities, names, scales, pointed = null) {
   const rows = []
   for (const name of names) {
+    const width = scales.width * (name === pointed ? THICKER : 1)
     for (const { at: point, vector } of quantities[name]) {
       const length = norm(vector)
       if (!(length > 0) || !scales[name]) continue
       const z = vector.map((x) => x / length)
-      if (name === 'axis') rows.push(row([CYLINDER, -1], point, z, [0.4 * scales.width, 0.4 * scales.width, scales.axis], COLOURS.axis))
+      if (name === 'axis') rows.push(row([CYLINDER, -1], point, z, [0.4 * width, 0.4 * width, scales.axis], COLOURS.axis))
       else {
         // MuJoCo draws an arrow half as long as its third size.
         const reach = 2 * length * scales[name]
         const heads = name === 'momentum' ? [1] : [1, INNER]
-        for (const part of heads) rows.push(row([ARROW, IN_FRONT], point, z, [scales.width, scales.width, part * reach], COLOURS[name]))
+        for (const part of heads) rows.push(row([ARROW, IN_FRONT], point, z, [width, width, part * reach], COLOURS[name]))
       }
     }
   }

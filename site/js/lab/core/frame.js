@@ -18,7 +18,7 @@
  * arrows of `arrows.js`.
  */
 
-import { ARROW, IN_FRONT, arrowRows, momenta } from './arrows.js'
+import { ARROW, IN_FRONT, THICKER, arrowRows, momenta } from './arrows.js'
 import { describeScene } from './scene.js'
 import { SceneGeoms } from './structs.js'
 
@@ -69,11 +69,28 @@ export class Pictures {
     for (const group of ['geomgroup', 'sitegroup', 'skingroup', 'flexgroup']) this.option[group].fill(0)
     this.option.flags[engine.k.vis.PERTFORCE] = 1
     this.ownOverlays = new Set()
-    for (const name of OVERLAYS) this.setOverlay(name, config.overlays.includes(name))
+    this.overlays = new Set(config.overlays) // that are on
+    this.pointed = null
+    this.forceWidth = this.model.vis.scale.forcewidth
+    for (const name of OVERLAYS) this.draw(name)
   }
 
   /** Switch an overlay on or off. */
   setOverlay(name, isOn) {
+    this.overlays[isOn ? 'add' : 'delete'](name)
+    this.draw(name)
+  }
+
+  /** Draw an overlay with thick arrows, whether it is on or not. @param {string | null} name `null`: none */
+  point(name) {
+    const before = this.pointed
+    this.pointed = name
+    this.model.vis.scale.forcewidth = this.forceWidth * (name === 'forces' ? THICKER : 1)
+    for (const changed of [before, name]) if (changed !== null) this.draw(changed)
+  }
+
+  draw(name) {
+    const isOn = this.overlays.has(name) || this.pointed === name
     const { vis, frame } = this.engine.k
     const flags = { contacts: vis.CONTACTPOINT, forces: vis.CONTACTFORCE, com: vis.COM, inertia: vis.INERTIA, joints: vis.JOINT }
     if (name === 'forces' && isOn) this.paintForces()
@@ -124,7 +141,7 @@ export class Pictures {
 
   arrows() {
     const { engine, model, data, ownOverlays, config } = this
-    return ownOverlays.size > 0 && config.arrows ? arrowRows(momenta(engine, model, data), ownOverlays, config.arrows) : []
+    return ownOverlays.size > 0 && config.arrows ? arrowRows(momenta(engine, model, data), ownOverlays, config.arrows, this.pointed) : []
   }
 
   writePoses(target) {

@@ -81,7 +81,7 @@ export function buildOverlays({ toggles, overlays, arrows }, words, toggle) {
   const ticks = rest.map((name) => {
     const box = h('input', { type: 'checkbox', checked: overlays.includes(name) })
     box.addEventListener('change', () => toggle(name, box.checked))
-    return h('label', { class: 'lab-check' }, box, ` ${words(`overlay.${name}`)}`)
+    return h('label', { class: 'lab-check', 'data-overlay': name }, box, ` ${words(`overlay.${name}`)}`)
   })
   const buttons = available.map((name) => arrowButton(name, words, overlays, toggle))
   const group = (kind, parts) =>
@@ -91,7 +91,9 @@ export function buildOverlays({ toggles, overlays, arrows }, words, toggle) {
 
 function arrowButton(name, words, overlays, toggle) {
   const kind = `lab-icon lab-arrow lab-${name}`
-  return switchButton(h('i', {}, SIGNS[name]), kind, words(`overlay.${name}`), overlays.includes(name), (isOn) => toggle(name, isOn))
+  const button = switchButton(h('i', {}, SIGNS[name]), kind, words(`overlay.${name}`), overlays.includes(name), (isOn) => toggle(name, isOn))
+  button.dataset.overlay = name
+  return button
 }
 
 /** A small button that stays pressed. */

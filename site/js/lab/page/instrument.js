@@ -12,6 +12,7 @@ import { download, h, icon, textButton } from './dom.js'
 import { curvesText, fillScript } from './export.js'
 import { History } from './history.js'
 import { digitsOfStep, formatReadout, formatTime } from './numbers.js'
+import { followLegend } from './legend.js'
 import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
@@ -56,6 +57,7 @@ export class Instrument extends Shell {
       view: this.view,
       on: this.listeners(),
     })
+    this.leaveLegend = followLegend(element, (name, isAsked) => this.simulation.point(name, isAsked))
   }
 
   build() {
@@ -409,6 +411,7 @@ export class Instrument extends Shell {
 
   dispose() {
     this.leaveEditor()
+    this.leaveLegend()
     clearTimeout(this.sayTimer)
     this.hands.dispose()
     this.plots.forEach((plot) => plot.dispose())

@@ -42,6 +42,7 @@ export class Simulation {
     this.tick = (now) => this.refresh(now)
     this.request = 0
     this.line = null
+    this.pointed = null
     this.latest = null
     if (config.autoplay) this.connect()
     else this.setState('asleep')
@@ -128,6 +129,13 @@ export class Simulation {
 
   overlay(name, on) {
     this.choose(name, { type: 'overlay', name, on })
+  }
+
+  /** Draw an overlay while the reader points at it, if the lab is loaded or `isAsked` to. @param {string | null} name `null`: none */
+  point(name, isAsked = false) {
+    if (name === this.pointed || (this.line === null && !isAsked)) return
+    this.pointed = name
+    this.send({ type: 'point', name })
   }
 
   /** Begin or stop to receive what the model offers, and with each frame its values. */

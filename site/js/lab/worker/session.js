@@ -23,6 +23,7 @@
  *   actuate {index, value, play}      set the control signal of an actuator; `play` as above
  *   keyframe {index}                  begin again at a keyframe of the model
  *   overlay {name, on}                one of `OVERLAYS` in core/frame.js
+ *   point {name}                      draw an overlay, with thick arrows, while the reader points at it; `null` ends that
  *   visible {on}                      a lab out of sight makes no steps and sends no frames
  *   perturb {body, point, target}     with `point` (m, world) take hold of the body there; draw it to `target`; `null` lets go.
  *                                     A lab that is paused moves its pose; else a spring pulls
@@ -287,6 +288,10 @@ const HANDLERS = {
   keyframe: (session, { index }) => session.begin((lab) => lab.startAt(index)),
   overlay(session, { name, on }) {
     session.lab.pictures.setOverlay(name, on)
+    session.stale = true
+  },
+  point(session, { name }) {
+    session.lab.pictures.point(name)
     session.stale = true
   },
   visible(session, { on }) {
