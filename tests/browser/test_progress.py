@@ -54,7 +54,9 @@ def test_answers_and_lessons_show_on_the_map_at_once_in_another_tab(
     expect(end.get_by_role("status")).to_have_text("You have read this lesson.")
     expect(end.get_by_role("button")).to_have_text("Mark as not read")
     beside = lesson.locator(".level-nav")
-    expect(beside.locator("a", has=lesson.locator(".tick"))).to_have_text("1.1 Push & <em>pull</em> read")
+    expect(beside.locator("a", has=lesson.locator(".tick"))).to_have_text(
+        "1.1 Push & <em>pull</em> read"
+    )
     expect_mark(home, "1.1", "read1/3")
     summary = home.locator('[data-progress="summary"]')
     expect(summary).to_have_text(re.compile(r"1 of 3 read\s*1 of 7 tasks done"))

@@ -78,7 +78,9 @@ FEATURE = Feature(
     ),
     parts=(
         PagePart(mark="data-mark", kinds=("home", "level"), bundled="map.js", texts=_MAP_TEXTS),
-        PagePart(mark='data-progress="lesson"', texts=("progress.lesson.", "progress.map.read", _TROUBLE)),
+        PagePart(
+            mark='data-progress="lesson"', texts=("progress.lesson.", "progress.map.read", _TROUBLE)
+        ),
         PagePart(
             mark='data-progress="overall"',
             bundled="progress.js",
