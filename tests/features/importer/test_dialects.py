@@ -268,6 +268,17 @@ def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
             "```python file=examples/l1_1_a.py folded\ntry:\n    import os\nexcept ImportError:\n"
             "    pass\n```",
         ),
+        ("[@b] ([@b])\n\n[@b]: https://a.org", r"[\@b] ([\@b])" + "\n\n" + r"[\@b]: https://a.org"),
+        ("[B][^1].\n\n[B]: https://b.org\n[^1]: C.", "[B][][^1].\n\n[B]: https://b.org\n[^1]: C."),
+        ("- :material-x:{ .lg } &nbsp; __A__\n\n  ---", "- __A__\n\n  ---"),
+        ("{octicon}`law;1em` B [:material-x:](https://a.org/b)", " B [a.org](https://a.org/b)"),
+        ("(a/b)=\n## B\n\n[c](#a/b)", "## B {#a-b}\n\n[c](#a-b)"),
+        ("::::{note}\n```\n:::\n```\n::::\n\nB.", "> [!note]\n> ```\n> :::\n> ```\n\nB."),
+        (
+            ":::{grid-item-card} {ref}`at`\n:link: at\n:link-type: ref\n:::\n\n(at)=\n## B",
+            "**[B](#at)**\n\n## B {#at}",
+        ),
+        ("`{{ #include }}`", "`{{ #include }}`"),
         (
             '```{code-cell}\nprint("%d"\n      % 3)\n```',
             '```python file=examples/l1_1_a.py\nprint("%d"\n      % 3)\n```',
@@ -289,3 +300,16 @@ def test_links_and_signs_that_cannot_stay_are_told(tmp_path: Path) -> None:
     left = account_of(course).partition("## Left")[2]
     assert "- `:smile:`, shown as written: write the sign, if its tool draws one\n" in left
     assert "- the link of a figure to `https://a.org`, which has a number here\n" in left
+
+
+def test_fields_of_sphinx_are_a_list_without_those_for_the_tool(tmp_path: Path) -> None:
+    text = ":orphan:\n\n# One\n\n:depth: How\n  deep.\n:local:\n:class: A style.\n"
+    files = {"conf.py": "project = 'A'", "index.md": "# A\n\n```{toctree}\na\n```\n"}
+    assert lesson(tmp_path, "a.md", text, **files) == (
+        "- **depth**: How deep.\n- **class**: A style.\n"
+    )
+
+
+def test_an_assignment_of_knitr_in_a_line_shows_nothing(tmp_path: Path) -> None:
+    text = '\n---\ntitle: One\n---\n\nA `r n = "b"` word\\index{a|see{b}}.\n'
+    assert lesson(tmp_path, "a.qmd", text) == "A  word.\n"
