@@ -71,8 +71,8 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         *read_book(files),
         *_read_nav(value_at(mkdocs, "nav"), str(value_at(mkdocs, "docs_dir") or "docs"), files),
     ]
-    found = None if parts else read_outline(files)
-    outline = found or Outline(title="", parts=tuple(parts))
+    own_outline = None if parts else read_outline(files)
+    outline = own_outline or Outline(title="", parts=tuple(parts))
     title, parts = outline.title or title, [*outline.parts]
     parts = parts or [*_group_by_folder(files)]
     if not parts:
@@ -86,7 +86,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     pages = [text for text in texts if _base_name(text.file) in _PAGES]
     if len(pages) == len(parts):  # a course has a lesson
         pages = []
-    if found:
+    if own_outline:
         pages = [*outline.pages]
     # A level for each group, and one for each run of lessons outside groups
     levels: list[ImportedLevel] = []
