@@ -1,4 +1,4 @@
-"""Anchors, labels and captions that texts of all dialects set, and by which they refer to places."""
+"""Anchors, labels and captions that texts of all dialects set, by which they refer to places."""
 
 from __future__ import annotations
 
