@@ -127,6 +127,11 @@ class LessonContext(Struct, frozen=True, kw_only=True):
             lines.append(line)
         return name
 
+    def add_note(self, words: str) -> str:
+        """Return the mark of a note that stands at the end of the lesson."""
+        self.notes.append(words)
+        return f"[^note-{len(self.notes)}]"
+
     def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
         """Return what a part of the text becomes, which the account notes."""
         return self.files.account.convert(kind, change, old, convert)

@@ -86,6 +86,7 @@ _LINE = re.compile(
     r"|(?P<tag><(?i:a|img|source|video)[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
     r"|(?P<markdown>(?P<before><[a-z]\w*(?:[ ][^<>\n]*?)?)[ ]markdown(?:=[\"'\w]+)?(?=[ >]))"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
+    r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z])-{2,3}(?=[a-z]))"
     rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
 GONE = "gone:"
@@ -118,8 +119,9 @@ _COMMENT = re.compile(
 )
 """A comment of MyST or Obsidian, or the break of MyST between two cells."""
 _COMMENT_AS_HEADING = re.compile(
-    r"^(#{1,6})[ \t]+<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$", re.MULTILINE
+    r"^(#{1,6}[ \t]+)?<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$(?(1)|(?=\n+:[ \t]))", re.MULTILINE
 )
+"""Or as a term whose meaning is below it."""
 _CONTENTS = re.compile(
     r'<div class="toc">.*?</div>|^(?:\[TOC\]|\[\[_?TOC_?\]\])[ \t]*$', re.DOTALL | re.M
 )
@@ -129,8 +131,6 @@ _SETTINGS = re.compile(
     re.MULTILINE,
 )
 """Settings of Pandoc, which takes them anywhere."""
-
-
 _KEPT = {
     re.compile(r"^[ >]*#{1,6}[ \t]+\S", re.MULTILINE): "heading",
     re.compile(
@@ -185,6 +185,7 @@ _KINDS = {
     "tag": ("tag of HTML", "its new address"),
     "markdown": ("tag of HTML", "without `markdown`: its text always is"),
     "attributes": ("attributes", "an anchor, or dropped: a page has its own look"),
+    "dashes": ("dashes", "the sign that its tool draws"),
     "span": ("attributes", "its words alone"),
 }
 """The kind of what a group of `_LINE` is, and how it is changed."""
@@ -214,8 +215,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     text = account.replace(_CONTENTS, "", text, "table of contents", change)
     if context.path.endswith((".qmd", ".Rmd")):
         text = _SETTINGS.sub("", text)
-    change = "the words of a heading that has no others: its tool replaces it"
-    text = account.replace(_COMMENT_AS_HEADING, r"\1 `\2`", text, "comment", change)
+    change = "the words of a heading or term that has no others: its tool replaces it"
+    text = account.replace(_COMMENT_AS_HEADING, r"\1`\2`", text, "comment", change)
     for pattern, kind in _KEPT.items():
         account.taken[kind] += len(pattern.findall(text))
     change = "a comment of HTML"
@@ -347,8 +348,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "square":
             return f"$${match['shown_tex'].strip()}$$"
         case "note":
-            context.notes.append(_rewrite_line(match["remark"], context))
-            return f"[^note-{len(context.notes)}]"
+            return context.add_note(_rewrite_line(match["remark"], context))
         case "math":
             if not context.files.has_dollars and whole[:2] != "$$":
                 return rf"\${_rewrite_line(whole[1:-1], context)}\$"
@@ -427,12 +427,15 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return convert_tag(whole, context)
         case "markdown":  # a tag whose text is Markdown, as it always is here
             return match["before"]
+        case "dashes":
+            return "–—"[len(whole) - 2] if context.files.has_signs(context.path) else whole
         case "attributes":
             return convert_attributes(match)
         case "span":
             label = re.search(r"\]\{[ ]*#([\w-]+)", whole)
             anchor = f'<a id="{to_anchor(label[1])}"></a>' if label else ""
-            return anchor + _rewrite_line(match["words"], context)
+            words = _rewrite_line(match["words"], context)
+            return anchor + (context.add_note(words) if ".aside" in whole else words)
         case _:
             return whole
 

@@ -245,6 +245,15 @@ class SourceFiles:
         has_none = bool(settings) and "math" not in "".join(map(self.read_text, settings))
         return not has_none and not (self.folder / ".gitbook.yaml").is_file()
 
+    def has_signs(self, path: str) -> bool:
+        """Whether the tool of a text draws hyphens in a row as a dash."""
+        signs = "smart-punctuation = true"
+        return (
+            path.endswith((".qmd", ".Rmd"))
+            or "conf.py" in self
+            or ("book.toml" in self and signs in self.read_text("book.toml"))
+        )
+
     def find(self, path: str) -> str:
         """Return the path of a file, given perhaps with links to folders; empty for no file."""
         if path in self._real_paths:

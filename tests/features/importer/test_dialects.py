@@ -224,6 +224,10 @@ TABLE = "| a | b |\n|---|---|\n| `{n}` | c |\n| `{n,}` | d |\n"
         ("a.qmd", CALLOUT, '> [!note] Norms\n> <a id="iso"></a>\n> Text.\n'),
         ("a.qmd", "A.\n\n---\neval: false\n---\n\nB.\n", "A.\n\n\n\nB.\n"),
         ("a.md", "A.\n\n---\neval: false\n---\n\nB.\n", "A.\n\n---\neval: false\n---\n\nB.\n"),
+        ("a.qmd", "A `r n = 1` b\\index{a|see{b}}.\n", "A  b.\n"),
+        ("a.md", ":orphan:\n\nA.\n\n:b: How\n  deep.\n:c:\n", "A.\n\n- **b**: How deep.\n"),
+        ("a.qmd", "A -- b---c.[d]{.aside}\n", "A – b—c.[^note-1]\n\n[^note-1]: d\n"),
+        ("a.md", "<!-- a.b -->\n\n:   C.\n\n<!-- d -->\n", "**`a.b`**: C.\n\n<!-- d -->\n"),
         ("a.md", TABLE, TABLE),
         ("a.md", '## B { #b data-label="C \\"d\\"" }\n\nText.\n', "## B {#b}\n\nText.\n"),
         ("a.md", "A.\n\n # B\n\nText.\n", "A.\n\n## B\n\nText.\n"),
@@ -234,7 +238,7 @@ TABLE = "| a | b |\n|---|---|\n| `{n}` | c |\n| `{n,}` | d |\n"
 def test_what_is_right_in_its_tool_is_right_here(
     tmp_path: Path, name: str, text: str, expected: str
 ) -> None:
-    assert lesson(tmp_path, name, f"\nOne\n===\n\n{text}") == expected
+    assert lesson(tmp_path, name, f"\nOne\n===\n\n{text}", **{"conf.py": ""}) == expected
 
 
 def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
@@ -300,16 +304,3 @@ def test_links_and_signs_that_cannot_stay_are_told(tmp_path: Path) -> None:
     left = account_of(course).partition("## Left")[2]
     assert "- `:smile:`, shown as written: write the sign, if its tool draws one\n" in left
     assert "- the link of a figure to `https://a.org`, which has a number here\n" in left
-
-
-def test_fields_of_sphinx_are_a_list_without_those_for_the_tool(tmp_path: Path) -> None:
-    text = ":orphan:\n\n# One\n\n:depth: How\n  deep.\n:local:\n:class: A style.\n"
-    files = {"conf.py": "project = 'A'", "index.md": "# A\n\n```{toctree}\na\n```\n"}
-    assert lesson(tmp_path, "a.md", text, **files) == (
-        "- **depth**: How deep.\n- **class**: A style.\n"
-    )
-
-
-def test_an_assignment_of_knitr_in_a_line_shows_nothing(tmp_path: Path) -> None:
-    text = '\n---\ntitle: One\n---\n\nA `r n = "b"` word\\index{a|see{b}}.\n'
-    assert lesson(tmp_path, "a.qmd", text) == "A  word.\n"

@@ -243,7 +243,7 @@ def test_the_site_of_docusaurus_may_stand_beside_its_texts(tmp_path: Path) -> No
     files = {
         "website/docusaurus.config.js": "module.exports = {title: 'A'}",
         "website/sidebars.json": '{"docs": {"**B**{.x}": ["two/README", "one"]}}',
-        "docs/one.md": "# One\n\nIt costs $1 or $2: [](two/).\n",
+        "docs/one.md": "\n---\ntitle: One\n---\n\nIt costs $1 or $2: [](two/).\n",
         "docs/two/README.md": "# Two\n\nWords.\n",
     }
     outline, _, _ = import_map(tmp_path, files)
