@@ -27,6 +27,8 @@ _WINDOW = re.compile(
     r"^([ \t]*)(?:display\()?(?:plt|(?:\w+\.)?pyplot)\.show\([^()\n]*\)+[ \t;]*$", re.MULTILINE
 )
 """What opens a window where there is none."""
+_DISPLAY = re.compile(r"^([ \t]*)display\(", re.MULTILINE)
+"""What Jupyter shows without an import."""
 _FIGURE = re.compile(r"\b(?:plt|pyplot|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
@@ -386,7 +388,8 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
         for magic in _MAGIC.finditer(text):
             context.leave("magic", f"`{magic[0].strip()}`, which is for Jupyter alone")
         text = _drop_magics(text)
-    text = _without_host(_WINDOW.sub(r"\1pass", text), context)
+    text = _DISPLAY.sub(r"\1print(", _WINDOW.sub(r"\1pass", text))
+    text = _without_host(text, context)
     if fault := _find_fault(text):
         context.leave("cell", f"a cell that is not Python is shown and not run: {fault}")
         return ""
@@ -404,7 +407,7 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
         root: ast.expr = last.value.func
         while isinstance(root, ast.Attribute | ast.Call):
             root = root.func if isinstance(root, ast.Call) else root.value
-        drawing_names = ("print", "plt", "ax", "axs", "axes", "fig", "display")
+        drawing_names = ("print", "plt", "ax", "axs", "axes", "fig")
         if isinstance(root, ast.Name) and root.id in drawing_names:
             return text
         if not cell.shows_value:
