@@ -195,7 +195,7 @@ class Chain:
 
 def _loaded_names(code: str) -> set[str]:
     """The names that a cell takes from those above it: no statement before has given them."""
-    loaded, own = set[str](), set[str]()
+    used_names, own_names = set[str](), set[str]()
     for statement in ast.parse(code).body:
         names = set[str]()
         for node in ast.walk(statement):
@@ -208,12 +208,12 @@ def _loaded_names(code: str) -> set[str]:
                     | (ast.Import() as inner)
                     | (ast.ImportFrom() as inner)
                 ):
-                    own |= _bound_names(inner)
+                    own_names |= _bound_names(inner)
                 case _:
                     continue
-        loaded |= names - own
-        own |= _bound_names(statement)
-    return loaded
+        used_names |= names - own_names
+        own_names |= _bound_names(statement)
+    return used_names
 
 
 def _bound_names(tree: ast.AST) -> set[str]:
