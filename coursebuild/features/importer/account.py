@@ -9,10 +9,13 @@ from __future__ import annotations
 import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
+from textwrap import shorten
 
 from msgspec import Struct
 
 from coursebuild.report.values import plural
+
+Replacement = Callable[[re.Match[str]], str]
 
 
 class Leftover(Struct, frozen=True, order=True):
@@ -36,6 +39,8 @@ _MOST_PLACES = 12
 """Places of one sort of leftover that are named."""
 _MOST_LINES = 40
 """Lines on leftovers in a report of the command."""
+_MOST_WORDS = 300
+"""Characters of a message in a report of the command."""
 _MOST_ALIKE = 3
 """Leftovers with the same words that it names one by one; else the first, and some places."""
 _NAMES = re.compile(r"`[^`]*`|\(.*\)")
@@ -71,6 +76,14 @@ class Account:
         self.changed[kind, change] += 1
         self._words[kind, change].append(" ".join(words.split()))
 
+    def replace(
+        self, old: re.Pattern[str], new: str | Replacement, text: str, kind: str, change: str
+    ) -> str:
+        """Return a text with what a pattern matches replaced, and note each as changed."""
+        text, count = old.subn(new, text)
+        self.changed[kind, change] += count
+        return text
+
     def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
         """Return what a part of a text becomes, and note what that is: kept, changed or left.
 
@@ -96,7 +109,7 @@ class Account:
             groups[leftover.kind, _NAMES.sub("", leftover.message)].append(leftover)
         for alike in groups.values():
             examples = alike if len(alike) <= _MOST_ALIKE else alike[:1]
-            lines += [f"left: {leftover.position}: {leftover.message}" for leftover in examples]
+            lines += [f"left: {e.position}: {shorten(e.message, _MOST_WORDS)}" for e in examples]
             if rest := alike[len(examples) :]:
                 places = "; ".join(leftover.position for leftover in rest[:_MOST_ALIKE])
                 ellipsis = "; …" * (len(rest) > _MOST_ALIKE)

@@ -1,4 +1,4 @@
-"""The anchors and labels that texts of all dialects set, and by which they refer to places."""
+"""Anchors, labels and captions that texts of all dialects set, by which they refer to places."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from coursebuild.features.importer.context import (
 from coursebuild.features.importer.displays import normalize_formulas
 
 TARGET = re.compile(
-    r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)\((?P<name>[\w:.-]+)\)=[ \t]*"
+    r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)\((?P<name>[\w:./|@<>*+-]+)\)=[ \t]*"
     r"(?:\n+(?P<heading>#{1,6}[ \t].*))?$",
     re.MULTILINE,
 )
@@ -24,51 +24,43 @@ FIGURE = re.compile(
 )
 
 
-_FIGURE_NAME = re.compile(
-    r"\{(?P<kind>figure|table|list-table)\}[^\n]*\n"
-    r"(?:[ \t]*(?::(?!name|label)[\w-]+:|---|(?!name)\w+:)[^\n]*\n)*"
-    r"[ \t]*:?(?:name|label):[ \t]*(?P<name>\S+)"
-)
-
-
-_NUMBERED = re.compile(
-    rf"\{{(?P<kind>(?:prf:)?(?:{'|'.join(sorted(NUMBERED))})|code|code-block|sourcecode)\}}[^\n]*\n"
+_LABELLED = re.compile(
+    rf"\{{(?:prf:)?(?P<kind>{'|'.join(sorted(NUMBERED))}|figure|table|list-table|code|code-block"
+    r"|sourcecode)\}[^\n]*\n"
     r"(?:[ \t]*(?::(?!name|label)[\w-]+:|---|(?!name|label)\w+:)[^\n]*\n)*"
     r"[ \t]*:?(?:name|label):[ \t]*(?P<name>\S+)"
 )
-_LISTING = re.compile(
-    r"^[`~ \t]*\{#lst-([\w-]+)|^#\|[ \t]*(?:lst-)?label:[ \t]*lst-([\w-]+)", re.MULTILINE
+_KINDS = {"figure": "fig", "table": "tab", "list-table": "tab"}
+_CHUNK = r"^(?:`{3,})?\{r[ \t]+(?P<name>[\w.-]+)[ \t]*(?=[,}])"
+_PLACES = (
+    ("", TARGET.pattern),
+    ("sec-", r"\{#sec-(?P<name>[\w-]+)"),
+    ("", r"\{\{[a-z]+\}\}\{(?P<name>[^{}\n]+)\}"),
+    ("lst:", r"^(?:[`~ \t]*\{#|#\|[ \t]*(?:lst-)?label:[ \t]*)lst-(?P<name>[\w-]+)"),
+    ("", r"^[: \t]*\{#(?P<name>(?:fig|tbl)-[\w-]+)"),
+    ("fig-", _CHUNK),
+    ("tbl-", _CHUNK),
+    ("tab:", r"\{#tbl-(?P<name>[\w-]+)"),
+    ("", r"^\s*:(?:label|name):[ \t]*(?P<name>\S+)"),
+    ("fig:", r"^(?:#\|[ \t]*label:[ \t]*|!\[[^\n]*\{#)fig-(?P<name>[\w-]+)"),
 )
-_CHUNK = re.compile(r"^(?:`{3,})?\{r[ \t]+([\w.-]+)[ \t]*(?=[,}])", re.MULTILINE)
-_DIVISION = re.compile(r"^[: \t]*\{#((?:fig|tbl)-[\w-]+)", re.MULTILINE)
+"""What sets an anchor, by what stands before its name here."""
+_ANCHORS = [(prefix, re.compile(pattern, re.MULTILINE)) for prefix, pattern in _PLACES]
 
 
 def find_anchors(text: str) -> set[str]:
     """Return the anchors that a text of any dialect sets, `eq:name` of formulas among them."""
-    labelled = [*_FIGURE_NAME.finditer(text)]
-    figures = {label_anchor(m["name"]) for m in labelled if m["kind"] == "figure"}
-    figures |= {to_anchor(match["label"]) for match in FIGURE.finditer(text)}
-    cells = re.findall(r"^(?:#\|[ \t]*label:[ \t]*|!\[[^\n]*\{#)fig-([\w-]+)", text, re.MULTILINE)
-    figures |= {to_anchor(label) for label in cells}
-    anchors = {to_anchor(match["name"]) for match in TARGET.finditer(text)}
-    anchors |= {f"sec-{to_anchor(name)}" for name in re.findall(r"\{#sec-([\w-]+)", text)}
-    anchors |= {to_anchor(key) for key in re.findall(r"\{\{[a-z]+\}\}\{([^{}\n]+)\}", text)}
+    anchors = {f"{kind}{to_anchor(m['name'])}" for kind, p in _ANCHORS for m in p.finditer(text)}
     proofs = re.findall(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", text)
     anchors |= {f"{kind}:{to_anchor(name)}" for kind, name in proofs}
-    anchors |= {f"lst:{to_anchor(m[1] or m[2])}" for m in _LISTING.finditer(text)}
-    anchors |= {to_anchor(name) for name in _DIVISION.findall(text)}
-    anchors |= {f"{kind}-{to_anchor(n)}" for n in _CHUNK.findall(text) for kind in ("fig", "tbl")}
     anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", normalize_formulas(text)))
     labels = re.findall(r"^\s*:(?:label|name):[ \t]*(\S+)", text, re.MULTILINE)
-    anchors |= {to_anchor(label) for label in labels}
     anchors |= {f"eq:{formula_anchor(label)}" for label in labels}
-    anchors |= {f"tab:{to_anchor(label)}" for label in re.findall(r"\{#tbl-([\w-]+)", text)}
-    anchors |= {f"fig:{name}" for name in figures}
-    anchors |= {f"tab:{label_anchor(m['name'])}" for m in labelled if m["kind"] != "figure"}
-    anchors -= {to_anchor(match["name"]) for match in labelled}
-    for match in _NUMBERED.finditer(text):
-        kind, name = match["kind"].removeprefix("prf:"), to_anchor(match["name"])
-        anchors = anchors - {name} | {f"{kind if kind in NUMBERED else 'lst'}:{name}"}
+    for match in _LABELLED.finditer(text):
+        kind = match["kind"] if match["kind"] in NUMBERED else _KINDS.get(match["kind"], "lst")
+        anchor = to_anchor(match["name"])
+        name = label_anchor(match["name"]) if match["kind"] in _KINDS else anchor
+        anchors = anchors - {anchor} | {f"{kind}:{name}"}
     return anchors
 
 
@@ -78,3 +70,18 @@ def write_figure(match: re.Match[str]) -> str:
     return (
         f"Figure: ![{alt}]({match['source']}) {match['alt']} {{#fig:{to_anchor(match['label'])}}}"
     )
+
+
+MARKDOWN_FIGURE = re.compile(
+    r"^(?P<lead>[ \t]*)<figure[^<>]*>\s*(?P<picture>!\[[^\]\n]*\]\([^()\n]*\))(?:\{[^{}\n]*\})?\s*"
+    r"(?:<figcaption\b[^<>]*>\s*(?P<caption>[^<>]*?)\s*</figcaption>\s*)?</figure>[ \t]*$",
+    re.MULTILINE,
+)
+"""A picture of Markdown between tags of HTML, as MkDocs has it."""
+
+
+def write_captioned(match: re.Match[str]) -> str:
+    """Return a picture with its caption, in as many lines."""
+    caption = " ".join((match["caption"] or "").split())
+    new = f"Figure: {match['picture']} {caption}" if caption else match["picture"]
+    return match["lead"] + new + "\n" * match[0].count("\n")

@@ -49,7 +49,7 @@ _MAX_DEPTH = 20
 """Blocks that may be around another."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
 _TITLE = re.compile(r"\b(?:title|tab|filename|lst-cap|name)=(?:\"([^\"]*)\"|'([^']*)')")
-_TAB_CHANGE = "a title in bold, and what it holds: pages show one tab below the other"
+_TAB = "tab", "a title in bold, and what it holds: pages show one tab below the other"
 _HIGHLIGHT = re.compile(
     r"^[ \t]*(?:#|//|--|%|/\*|<!--|\{/\*)[ \t]*highlight-(?:next-line|start|end)\b.*\n?",
     re.MULTILINE,
@@ -91,10 +91,10 @@ def _convert(segment: Segment, context: LessonContext) -> str:
         case "!" | "?":
             names, _, title = head.partition('"')
             name = names.split()[0]
-            fold_mark = "-" if segment.mark == "???" else ""
+            is_folded = segment.mark == "???"
             title = title.rpartition('"')[0] or " ".join(names.split()[1:])
             title = "" if title in ("inline", "inline end", "end") else title
-            return _write_callout(name, title, text, context, fold_mark=fold_mark)
+            return _write_callout(name, title, text, context, is_folded)
         case "/":
             name, _, title = (part.strip() for part in head.partition("|"))
             match name:
@@ -109,7 +109,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
                         title,
                         re.sub(r"\A(?:[ ]{4}[\w-]+:.*\n?)+", "", text),
                         context,
-                        fold_mark="-" if is_folded else "",
+                        is_folded,
                     )
         case _:
             return _convert_fence(head, text, context)
@@ -129,12 +129,8 @@ def _bold_headings(text: str) -> str:
 
 
 def _write_tab(title: str, text: str, context: LessonContext) -> str:
-    _note_change(context, "tab", _TAB_CHANGE)
+    context.files.account.changed[_TAB] += 1
     return f"**{rewrite_prose(title, context).strip()}**\n\n{_convert_nested(text, context)}"
-
-
-def _note_change(context: LessonContext, kind: str, change: str) -> None:
-    context.files.account.changed[kind, change] += 1
 
 
 def _convert_division(head: str, text: str, context: LessonContext) -> str:
@@ -142,16 +138,16 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     callout = re.search(r"callout-(\w+)", head)
     attribute = _TITLE.search(head)
     title = (attribute[1] or attribute[2] or "") if attribute else ""
-    fold_mark = "-" if re.search(r"collapse=\"?true", head) else ""
+    is_folded = re.search(r"collapse=\"?true", head) is not None
     if callout is not None:
         title, text = (title, text) if title else _take_heading(text)
         label = re.search(r"#([a-z]+)-([\w-]+)", head)
         title += f" {{#{label[1]}:{to_anchor(label[2])}}}" if label else ""
-        return _write_callout(callout[1], title, text, context, fold_mark=fold_mark)
+        return _write_callout(callout[1], title, text, context, is_folded)
     plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)
     if plain is not None:  # as Docusaurus and its likes write callouts
         if plain[1] == "details":
-            return _write_callout("note", plain[2] or plain[3] or "", text, context, fold_mark="-")
+            return _write_callout("note", plain[2] or plain[3] or "", text, context, True)
         if plain[1].lower() in _CALLOUTS:
             title = plain[2] or plain[3] or ""
             return _write_callout(plain[1].lower(), title, text, context)
@@ -173,9 +169,9 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         context.leave("division", f"documentation that its tool makes from the code of `{head}`")
         return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
     if "panel-tabset" in classes:
-        _note_change(context, "tab", _TAB_CHANGE)
+        context.files.account.changed[_TAB] += 1
         return _convert_nested(_bold_headings(text), context)
-    _note_change(context, "division", "what it holds, without a frame")
+    context.files.account.changed["division", "what it holds, without a frame"] += 1
     if figure := re.search(r"#fig-([\w-]+)", head):
         return f'<a id="fig-{to_anchor(figure[1])}"></a>\n\n{_convert_nested(text, context)}'
     return _convert_nested(text, context)
@@ -240,9 +236,8 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         text = code_for_readers(cell)
         caption = options.get("fig-cap") or options.get("lst-cap") or ""
         head += f' title="{caption}"' if caption else ""
-    text, count = _HIGHLIGHT.subn("", text)
-    if count:
-        _note_change(context, "comment in code", "dropped: its tool colours the lines beside it")
+    change = "dropped: its tool colours the lines beside it"
+    text = context.files.account.replace(_HIGHLIGHT, "", text, "comment in code", change)
     title = _TITLE.search(head)
     words = re.sub(r"(?<!\\)[_*`]", r"\\\g<0>", title[1] or title[2] or "") if title else ""
     if kind in ("output", "text") or package:  # of a block that is not run here
@@ -280,12 +275,12 @@ def _callout_kind(kind: str, context: LessonContext) -> str:
 
 
 def _write_callout(
-    kind: str, title: str, text: str, context: LessonContext, *, fold_mark: str = ""
+    kind: str, title: str, text: str, context: LessonContext, is_folded: bool = False
 ) -> str:
     title, brace, label = title.partition("{#")
     title = " ".join(f"{rewrite_prose(title, context)} {brace}{label}".split())
-    head = f"[!{_callout_kind(kind, context)}]{fold_mark} {title}".rstrip()
-    _note_change(context, "callout", "a quotation that begins with its kind")
+    head = f"[!{_callout_kind(kind, context)}]{'-' * is_folded} {title}".rstrip()
+    context.files.account.changed["callout", "a quotation that begins with its kind"] += 1
     return marks.block_quote(f"{head}\n{_convert_nested(text, context)}".rstrip("\n"))
 
 
@@ -298,7 +293,7 @@ def _convert_directive(name: str, argument: str, text: str, context: LessonConte
         body,
         nested=lambda text: _convert_nested(text, context),
         callout=lambda kind, title, text, is_folded: _write_callout(
-            kind, title, text, context, fold_mark="-" if is_folded else ""
+            kind, title, text, context, is_folded
         ),
     )
     return context.convert(

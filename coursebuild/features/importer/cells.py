@@ -6,7 +6,7 @@ import ast
 import posixpath
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from msgspec.structs import replace
 
@@ -27,6 +27,8 @@ _WINDOW = re.compile(
     r"^([ \t]*)(?:display\()?(?:plt|(?:\w+\.)?pyplot)\.show\([^()\n]*\)+[ \t;]*$", re.MULTILINE
 )
 """What opens a window where there is none."""
+_DISPLAY = re.compile(r"^([ \t]*)display\(", re.MULTILINE)
+"""What Jupyter shows without an import."""
 _FIGURE = re.compile(r"\b(?:plt|pyplot|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
@@ -45,13 +47,12 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     code = runnable_code(cell, context)
     if not code:
         magic = re.match(r"\s*%%(\w+).*\n", cell.text)
-        shown_code = code_for_readers(cell).strip("\n")
-        language = magic[1].lower() if magic is not None else "python"
+        shown_code, language = code_for_readers(cell), "python"
         if magic is not None:
             shown_code = cell.text[magic.end() :].strip("\n")
             if magic[1] == "writefile":
                 shown_code = f"# {magic[0].split()[-1]}\n{shown_code}"
-            language = {"writefile": "text", "script": "text"}.get(language, language)
+            language = re.sub("writefile|script", "text", magic[1].lower())
         if language == "html":
             return rewrite_prose(shown_code, context)
         blocks = [marks.fence(language, shown_code)] if shown_code else []
@@ -71,15 +72,12 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     context.parts.append(code)
     account.changed["cell", "a part of the lesson's script"] += 1
     options = options_of(cell)
-    title = caption_of_code(options, context)
+    title = caption_of_code(options, context, ("lst-cap", "tbl-cap"))
     label = re.sub("^lst-", "", options.get("lst-label", ""))
     word += how_shown(cell) + (f" {{#lst:{to_anchor(label)}}}" if label else "")
     head, end = f"python file={context.script_path}{word}", f"\n{_END} {len(context.parts)}"
     blocks = [*title, marks.fence(head, code + end)]
-    if output := recorded_output(cell, code):
-        blocks.append(marks.fence("output", output))
-        account.taken["output that is recorded"] += 1
-        context.notebook_outputs.append((context.script_path, output))
+    blocks += write_recorded(recorded_output(cell, code), context.script_path, context)
     return "\n\n".join((*blocks, figure) if figure else blocks)
 
 
@@ -145,11 +143,15 @@ def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tup
             context.copies[f"{context.folder}/{name}"] = picture
         context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
     code = _SAVED.sub(lambda match: f'{match["call"]}"{names[match["path"]]}"', code)
-    lines = code.rstrip("\n").split("\n")
     caption = _caption_of(cell, code, context)
     label = len(names) == 1
     figures = (_write_figure(cell, name, caption, has_label=label) for name in names.values())
-    return "\n".join(lines[:-1] if lines[-1] == "pass" else lines), "\n\n".join(figures)
+    return _without_window(code), "\n\n".join(figures)
+
+
+def _without_window(code: str) -> str:
+    """Return code without what stands at its end for a window."""
+    return re.sub(r"^pass\s*\Z", "", code, flags=re.MULTILINE).rstrip("\n")
 
 
 def _caption_of(cell: Segment, code: str, context: LessonContext) -> str:
@@ -189,10 +191,7 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
     name = _keep_picture(cell, context) or f"{_picture_stem(context)}.svg"
     context.figures.append(name)
     context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
-    lines = code.rstrip("\n").split("\n")
-    if lines[-1] == "pass":
-        del lines[-1]
-    code = "\n".join((*lines, f'{pyplot}.savefig("{name}")', f'{pyplot}.close("all")'))
+    code = f'{_without_window(code)}\n{pyplot}.savefig("{name}")\n{pyplot}.close("all")'.lstrip()
     return code, _write_figure(cell, name, _caption_of(cell, code, context))
 
 
@@ -203,6 +202,14 @@ def write_outputs(cell: Segment, context: LessonContext) -> Iterator[str]:
         yield marks.fence("text", text)
     if name := _keep_picture(cell, context):
         yield f"![{context.title}]({name})"
+
+
+def write_recorded(printed: str, script: str, context: LessonContext) -> Iterator[str]:
+    """Yield what a script printed, as it is recorded, if anything is."""
+    if output := plain_output(printed):
+        context.files.account.taken["output that is recorded"] += 1
+        context.notebook_outputs.append((script, output))
+        yield marks.fence("output", output)
 
 
 def _picture_stem(context: LessonContext) -> str:
@@ -313,7 +320,7 @@ def recorded_output(cell: Segment, code: str) -> str:
         printed = _TIMES.sub("", printed)
     for text in (printed, cell.value if prints_value else ""):
         output += text and text.removesuffix("\n") + "\n"
-    return plain_output(output)
+    return output
 
 
 def plain_output(text: str) -> str:
@@ -321,9 +328,11 @@ def plain_output(text: str) -> str:
     return _ESCAPE.sub("", text).strip("\n")
 
 
-def caption_of_code(options: Mapping[str, str], context: LessonContext) -> list[str]:
-    """Return the caption of a listing, or of a table that is printed, as a paragraph, if any."""
-    captions = (options.get(name) for name in ("lst-cap", "tbl-cap"))
+def caption_of_code(
+    options: Mapping[str, str], context: LessonContext, names: Sequence[str]
+) -> list[str]:
+    """Return the caption that one of these options gives, as a paragraph, if any does."""
+    captions = (options.get(name) for name in names)
     words = " ".join(next(filter(None, captions), "").split())
     return [f"**{rewrite_prose(words, context)}**"] if words else []
 
@@ -379,7 +388,8 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
         for magic in _MAGIC.finditer(text):
             context.leave("magic", f"`{magic[0].strip()}`, which is for Jupyter alone")
         text = _drop_magics(text)
-    text = _without_host(_WINDOW.sub(r"\1pass", text), context)
+    text = _DISPLAY.sub(r"\1print(", _WINDOW.sub(r"\1pass", text))
+    text = _without_host(text, context)
     if fault := _find_fault(text):
         context.leave("cell", f"a cell that is not Python is shown and not run: {fault}")
         return ""
@@ -397,7 +407,7 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
         root: ast.expr = last.value.func
         while isinstance(root, ast.Attribute | ast.Call):
             root = root.func if isinstance(root, ast.Call) else root.value
-        drawing_names = ("print", "plt", "ax", "axs", "axes", "fig", "display")
+        drawing_names = ("print", "plt", "ax", "axs", "axes", "fig")
         if isinstance(root, ast.Name) and root.id in drawing_names:
             return text
         if not cell.shows_value:

@@ -62,6 +62,8 @@ class Chain:
         self.findings: list[tuple[Rank, str, Span | None]] = []
         self.failures: dict[int, list[str]] = {}
         """The errors of each cell that failed."""
+        self.reasons: dict[int, str] = {}
+        """Why cells are shown that cannot run, once the edits are made."""
         stderr = script_run.stderr
         notes = re.findall(rf"^{FAILURE} (\d+)\n(.*)$", stderr, re.MULTILINE)
         self._has_gone_on = bool(notes)
@@ -82,7 +84,7 @@ class Chain:
         if not self.failures or not self.is_of_cells or self.script.requires:
             return
         imports, names = self._without_modules()
-        reasons: dict[int, str] = {}
+        reasons = self.reasons
         for number, code in enumerate(self.codes):
             code = imports.get(number, code)
             errors = self.failures.get(number, [])
@@ -96,12 +98,12 @@ class Chain:
             elif errors:
                 reasons[number] = f"`{shorten(errors[0], 200, placeholder='…')}`"
             else:
-                names -= _bound_names(code)
+                names -= _bound_names(ast.parse(code))
                 continue
             if reasons[number].startswith("`"):
                 message = f": `{shorten(errors[0], 200, placeholder='…')}`, so the cell is not run"
                 self.findings.append((Rank.FAILED, message, self.parts[number].span))
-            names |= _bound_names(code)
+            names |= _bound_names(ast.parse(code))
         rest = (imports.get(n, c) for n, c in enumerate(self.codes) if n not in reasons)
         if self.modules and not any(rest):
             return  # nothing would be left of it: a key says what it requires
@@ -127,7 +129,7 @@ class Chain:
                     case _:
                         continue
                 if any(f"{name}.".startswith(f"{m}.") for name in modules for m in self.modules):
-                    names |= _bound_names(ast.unparse(statement))
+                    names |= _bound_names(statement)
                     first, last = statement.lineno - 1, statement.end_lineno or statement.lineno
                     lines[first:last] = [""] * (last - first)
             if (new := "\n".join(lines)) != code:
@@ -192,22 +194,32 @@ class Chain:
 
 
 def _loaded_names(code: str) -> set[str]:
-    """The names that a cell takes from those above it, without those that it imports itself."""
-    nodes = [*ast.walk(ast.parse(code))]
-    imports = {
-        alias.asname or alias.name
-        for node in nodes
-        if isinstance(node, ast.Import | ast.ImportFrom)
-        for alias in node.names
-    }
-    names = (n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load))
-    return {*names} - imports
+    """The names that a cell takes from those above it: no statement before has given them."""
+    used_names, own_names = set[str](), set[str]()
+    for statement in ast.parse(code).body:
+        names = set[str]()
+        for node in ast.walk(statement):
+            match node:
+                case ast.Name(id=name, ctx=ast.Load()) | ast.AugAssign(target=ast.Name(id=name)):
+                    names.add(name)
+                case (
+                    ast.For(target=inner)
+                    | ast.comprehension(target=inner)
+                    | (ast.Import() as inner)
+                    | (ast.ImportFrom() as inner)
+                ):
+                    own_names |= _bound_names(inner)
+                case _:
+                    continue
+        used_names |= names - own_names
+        own_names |= _bound_names(statement)
+    return used_names
 
 
-def _bound_names(code: str) -> set[str]:
-    """The names that a cell gives."""
+def _bound_names(tree: ast.AST) -> set[str]:
+    """The names that code gives."""
     names = set[str]()
-    for node in ast.walk(ast.parse(code)):
+    for node in ast.walk(tree):
         match node:
             case ast.Name(id=name, ctx=ast.Store()):
                 names.add(name)

@@ -18,6 +18,7 @@ from coursebuild.api import UsageError
 from coursebuild.features.importer.bookdown import read_book
 from coursebuild.features.importer.displays import read_macros
 from coursebuild.features.importer.outlines import (
+    Outline,
     find_text,
     flatten,
     leave_entry,
@@ -70,9 +71,9 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         *read_book(files),
         *_read_nav(value_at(mkdocs, "nav"), str(value_at(mkdocs, "docs_dir") or "docs"), files),
     ]
-    outline = None if parts else read_outline(files)
-    if outline is not None:
-        title, parts = outline.title or title, [*outline.parts]
+    own_outline = None if parts else read_outline(files)
+    outline = own_outline or Outline(title="", parts=tuple(parts))
+    title, parts = outline.title or title, [*outline.parts]
     parts = parts or [*_group_by_folder(files)]
     if not parts:
         left = [f"{left.path}: {left.message}" for left in files.account.leftovers[:3]]
@@ -85,7 +86,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     pages = [text for text in texts if _base_name(text.file) in _PAGES]
     if len(pages) == len(parts):  # a course has a lesson
         pages = []
-    if outline is not None:
+    if own_outline:
         pages = [*outline.pages]
     # A level for each group, and one for each run of lessons outside groups
     levels: list[ImportedLevel] = []
@@ -96,14 +97,14 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
             levels += (part for part in run if isinstance(part, ImportedLevel))
     return ImportedCourse(
         title=title or title_of_file(files.name),
-        summary=outline.summary if outline is not None else "",
-        language=outline.language if outline is not None else "",
+        summary=outline.summary,
+        language=outline.language,
         has_own_titles=True,
         substitutions=_read_substitutions(settings, files),
         macros="".join(map(read_macros, settings)),
         levels=tuple(levels),
         pages=tuple(pages),
-        has_hidden_lines=outline is not None and outline.has_hidden_lines,
+        has_hidden_lines=outline.has_hidden_lines,
     )
 
 

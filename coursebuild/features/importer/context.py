@@ -127,6 +127,11 @@ class LessonContext(Struct, frozen=True, kw_only=True):
             lines.append(line)
         return name
 
+    def add_note(self, words: str) -> str:
+        """Return the mark of a note that stands at the end of the lesson."""
+        self.notes.append(words)
+        return f"[^note-{len(self.notes)}]"
+
     def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
         """Return what a part of the text becomes, which the account notes."""
         return self.files.account.convert(kind, change, old, convert)
@@ -152,7 +157,10 @@ class LessonContext(Struct, frozen=True, kw_only=True):
             return parts.geturl()
         path = self.resolve_path(parts.path)
         anchor = f"#{parts.fragment}" if parts.fragment else ""
-        target = self.targets.get(stem_of(path)) or self.targets.get(path)
+        stem = stem_of(path)  # the first text of a folder is often called by the folder
+        folder = path if stem == path else stem.removesuffix("/index")
+        names = (stem, path, f"{folder}/index", f"{folder}/README")
+        target = next(filter(None, map(self.targets.get, names)), None)
         if target is not None:
             return target + anchor
         if path in self.files:
@@ -180,11 +188,6 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         if path.endswith(TEXTS) or stem_of(path) in self.targets or path not in self.files:
             return ""
         return self.add_file(path)
-
-    @property
-    def is_gitbook(self) -> bool:
-        """Whether only two dollar signs begin a formula: one is a dollar, `\\(` a bracket."""
-        return (self.files.folder / ".gitbook.yaml").is_file()
 
     @property
     def has_marks(self) -> bool:

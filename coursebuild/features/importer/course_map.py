@@ -219,7 +219,7 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
                 lesson.old_id if fits else next(other_ids), other_ids, used_lesson_ids
             )
             lessons.append(read(lesson, lesson_id))
-        title = level.title or f"Level {id}"
+        title = _plain_text(level.title) or f"Level {id}"
         levels.append(replace(level, id=id, title=title, lessons=tuple(lessons)))
     used_ids = {*RESERVED_IDS}
     for page in course.pages:
@@ -286,7 +286,7 @@ def _read_file(
         words = f"“{title}” is “{read.title}”"
         files.account.change("title in the map", "the title of the text itself", words)
         title = read.title
-    title = _plain_text(_ROLE.sub(r"\1", title or read.title)) or title_of_file(text.file)
+    title = _plain_text(title or read.title) or title_of_file(text.file)
     slug = slug_of(slug or title_of_file(text.file))
     if not re.search("[a-z]", slug) or (slug == "index" and not text.slug):
         slug = slug_of(title)
@@ -313,6 +313,7 @@ _ROLE = re.compile(r"\{[a-z][\w:-]*\}`([^`]*?)(?:\s*<[^`<>]*>)?`")
 
 def _plain_text(title: str) -> str:
     """The words of a title without Markdown, for the map."""
+    title = re.sub(r"\{[ ]*[.#][^{}]*\}", "", _ROLE.sub(r"\1", title))
     (inline,) = MarkdownIt("commonmark").parseInline(title)
     words = (
         " " if part.type.endswith("break") or part.content.startswith("<br") else part.content

@@ -17,7 +17,7 @@ from coursebuild.features.importer.context import NUMBERED, LessonContext, label
 from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.roles import write_link
+from coursebuild.features.importer.roles import words_of_link, write_link
 from coursebuild.features.importer.source_files import TOO_MUCH, read_yaml
 
 
@@ -242,12 +242,13 @@ def _write_card(directive: Directive, context: LessonContext) -> str:
     parts = [header, *parts, footer]
     title = rewrite_prose(directive.argument.strip(), context)
     link = directive.options.get("link", "")
-    if link and title:
+    if link:
         is_label = directive.options.get("link-type") == "ref"
         is_text = directive.options.get("link-type") == "doc" or not re.search(r"[:.#/]", link)
         address = context.resolve_anchor(to_anchor(link)) if is_label else ""
         address = address or context.resolve_link(f"{link}.md" if is_text else link)
-        title = f"[{title}]({address})" if address else title
+        if "](" not in title:
+            title = write_link(title or words_of_link(address, link), address)
     inside = (directive.nested(part).strip() for part in parts)
     return "\n\n".join(part for part in (f"**{title}**" if title else "", *inside) if part)
 

@@ -22,7 +22,7 @@ _MOST_LINES = 100_000
 """After so many lines of a file no more of it are chosen: some could be chosen again and again."""
 _MARK = re.compile(
     r"(?P<escape>\\)?\{\{[ ]*#(?P<command>include|rustdoc_include|playground|title)[ ]+"
-    r"(?P<mdbook>[^{}]*?)[ ]*\}\}"
+    r"(?P<mdbook>[^{}\s][^{}]*?)[ ]*\}\}"
     r"|\{\{<[ ]*include[ ]+(?P<quarto>\S+)[ ]*>\}\}"
     r"|\{%-?[ ]*include(?:-markdown)?[ ]+[\"'](?P<markdown>[^\"'\n]+)[\"'][^%\n]*%\}"
     r"|\{!>?[ \t]*(?P<inclusion>[^{}!\s]+)[^{}!\n]*!\}"

@@ -15,14 +15,14 @@ from msgspec.structs import replace
 
 from coursebuild.api import marks
 from coursebuild.features.importer.cells import (
+    caption_of_code,
     code_for_readers,
     how_shown,
     options_of,
-    plain_output,
     write_outputs,
+    write_recorded,
 )
 from coursebuild.features.importer.context import JoinedCells, LessonContext, to_anchor
-from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment
 
 _EXTENSIONS = {
@@ -77,14 +77,12 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     """Return a cell of this language as a script, or as code that is shown, with its output."""
     options, kind = _options_of(cell), f"cell of `{language}`"
     code = code_for_readers(replace(cell, text=_MAGIC.sub("", cell.text, count=1)))
-    captions = (options[name] for name in ("fig-cap", "lst-cap") if options.get(name))
-    caption = rewrite_prose(" ".join(next(captions, "").split()), context)
     label = options.get("label", "")
     if own_label := _own_label(cell.head):  # of which only figures and tables are referred to
         label = f"fig-{own_label}" if "fig-cap" in options else ""
         label = label or (f"tbl-{own_label}" if "caption" in code else "")
-    mark = f'<a id="{to_anchor(label)}"></a>' if label else ""
-    head = [part for part in (mark, f"**{caption}**" if caption else "") if part]
+    head = [f'<a id="{to_anchor(label)}"></a>'] if label else []
+    head += caption_of_code(options, context, ("fig-cap", "lst-cap"))
     if _SETTINGS.fullmatch(code):
         context.leave(kind, f"a {kind} that sets how its tool shows others")
         code = ""
@@ -114,10 +112,7 @@ def write_joined_cells(context: LessonContext) -> Iterator[str]:
         message = f"the cells of `{language}` are one script, which runs when `[runners]` says how"
         context.leave(f"script of `{language}`", message)
         yield marks.fence(f"{language} file={script.path} folded", "\n".join(script.lines))
-        if output := plain_output(script.printed):
-            context.files.account.taken["output that is recorded"] += 1
-            context.notebook_outputs.append((script.path, output))
-            yield marks.fence("output", output)
+        yield from write_recorded(script.printed, script.path, context)
 
 
 def _new_path(language: str, context: LessonContext) -> str:
@@ -134,9 +129,6 @@ def _own_label(head: str) -> str:
 
 def _outputs(cell: Segment, language: str, context: LessonContext) -> Iterator[str]:
     printed = cell.printed + (cell.value if language in _PRINTING else "")
-    if output := plain_output(printed):
-        context.files.account.taken["output that is recorded"] += 1
-        context.notebook_outputs.append((context.scripts[-1], output))
-        yield marks.fence("output", output)
+    yield from write_recorded(printed, context.scripts[-1], context)
     value = "" if language in _PRINTING else cell.value
     yield from write_outputs(replace(cell, printed="", value=value), context)

@@ -9,7 +9,13 @@ from __future__ import annotations
 import re
 import textwrap
 
-from coursebuild.features.importer.anchors import FIGURE, TARGET, write_figure
+from coursebuild.features.importer.anchors import (
+    FIGURE,
+    MARKDOWN_FIGURE,
+    TARGET,
+    write_captioned,
+    write_figure,
+)
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.displays import WORDS, normalize_formulas
 from coursebuild.features.importer.pandoc_tables import rewrite_tables
@@ -22,6 +28,7 @@ from coursebuild.features.importer.roles import (
     convert_tag,
     convert_wiki_link,
     tell_emoji,
+    words_of_link,
     write_link,
 )
 from coursebuild.features.importer.source_files import title_of_file
@@ -51,7 +58,8 @@ _LINE = re.compile(
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
     r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
     r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
-    r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]\[(?P<path>[A-Za-z_]\w*(?:\.\w+)+)?\])"
+    r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]"
+    r"(?:\[(?P<path>[A-Za-z_]\w*(?:\.\w+)+)?\]|(?=\[\^)))"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
     rf"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst|{'|'.join(PROOF_LABELS)})"
     r"-(?P<label>\w+(?:-\w+)*)\]?)"
@@ -60,7 +68,7 @@ _LINE = re.compile(
     r"|(?P<change>\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
-    r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{[^{}\n]*\})"
+    r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
     rf"|(?P<told>(?<![\w@.\\/])@(?P<work>{_KEY})(?:[ ]?\[[, ]*(?P<cited>[^\[\]\n@]+)\](?!\())?)"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
@@ -71,13 +79,14 @@ _LINE = re.compile(
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
-    r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:)"
+    r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:(?:\{[^{}\n]*\})?(?:[ ]|&nbsp;)*)"
     r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     r"|(?P<tag><(?i:a|img|source|video)[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
     r"|(?P<markdown>(?P<before><[a-z]\w*(?:[ ][^<>\n]*?)?)[ ]markdown(?:=[\"'\w]+)?(?=[ >]))"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
+    r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z])-{2,3}(?=[a-z]))"
     rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
 GONE = "gone:"
@@ -93,6 +102,11 @@ _MEANING = re.compile(
     re.MULTILINE,
 )
 """A term in a paragraph of its own, and what it means, once or more, each behind a colon."""
+_FIELDS = re.compile(
+    r"(?<![^\n]\n)(?:^:[A-Za-z][\w -]*:(?:[ \t]+\S[^\n]*)?(?:\n[ \t]+\S[^\n]*)*\n?)+^(?!.)",
+    re.MULTILINE,
+)
+"""A paragraph of lines such as `:name: words`, a list of fields in Sphinx."""
 _ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
 _EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
@@ -105,8 +119,9 @@ _COMMENT = re.compile(
 )
 """A comment of MyST or Obsidian, or the break of MyST between two cells."""
 _COMMENT_AS_HEADING = re.compile(
-    r"^(#{1,6})[ \t]+<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$", re.MULTILINE
+    r"^(#{1,6}[ \t]+)?<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$(?(1)|(?=\n+:[ \t]))", re.MULTILINE
 )
+"""Or as a term whose meaning is below it."""
 _CONTENTS = re.compile(
     r'<div class="toc">.*?</div>|^(?:\[TOC\]|\[\[_?TOC_?\]\])[ \t]*$', re.DOTALL | re.M
 )
@@ -116,8 +131,6 @@ _SETTINGS = re.compile(
     re.MULTILINE,
 )
 """Settings of Pandoc, which takes them anywhere."""
-
-
 _KEPT = {
     re.compile(r"^[ >]*#{1,6}[ \t]+\S", re.MULTILINE): "heading",
     re.compile(
@@ -172,6 +185,7 @@ _KINDS = {
     "tag": ("tag of HTML", "its new address"),
     "markdown": ("tag of HTML", "without `markdown`: its text always is"),
     "attributes": ("attributes", "an anchor, or dropped: a page has its own look"),
+    "dashes": ("dashes", "the sign that its tool draws"),
     "span": ("attributes", "its words alone"),
 }
 """The kind of what a group of `_LINE` is, and how it is changed."""
@@ -193,42 +207,33 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         context.line_below(line).leave("table or verse of Pandoc", message)
 
     text, count = rewrite_tables(text, leave_grid)
-    if count:
-        change = "its rows between bars, a cell in one line; or a verse in lines that end"
-        account.changed["table or verse of Pandoc", change] += count
-    text, count = _MARKDOWN_FIGURE.subn(_write_captioned, text)
-    if count:
-        account.changed["figure", "a picture with its caption"] += count
-    text, count = _CONTENTS.subn("", text)
-    if count:
-        account.changed["table of contents", "dropped: the site has its own"] += count
+    change = "its rows between bars, a cell in one line; or a verse in lines that end"
+    account.changed["table or verse of Pandoc", change] += count
+    change = "a picture with its caption"
+    text = account.replace(MARKDOWN_FIGURE, write_captioned, text, "figure", change)
+    change = "dropped: the site has its own"
+    text = account.replace(_CONTENTS, "", text, "table of contents", change)
     if context.path.endswith((".qmd", ".Rmd")):
         text = _SETTINGS.sub("", text)
-    text, count = _COMMENT_AS_HEADING.subn(r"\1 `\2`", text)
-    if count:
-        change = "the words of a heading that has no others: its tool replaces it"
-        account.changed["comment", change] += count
+    change = "the words of a heading or term that has no others: its tool replaces it"
+    text = account.replace(_COMMENT_AS_HEADING, r"\1`\2`", text, "comment", change)
     for pattern, kind in _KEPT.items():
-        if count := len(pattern.findall(text)):
-            account.taken[kind] += count
-    text, count = _COMMENT.subn(_write_comment, text)
-    if count:
-        account.changed["comment of MyST", "a comment of HTML"] += count
+        account.taken[kind] += len(pattern.findall(text))
+    change = "a comment of HTML"
+    text = account.replace(_COMMENT, _write_comment, text, "comment of MyST", change)
     text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
-    text, count = TARGET.subn(write_target, text)
-    if count:
-        account.changed["label", "an anchor"] += count
+    text = account.replace(TARGET, write_target, text, "label", "an anchor")
     for abbreviation in _ABBREVIATION.finditer(text):
         message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
         context.leave("abbreviation", message)
     text = _ABBREVIATION.sub("", text)
-    text, count = _MEANING.subn(_write_meanings, text)
-    if count:
-        account.changed["definition", "behind its term, which is bold"] += count
-    text, count = _CAPTION.subn(_move_caption, text)
-    if count:
-        account.changed["caption of a table", "stands above it"] += count
+    if "conf.py" in context.files:
+        change = "a list; dropped where no field says a word"
+        text = account.replace(_FIELDS, _write_fields, text, "list of fields", change)
+    change = "behind its term, which is bold"
+    text = account.replace(_MEANING, _write_meanings, text, "definition", change)
+    text = account.replace(_CAPTION, _move_caption, text, "caption of a table", "stands above it")
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         edge = _EDGE.match(line)
@@ -243,21 +248,6 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     return FIGURE.sub(write_figure, "\n".join(out))
 
 
-_MARKDOWN_FIGURE = re.compile(
-    r"^(?P<lead>[ \t]*)<figure[^<>]*>\s*(?P<picture>!\[[^\]\n]*\]\([^()\n]*\))(?:\{[^{}\n]*\})?\s*"
-    r"(?:<figcaption\b[^<>]*>\s*(?P<caption>[^<>]*?)\s*</figcaption>\s*)?</figure>[ \t]*$",
-    re.MULTILINE,
-)
-"""A picture of Markdown between tags of HTML, as MkDocs has it."""
-
-
-def _write_captioned(match: re.Match[str]) -> str:
-    """Return a picture with its caption, in as many lines."""
-    caption = " ".join((match["caption"] or "").split())
-    new = f"Figure: {match['picture']} {caption}" if caption else match["picture"]
-    return match["lead"] + new + "\n" * match[0].count("\n")
-
-
 def _write_comment(match: re.Match[str]) -> str:
     """Return a comment as one of HTML; nothing for a mark that says nothing."""
     words = (match["inner"] or match["lines"] or match["line"] or match["data"] or "").strip()
@@ -268,6 +258,12 @@ def _join_lines(match: re.Match[str]) -> str:
     """Return a role or note on one line, and behind it the line ends that stood in it."""
     lines = match[0].split("\n")
     return " ".join(line.strip() for line in lines) + "\n" * (len(lines) - 1)
+
+
+def _write_fields(match: re.Match[str]) -> str:
+    """Return fields as items of a list; those without words are for the tool."""
+    fields = re.findall(r"^:([^:\n]+):[ \t]+(\S[^\n]*(?:\n[ \t][^\n]*)*)", match[0], re.MULTILINE)
+    return "".join(f"- **{name}**: {' '.join(words.split())}\n" for name, words in fields)
 
 
 def _write_meanings(match: re.Match[str]) -> str:
@@ -331,31 +327,30 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             context.leave("picture", f"the picture `{source}`, which is not in the folder")
             return alt
         case "link":
-            text, address = match["text"], context.resolve_link(match["address"].strip("<>"))
-            if not text and not re.match("#|lesson:|page:", address):  # its tool knows a title
-                text = title_of_file(re.split("[:#]", match["address"])[-1])
-            return write_link(_rewrite_line(text, context), address, match["title"] or "")
+            address = context.resolve_link(match["address"].strip("<>"))
+            text = _rewrite_line(match["text"], context) or words_of_link(address, match["address"])
+            return write_link(text, address, match["title"] or "")
         case "anchor" | "icon":
             return ""
         case "object":
             called = match["called"]
             if (match["path"] or called).casefold() in context.references:
-                return whole
+                # What stands before a note would be called by it
+                return whole if len(whole) > len(called) + 2 else f"{whole}[]"
             is_path = match["path"] is not None or re.fullmatch(
                 r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called
             )
             return _rewrite_line(called, context) if is_path else whole
-        case "paren" if context.is_gitbook:
+        case "paren" if not context.files.has_dollars:
             return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":
             return f"${match['inner'].strip()}$"
         case "square":
             return f"$${match['shown_tex'].strip()}$$"
         case "note":
-            context.notes.append(_rewrite_line(match["remark"], context))
-            return f"[^note-{len(context.notes)}]"
+            return context.add_note(_rewrite_line(match["remark"], context))
         case "math":
-            if context.is_gitbook and whole[:2] != "$$":
+            if not context.files.has_dollars and whole[:2] != "$$":
                 return rf"\${_rewrite_line(whole[1:-1], context)}\$"
             formula = whole.replace("&lt;", "<").replace("&gt;", ">")  # as some notebooks hold it
             if _WORD.search(formula):
@@ -365,13 +360,15 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)
             return re.sub(r"(?<!\\)\|", r"\\|", code) if is_cell else code
-        case "digits" if context.is_gitbook:
+        case "digits" if not context.files.has_dollars:
             return whole.replace("$", r"\$")
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":
             return convert_cross_reference(whole, match["kind"], match["label"], context)
         case "cite":
+            if whole[1:-1].casefold() in context.references:
+                return whole.replace("@", r"\@")
             keys = _CITED_KEY.findall(whole)
             if any(key.partition("-")[0] in _CROSS_KINDS for key in keys):
                 return _rewrite_line(whole[1:-1], context)
@@ -430,12 +427,15 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return convert_tag(whole, context)
         case "markdown":  # a tag whose text is Markdown, as it always is here
             return match["before"]
+        case "dashes":
+            return "–—"[len(whole) - 2] if context.files.has_signs(context.path) else whole
         case "attributes":
             return convert_attributes(match)
         case "span":
             label = re.search(r"\]\{[ ]*#([\w-]+)", whole)
             anchor = f'<a id="{to_anchor(label[1])}"></a>' if label else ""
-            return anchor + _rewrite_line(match["words"], context)
+            words = _rewrite_line(match["words"], context)
+            return anchor + (context.add_note(words) if ".aside" in whole else words)
         case _:
             return whole
 

@@ -7,6 +7,7 @@ replaces, or code that its tool runs.
 from __future__ import annotations
 
 import re
+from urllib.parse import urlsplit
 
 from coursebuild.features.importer.context import (
     PROOF_LABELS,
@@ -20,6 +21,13 @@ from coursebuild.features.importer.source_files import title_of_file
 def write_link(text: str, address: str, title: str = "") -> str:
     """Return a link; its text alone where there is no address."""
     return f"[{text}]({address}{title})" if address else text
+
+
+def words_of_link(address: str, old: str) -> str:
+    """Return what a link without words is called; nothing where the page knows the title."""
+    if re.match("#|lesson:|page:", address):
+        return ""
+    return urlsplit(address).hostname or title_of_file(re.split("[:#]", old)[-1])
 
 
 def convert_role(name: str, body: str, context: LessonContext) -> str:
@@ -71,6 +79,8 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             return f"`{words or target}`"
         case _ if name in _WORD_ROLES:
             return words or body
+        case _ if _ICON_ROLE.fullmatch(name):
+            return ""
         case _:
             message = f"the role `{{{name}}}`, whose text is code now: write what it stands for"
             context.leave(f"role `{{{name}}}`", message)
@@ -82,6 +92,7 @@ _CODE_ROLES = frozenset(
     "attribute data const exc exception obj object type".split()
 )
 _WORD_ROLES = frozenset("abbr chem dfn guilabel menuselection raw sc smallcaps span term".split())
+_ICON_ROLE = re.compile(r"octicon|fa[bsr]?|material-\w+")
 _INLINE_RUN = re.compile(r"`(?:\{(python|r|julia)\}|r)[ ]+([^`]+)`")
 _LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)[\w-]+[ ]+")
 """The language of code in a line, as MkDocs marks it."""
@@ -97,6 +108,9 @@ def convert_code(whole: str, context: LessonContext) -> str:
     run = _INLINE_RUN.fullmatch(whole)
     if run is None:
         return _LANGUAGE.sub(r"\1", whole)
+    if run[1] is None and re.match(r"[\w.]+[ ]*(?:<-|=(?!=))", run[2]):
+        context.leave("code in a line", f"{whole}, which shows nothing: set the name in a cell")
+        return ""
     name = context.print_value(run[1] or "r", run[2])
     return _ask_value("code in a line", name, run[2], whole, context)
 

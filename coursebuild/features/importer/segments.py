@@ -28,7 +28,7 @@ _TITLED = re.compile(
 )
 _CELL = re.compile(r"\{code-cell\}(?:[ \t]+i?python3?\b.*)?|\{(?:python|ipython3?)[^}]*\}")
 _FRONT_MATTER = re.compile(
-    r"---[ \t]*\n(?P<yaml>.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
+    r"(?:[ \t]*\n)*---[ \t]*\n(?P<yaml>.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
     r"|\+\+\+[ \t]*\n(?P<toml>.*?\n)?\+\+\+[ \t]*(?:\n|\Z)",
     re.DOTALL,
 )
@@ -252,9 +252,14 @@ def _parse_marked(state: StateBlock, start: int, end: int, silent: bool) -> bool
     opening = match_mark(start)
     if opening is None or not re.match(r"." if opening[1][0] == ":" else r"[A-Za-z]", opening[2]):
         return False
-    depth, last = 1, start
+    depth, last, fence = 1, start, ""
     while depth and last + 1 < end:
         last += 1
+        line = state.getLines(last, last + 1, state.blkIndent, False).strip()
+        if edge := re.match("`{3,}(?=[^`]*$)|~{3,}", line):  # marks within code are its text
+            fence = edge[0] if not fence else fence * (not line.startswith(fence))
+        if fence:
+            continue
         mark = match_mark(last)
         if mark is not None and mark[1][0] == opening[1][0] == ":":
             depth += 1 if mark[2] else -1

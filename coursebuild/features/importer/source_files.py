@@ -14,6 +14,7 @@ import stat
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, ValuesView
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -233,6 +234,25 @@ class SourceFiles:
 
     def __contains__(self, path: str) -> bool:
         return path in self._real_paths
+
+    @cached_property
+    def has_dollars(self) -> bool:
+        """Whether a dollar begins a formula: in GitBook two do, in Docusaurus an extension says.
+
+        Else it is a dollar, and `\\(` a bracket.
+        """
+        settings = [path for path in self if re.search(r"(^|/)docusaurus\.config\.\w+$", path)]
+        has_none = bool(settings) and "math" not in "".join(map(self.read_text, settings))
+        return not has_none and not (self.folder / ".gitbook.yaml").is_file()
+
+    def has_signs(self, path: str) -> bool:
+        """Whether the tool of a text draws hyphens in a row as a dash."""
+        signs = "smart-punctuation = true"
+        return (
+            path.endswith((".qmd", ".Rmd"))
+            or "conf.py" in self
+            or ("book.toml" in self and signs in self.read_text("book.toml"))
+        )
 
     def find(self, path: str) -> str:
         """Return the path of a file, given perhaps with links to folders; empty for no file."""

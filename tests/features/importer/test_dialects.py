@@ -224,6 +224,10 @@ TABLE = "| a | b |\n|---|---|\n| `{n}` | c |\n| `{n,}` | d |\n"
         ("a.qmd", CALLOUT, '> [!note] Norms\n> <a id="iso"></a>\n> Text.\n'),
         ("a.qmd", "A.\n\n---\neval: false\n---\n\nB.\n", "A.\n\n\n\nB.\n"),
         ("a.md", "A.\n\n---\neval: false\n---\n\nB.\n", "A.\n\n---\neval: false\n---\n\nB.\n"),
+        ("a.qmd", "A `r n = 1` b\\index{a|see{b}}.\n", "A  b.\n"),
+        ("a.md", ":orphan:\n\nA.\n\n:b: How\n  deep.\n:c:\n", "A.\n\n- **b**: How deep.\n"),
+        ("a.qmd", "A -- b---c.[d]{.aside}\n", "A – b—c.[^note-1]\n\n[^note-1]: d\n"),
+        ("a.md", "<!-- a.b -->\n\n:   C.\n\n<!-- d -->\n", "**`a.b`**: C.\n\n<!-- d -->\n"),
         ("a.md", TABLE, TABLE),
         ("a.md", '## B { #b data-label="C \\"d\\"" }\n\nText.\n', "## B {#b}\n\nText.\n"),
         ("a.md", "A.\n\n # B\n\nText.\n", "A.\n\n## B\n\nText.\n"),
@@ -234,7 +238,7 @@ TABLE = "| a | b |\n|---|---|\n| `{n}` | c |\n| `{n,}` | d |\n"
 def test_what_is_right_in_its_tool_is_right_here(
     tmp_path: Path, name: str, text: str, expected: str
 ) -> None:
-    assert lesson(tmp_path, name, f"\nOne\n===\n\n{text}") == expected
+    assert lesson(tmp_path, name, f"\nOne\n===\n\n{text}", **{"conf.py": ""}) == expected
 
 
 def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
@@ -268,6 +272,17 @@ def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
             "```python file=examples/l1_1_a.py folded\ntry:\n    import os\nexcept ImportError:\n"
             "    pass\n```",
         ),
+        ("[@b] ([@b])\n\n[@b]: https://a.org", r"[\@b] ([\@b])" + "\n\n" + r"[\@b]: https://a.org"),
+        ("[B][^1].\n\n[B]: https://b.org\n[^1]: C.", "[B][][^1].\n\n[B]: https://b.org\n[^1]: C."),
+        ("- :material-x:{ .lg } &nbsp; __A__\n\n  ---", "- __A__\n\n  ---"),
+        ("{octicon}`law;1em` B [:material-x:](https://a.org/b)", " B [a.org](https://a.org/b)"),
+        ("(a/b)=\n## B\n\n[c](#a/b)", "## B {#a-b}\n\n[c](#a-b)"),
+        ("::::{note}\n```\n:::\n```\n::::\n\nB.", "> [!note]\n> ```\n> :::\n> ```\n\nB."),
+        (
+            ":::{grid-item-card} {ref}`at`\n:link: at\n:link-type: ref\n:::\n\n(at)=\n## B",
+            "**[B](#at)**\n\n## B {#at}",
+        ),
+        ("`{{ #include }}`", "`{{ #include }}`"),
         (
             '```{code-cell}\nprint("%d"\n      % 3)\n```',
             '```python file=examples/l1_1_a.py\nprint("%d"\n      % 3)\n```',

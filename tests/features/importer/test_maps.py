@@ -237,3 +237,16 @@ def test_a_text_of_r_markdown_is_a_lesson_and_so_is_one_with_a_long_extension(
     course = convert(SourceFiles(tmp_path))
     assert b"**A plot**\n\n```r\nplot(x)\n```" in course.files["content/lessons/1.1-a.md"]
     assert b"[back](lesson:1.1)" in course.files["content/lessons/1.2-b.md"]
+
+
+def test_the_site_of_docusaurus_may_stand_beside_its_texts(tmp_path: Path) -> None:
+    files = {
+        "website/docusaurus.config.js": "module.exports = {title: 'A'}",
+        "website/sidebars.json": '{"docs": {"**B**{.x}": ["two/README", "one"]}}',
+        "docs/one.md": "\n---\ntitle: One\n---\n\nIt costs $1 or $2: [](two/).\n",
+        "docs/two/README.md": "# Two\n\nWords.\n",
+    }
+    outline, _, _ = import_map(tmp_path, files)
+    assert outline == [("B", ["Two", "One"])]
+    text = convert(SourceFiles(tmp_path)).files["content/lessons/1.2-one.md"].decode()
+    assert text == "It costs \\$1 or \\$2: [Two](lesson:1.1).\n"

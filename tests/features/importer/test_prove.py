@@ -94,7 +94,7 @@ def test_a_cell_that_fails_costs_only_those_that_need_it(folder: Path) -> None:
         "print(height)",
         plot + "plt.show()",
         "print(missing)",
-        "print('at the end')",
+        "height = 2\nheight += 1\ndisplay(height)",
     )
     write_notebook(folder / "old/b.ipynb", "1 / 0")
     write_notebook(folder / "old/c.ipynb", f"import {ABSENT}", f"{ABSENT}.run()")
@@ -108,7 +108,7 @@ def test_a_cell_that_fails_costs_only_those_that_need_it(folder: Path) -> None:
     assert "height = 1 / 0\n```\n\n*Not run here:* `ZeroDivisionError: division by zero`" in text
     assert "print(height)\n```\n\n*Not run here:* it needs `height`" in text
     assert "*Not run here:* `NameError: name 'missing' is not defined`" in text
-    assert "```output\nat the end\n```" in text
+    assert "print(height)\n```\n\n```output\n3\n```" in text
     assert lesson(folder / "new", "1.2-b").startswith(
         "```python\n1 / 0\n```\n\n*Not run here:* `Zero"
     )

@@ -100,7 +100,7 @@ def prove(options: Options, most_seconds: float) -> Findings:
         for module in cells.modules:
             findings.add(Rank.MISSING, f"{script.path}: {name_package(module, options)}")
         if cell_edits or script_run.outcome is Outcome.OK:
-            failing_parts = cells.failures if cell_edits else ()
+            failing_parts = {*cells.failures, *cells.reasons} if cell_edits else ()
             edits[script.span.source] += _record_outputs(
                 script, script_run, course, options, findings, failing_parts
             )
