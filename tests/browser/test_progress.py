@@ -53,8 +53,8 @@ def test_answers_and_lessons_show_on_the_map_at_once_in_another_tab(
     end.get_by_role("button", name="Mark as read").click()
     expect(end.get_by_role("status")).to_have_text("You have read this lesson.")
     expect(end.get_by_role("button")).to_have_text("Mark as not read")
-    beside = lesson.locator(".level-nav")
-    expect(beside.locator("a", has=lesson.locator(".tick"))).to_have_text(
+    lesson_list = lesson.locator(".level-nav")
+    expect(lesson_list.locator("a", has=lesson.locator(".tick"))).to_have_text(
         "1.1 Push & <em>pull</em> read"
     )
     expect_mark(home, "1.1", "read1/3")
