@@ -12,9 +12,9 @@ import pytest
 
 from mjbench.bench import CompiledModel, compile_subject
 from mjbench.cli import main
+from mjbench.cones import find_references
 from mjbench.delays import loop_note
 from mjbench.host import LocalHost
-from mjbench.known_motion import find_references
 from mjbench.loop import Loop, read_loop
 from mjbench.parts import Parts
 from mjbench.pilot import run_pilot
