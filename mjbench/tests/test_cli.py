@@ -225,6 +225,12 @@ def test_what_is_known_is_printed_when_the_user_interrupts(tmp_path: Path) -> No
     assert "the scenario step was not measured" not in out
 
 
+def test_minutes_that_are_over_stop_it_as_the_user_does(tmp_path: Path, capsys: Any) -> None:
+    (tmp_path / "spring.xml").write_text(SPRING)
+    assert main([str(tmp_path / "spring.xml"), "--quick", "--minutes", "0"]) == 130
+    assert "mjbench: stopped" in capsys.readouterr().err
+
+
 @pytest.mark.long
 def test_an_integrator_that_fails_takes_nothing_else_with_it(tmp_path: Path) -> None:
     condition = "model.opt.integrator == 1"  # RK4
