@@ -59,8 +59,8 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
             motions[cone] = self_reference(variant, pilot, quick=quick)
     count = min(len(motion.states.times) for motion in (reference, *motions.values()))
     limits = {cone: _until(model, motion, count) for cone, motion in motions.items()}
-    closed = _until(model, reference, count) if reference.kind == "closed" else None
-    truth = closed or limits["elliptic"]
+    exact = _until(model, reference, count) if reference.kind == "closed" else None
+    truth = exact or limits["elliptic"]
     cones = {}
     for cone, limit in limits.items():
         sticks = find_sticks(model, scene, limit.states)
@@ -71,9 +71,9 @@ def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[st
         gap = motion_gap(model, limit.states, truth.states).place
         least = FLOORS * max(limit.floor.place, truth.floor.place)
         visible = 0.0
-        if closed is None and gap > least:
+        if exact is None and gap > least:
             visible = visible_error(model, scene, limit.states, truth.states)
-        cones[cone] = Cone(closed or limit, max(gap, least), visible, sticks, is_held)
+        cones[cone] = Cone(exact or limit, max(gap, least), visible, sticks, is_held)
     return cones
 
 

@@ -71,9 +71,9 @@ def loop_note(model: Any, pilot: Pilot, reference: EngineStates) -> str:
             else f"at no delay longer than {loop.delay:.3g} s"
         )
     span = f"for the {scene.scenario.duration:.3g} s of the scenario"
-    kept = "small differences do not grow" if is_calm else f"it stays bounded {span}"
+    clause = "small differences do not grow" if is_calm else f"it stays bounded {span}"
     return (
-        f"with {Path(loop.path).name} every {loop.period:.3g} s {kept} {bounds[0]}, and it stays "
+        f"with {Path(loop.path).name} every {loop.period:.3g} s {clause} {bounds[0]}, and it stays "
         f"near the motion of small steps {span if is_calm else 'for as long'} {bounds[1]}, at the "
         "scene's own setting"
     )
@@ -86,6 +86,6 @@ def _grows(model: Any, setup: Setup) -> bool:
     mujoco.mj_integratePos(model, data.qpos, position, 1.0)
     start = {"qpos": tuple(data.qpos), "qvel": tuple(data.qvel + velocity)}
     nudged = replace(setup, scenario=replace(setup.scenario, **start))
-    own, near = (simulate(each, model).states.qvel for each in (setup, nudged))
-    first, second = np.array_split(near - own, 2)
+    differences = simulate(nudged, model).states.qvel - simulate(setup, model).states.qvel
+    first, second = np.array_split(differences, 2)
     return not np.linalg.norm(second) <= (1 + _RESOLUTION) * np.linalg.norm(first)

@@ -206,8 +206,8 @@ def test_the_page_begins_with_a_picture_of_cases_and_integrators(make: Make) -> 
     costs = (StepCost("RK4", interval(1e-6)),)
     cheap = case("cheap", 4, errors=(run(integrator="RK4", position=(1e-4, 1e-4)),), costs=costs)
     cases = (case("spring", 5), replace(case("lost", 5), boundaries=(lost,), orders=()), cheap)
-    made = make("## A\n\nText.\n").site(reports=Reports(cases=cases))
-    files = {path: data.decode() for path, data in made.items() if path.endswith(("html", "md"))}
+    outputs = make("## A\n\nText.\n").site(reports=Reports(cases=cases))
+    files = {path: data.decode() for path, data in outputs.items() if path.endswith(("html", "md"))}
     page = files["numerics/index.html"]
     rows = picture(page)
     assert rows["A &lt;spring&gt;"] == [
@@ -218,9 +218,9 @@ def test_the_page_begins_with_a_picture_of_cases_and_integrators(make: Make) -> 
     assert rows["A &lt;lost&gt;"] == ["none", "–", "–", "–", "–", "–", "–"]
     *_, cost = rows["A &lt;cheap&gt;"][-5:-1]
     assert rows["A &lt;cheap&gt;"][-1] == "–" and cost.endswith("s (0)"), "the only one so exact"
-    copied = [line.split(" | ") for line in files["numerics/index.md"].splitlines()]
-    [copied_cost] = [n for line in copied for n, cell in enumerate(line) if cell == cost[:-4]]
-    assert copied_cost == 14, "in the same column as on the page"
+    table = [line.split(" | ") for line in files["numerics/index.md"].splitlines()]
+    [column] = [n for line in table for n, cell in enumerate(line) if cell == cost[:-4]]
+    assert column == 14, "in the same column as on the page"
     heads = re.findall(r'<th scope="col">(.*?)</th>', page)
     assert heads[1:] == ["Euler", "implicit", "implicitfast", "RK4", "discrete"] * 3
     assert 'href="case-5.html#spring"' in page and 'id="spring"' in files["numerics/case-5.html"]
