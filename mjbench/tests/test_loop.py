@@ -111,7 +111,7 @@ def compiled_loop(model: Path, policy: str, scenario: str) -> CompiledModel:
 
 
 @pytest.mark.long
-def test_a_loop_is_stable_up_to_the_timestep_and_the_delay_of_theory(model: Path) -> None:
+def test_a_loop_is_stable_up_to_the_timestep_of_theory(model: Path) -> None:
     policy = f"""
 period = 0.01
 def control(model, data):
