@@ -6,6 +6,7 @@ import _thread
 import argparse
 import hashlib
 import shutil
+import signal
 import sys
 import threading
 import time
@@ -228,6 +229,8 @@ def _measure_scene(
     scenarios: list[ScenarioReport] = []
     parts, limit = Parts(), threading.Timer(60 * minutes, _thread.interrupt_main)
     limit.daemon = True
+    if minutes < _MONTH:  # a job in the background ignores what stops it
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     limit.start()
 
     def scenario(number: int) -> None:
