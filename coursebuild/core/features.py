@@ -161,6 +161,10 @@ class PageKind(Struct, frozen=True, kw_only=True):
     draw: Callable[[Renderer, Mapping[str, Any]], Markup] | None = None
     """The content below the page's title. Without it, the template `NAME.html` is used."""
     exists: Callable[[Library], bool] = lambda library: True
+    parts: Callable[[Library], Iterable[str]] = lambda library: ()
+    """The ids of further pages, each at `NAME/ID.html`, that are drawn by `NAME-part.html`."""
+    part_values: Callable[[Library, str], Mapping[str, object]] = lambda library, part: {}
+    """Everything that one of these shows of the course, with its `title`."""
     order: int = 100
     """Its place in the foot of every page, the lowest first."""
     indexed: bool = True
@@ -171,6 +175,10 @@ class PageKind(Struct, frozen=True, kw_only=True):
     @property
     def path(self) -> str:
         return f"{self.name}/index.html"
+
+    def part_path(self, part: str) -> str:
+        """The path of a further page."""
+        return f"{self.name}/{part}.html"
 
 
 class ModelPart(Struct, frozen=True, kw_only=True):

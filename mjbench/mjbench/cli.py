@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import _thread
 import argparse
 import hashlib
 import shutil
+import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -51,6 +54,8 @@ Measures MuJoCo models: speed against error of every integrator and timestep, th
 timestep, and what a model could do without. `mjbench MODEL.xml` is `mjbench bench MODEL.xml`.
 """
 _T = TypeVar("_T")
+_MONTH = 30 * 24 * 60.0
+"""Minutes, after which a measurement ends that has no other limit."""
 _STOPPED = 130
 """The exit status of a command that the user stopped."""
 
@@ -109,6 +114,8 @@ def _parser() -> argparse.ArgumentParser:
     help = "measure other engines instead: all, or some, as in mjx,warp"
     command.add_argument("--engines", nargs="?", const="", metavar="NAMES", help=help)
     command.add_argument("--quick", action="store_true", help="fewer settings and rough times")
+    help = "after which it stops, as with Ctrl-C, and says what is known"
+    command.add_argument("--minutes", type=float, default=_MONTH, metavar="M", help=help)
     help = "say where the time goes, by phase, under the settings that the verdict compares"
     command.add_argument("--profile", action="store_true", help=help)
     help = "write a page with verdicts, plots and tables"
@@ -184,7 +191,12 @@ def _bench(arguments: argparse.Namespace) -> int:
         subject, host, quick=quick, loop=loop, task=arguments.task
     )
     scene, is_stopped = _measure_scene(
-        compiled_model, host, quick=quick, timed=timed, profile=arguments.profile
+        compiled_model,
+        host,
+        quick=quick,
+        timed=timed,
+        profile=arguments.profile,
+        minutes=arguments.minutes,
     )
     if recorded is not None:
         departures = scene_departures(recorded, scene, compiled_model.declarations.bench)
@@ -211,10 +223,15 @@ def _measure_scene(
     quick: bool,
     timed: bool,
     profile: bool,
+    minutes: float,
 ) -> tuple[SceneReport, bool]:
-    """A model in all of its scenarios and sweeps, and whether the user stopped it."""
+    """A model in all of its scenarios and sweeps, and whether the user or the time stopped it."""
     scenarios: list[ScenarioReport] = []
-    parts = Parts()
+    parts, limit = Parts(), threading.Timer(60 * minutes, _thread.interrupt_main)
+    limit.daemon = True
+    if minutes < _MONTH:  # a job in the background ignores what stops it
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    limit.start()
 
     def scenario(number: int) -> None:
         try:
@@ -239,6 +256,7 @@ def _measure_scene(
         run = partial(bench.run_sweep, compiled_model, sweep.name, host, quick=quick, timed=timed)
         report = parts.run(f"the sweep {sweep.name}", run, None)
         sweeps += [] if report is None else [report]
+    limit.cancel()
     join = partial(bench.join_parts, compiled_model, scenarios, sweeps, host, quick=quick)
     return join(card=not parts.stopped, failures=parts.failures), parts.stopped
 

@@ -380,7 +380,7 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
         error = f"errs by {'' if is_known else 'less than '}{rounded_text(value, 2)}"
         error += f" in {quantity.label}"
         if quantity.name == "step_error" and row.seen is not None and row.seen > value:
-            error += f", and by {rounded_text(row.seen, 2)} with the model of contacts"
+            error += f", and by at most {rounded_text(row.seen, 2)} with the model of contacts"
         error += parts_text(report.parts)
     better, *_ = report.verdict.text.split("; the scene's own error")
     lines = [speed, error, better, stability_text(report)]

@@ -11,10 +11,6 @@
    integration in reasonable time, only the engine itself is left: in small steps, and again in
    steps twice as long under another integrator. This reference is called `self`.
 4. A motion counts only as long as it is known: where two integrations part, the horizon ends.
-5. Errors under a cone are those of the timestep and the solver: they are measured against what the
-   engine tends to under that cone in small steps. What remains then is the model's own error:
-   against the closed form where the scenario names one, else of a pyramid against the cone that it
-   stands for.
 """
 
 from __future__ import annotations
@@ -32,19 +28,12 @@ from mjbench import integrate
 from mjbench.cases import closed_motion, floor
 from mjbench.declarations import DeclaredScenario, Place
 from mjbench.measure import (
-    Sticks,
     errors,
-    find_sticks,
-    friction_holds,
     largest_errors,
-    quantity_errors,
-    quantity_name,
-    visible_error,
 )
 from mjbench.pilot import NUDGE, Pilot, horizon_errors, position_distances
 from mjbench.problem import ROUNDING, Integrator, Setup, Sizes
-from mjbench.reports.scene_report import FLOORS
-from mjbench.scene import ExactMotion, Scene, SceneError
+from mjbench.scene import ExactMotion, SceneError
 from mjbench.settings import CONES
 from mjbench.simulation import (
     EngineStates,
@@ -124,7 +113,7 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         subject = f"`{exact.path}`, `{name}`," if len(motions) > 1 else f"`{exact.path}`"
         precision = _check_exact(model, pilot, (exact, subject), states, reference, quick=quick)
         least = least.at_least(precision)
-        gaps.append(_gap(model, states, next(iter(motions.values()))))
+        gaps.append(motion_gap(model, states, next(iter(motions.values()))))
     # The formula comes first, and the equations bound it, where there are both.
     states, source = next(iter(motions.values())), exact.path
     least = least.at_least(gaps[-1])
@@ -152,8 +141,8 @@ def find_nearby(
         return reference.states
     motions = exact.engine_states(model, pilot.scene.scenario, reference.states)
     states = next(iter(motions.values()))
-    gap = _gap(model, states, reference.states).place
-    usual_gap = _gap(model, declared_reference.states, declared_reference.second_states).place
+    gap = motion_gap(model, states, reference.states).place
+    usual_gap = motion_gap(model, declared_reference.states, declared_reference.second_states).place
     is_usual = gap <= _NEARBY_GAP * max(usual_gap, reference.floor.place)
     return states if is_usual else reference.states
 
@@ -193,7 +182,7 @@ def _check_exact(
 ) -> Sizes:
     """How well a course's exact motion, with its name, is known where no integration says it."""
     exact, name = named_exact
-    subject, gap = f"{name} is not this scene's motion", _gap(model, states, second.states)
+    subject, gap = f"{name} is not this scene's motion", motion_gap(model, states, second.states)
     clause = f"in the scenario `{pilot.scene.name}` it"
     precision = pilot.scene.declaration.precision or PRECISION
     if second.kind == "ode":
@@ -245,9 +234,9 @@ def _stiff_gaps(
                 raise
             break  # too stiff for steps of this length
         count = min(len(stiff_states.times), len(stiff.states.times))
-        shifts.append(_gap(model, stiff_states.head(count), stiff.states.head(count)).place)
+        shifts.append(motion_gap(model, stiff_states.head(count), stiff.states.head(count)).place)
         stiff_states, least = stiff.states, stiff.floor.place
-        gaps.append(_gap(model, states.head(count), stiff_states.head(count)).place)
+        gaps.append(motion_gap(model, states.head(count), stiff_states.head(count)).place)
         rest = min(rest, max(gaps[-1], least))
         if gaps[-1] <= max(precision, _NEAR * least):
             break
@@ -322,7 +311,7 @@ def self_reference(
     reference = _combine(model, pilot, "self", source, runs[0], second, runs[1])
     count, floor = len(reference.states.times), reference.floor
     for states in runs[2:]:
-        floor = floor.at_least(_gap(model, reference.states, states.head(count)))
+        floor = floor.at_least(motion_gap(model, reference.states, states.head(count)))
     return replace(reference, floor=floor)
 
 
@@ -344,12 +333,13 @@ def _combine(
     parted = np.flatnonzero(gaps > _PARTING_SHARE)
     good = max(1, int(parted[0])) if parted.size else len(gaps)
     states, second_states = states.head(good), second_states.head(good)
-    gap, horizon = _gap(model, states, second_states), float(states.times[-1])
+    gap, horizon = motion_gap(model, states, second_states), float(states.times[-1])
     floor = gap.at_least(ROUNDING)
     return KnownMotion(kind, source, states, second_states, floor, second, gap.largest, horizon)
 
 
-def _gap(model: Any, states: EngineStates, second_states: EngineStates) -> Sizes:
+def motion_gap(model: Any, states: EngineStates, second_states: EngineStates) -> Sizes:
+    """How far two motions are apart at most."""
     return largest_errors(errors(motion_of(model, states), motion_of(model, second_states)))
 
 
@@ -365,7 +355,7 @@ def _with_closed_form(
     """Put a closed form first, and what was integrated second."""
     count = min(len(states.times), len(second.states.times))
     states = states.head(count)
-    gap = _gap(model, states, second.states)
+    gap = motion_gap(model, states, second.states)
     distance = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
     floor = least
     if second.kind == "ode":
@@ -385,66 +375,3 @@ def _with_closed_form(
         agreement=gap.largest,
         note="",
     )
-
-
-def least_known(model: Any, scene: Scene, reference: KnownMotion) -> tuple[float, float]:
-    """Below which a reference knows nothing of what is seen, and of the declared quantity.
-
-    It is as much of what its two motions differ by there as it may be off in itself: a formula that
-    was checked is far nearer to the truth than to the engine, whose friction and contacts are soft.
-    """
-    states, second_states, floor = reference.states, reference.second_states, reference.floor
-    gap = _gap(model, states, second_states)
-    share = min(1.0, floor.place / (gap.place or 1.0))
-    least_seen = FLOORS * share * visible_error(model, scene, states, second_states)
-    if not quantity_name(model, scene):
-        return least_seen, 0.0
-    share = max(share, min(1.0, floor.velocity / (gap.velocity or 1.0)))
-    distances = quantity_errors(model, scene, states, second_states)
-    return least_seen, FLOORS * share * float(distances.max())
-
-
-class Cone(Struct, frozen=True):
-    """The reference for errors under a cone."""
-
-    reference: KnownMotion
-    model_error: float | None
-    """What remains of the error however small the timestep, m or rad."""
-    visible_model_error: float
-    """The same as a visible error; 0 where the errors contain it already."""
-    sticks: Sticks | None = None
-    """What sticks in the reference; `None` where nothing touches."""
-    is_held: bool = False
-    """Whether friction is below its limit there, so that what moves is creep."""
-
-
-def find_references(model: Any, pilot: Pilot, *, quick: bool = False) -> dict[str, Cone]:
-    """The references of a scene by cone; under "" where nothing touches."""
-    model, scene = without_sleep(model), pilot.scene
-    reference = find_reference(model, pilot, quick=quick)
-    if not pilot.contact:
-        return {"": Cone(reference, None, 0.0)}
-    limits = {}
-    for cone, number in CONES.items():
-        limits[cone] = reference
-        if reference.kind != "self" or model.opt.cone != number:
-            variant = with_integrator(model, Integrator.EULER, scene.timestep)
-            variant.opt.cone = number
-            limits[cone] = self_reference(variant, pilot, quick=quick)
-    cones = {}
-    for cone, limit in limits.items():
-        truth = reference if reference.kind == "closed" else limits["elliptic"]
-        sticks = find_sticks(model, scene, limit.states)
-        is_held = friction_holds(model, scene, limit.states, sticks)
-        if cone == "elliptic" and truth is limit:
-            cones[cone] = Cone(limit, None, 0.0, sticks, is_held)
-            continue
-        count = min(len(limit.states.times), len(truth.states.times))
-        limit_states, true_states = limit.states.head(count), truth.states.head(count)
-        gap = _gap(model, limit_states, true_states).place
-        least = FLOORS * max(limit.floor.place, truth.floor.place)
-        is_apart = truth is not reference and gap > least
-        visible = visible_error(model, scene, limit_states, true_states) if is_apart else 0.0
-        motion = reference if truth is reference else limit
-        cones[cone] = Cone(motion, max(gap, least), visible, sticks, is_held)
-    return cones

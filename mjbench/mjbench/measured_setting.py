@@ -10,7 +10,9 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from mjbench import known_motion, measure, simulation
+from mjbench import measure, simulation
+from mjbench.cones import Cone
+from mjbench.known_motion import KnownMotion
 from mjbench.pilot import Pilot, horizon_errors, position_distances
 from mjbench.reports import scene_report
 from mjbench.settings import with_setting
@@ -23,7 +25,7 @@ class Basis(Struct, frozen=True, eq=False):
     pilot: Pilot
     baseline: scene_report.MeasuredSetting
     """The scene's own setting."""
-    cones: Mapping[str, known_motion.Cone]
+    cones: Mapping[str, Cone]
     energy: float | None
     """The scale for changes of energy, J; `None` where energy is not conserved."""
     momentum_conserved: bool
@@ -33,7 +35,7 @@ class Basis(Struct, frozen=True, eq=False):
     """The same of the declared quantity."""
 
     @property
-    def reference(self) -> known_motion.KnownMotion:
+    def reference(self) -> KnownMotion:
         """The reference of the scene's own setting."""
         return self.cones[self.baseline.cone].reference
 

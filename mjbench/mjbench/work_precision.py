@@ -20,6 +20,7 @@ from msgspec.structs import replace
 
 from mjbench import known_motion, measure, simulation
 from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
+from mjbench.cones import find_references, least_known
 from mjbench.costs import Clock, costs
 from mjbench.delays import loop_note
 from mjbench.derive import derive_charts, derive_failures, derive_profile, derive_scenario
@@ -155,12 +156,12 @@ def _find_basis(
     tell(f"{scene.name}: a first run")
     pilot = run_pilot(model, scene)
     tell(f"{scene.name}: the reference")
-    cones = known_motion.find_references(model, pilot, quick=quick)
+    cones = find_references(model, pilot, quick=quick)
     baseline = own_setting(model, pilot)
     reference = cones[baseline.cone].reference
     conserved = find_conserved(model, pilot, reference)
     leasts = zip(
-        *(known_motion.least_known(model, scene, cone.reference) for cone in cones.values()),
+        *(least_known(model, scene, cone.reference) for cone in cones.values()),
         strict=True,
     )
     return Basis(model, pilot, baseline, cones, *conserved, *map(max, leasts))
@@ -292,15 +293,18 @@ def _nearby_ratios(
         nudged_scenario = replace(scenario, **start)
         setup = replace(pilot.setup, scenario=nudged_scenario)
         near = replace(pilot, scene=replace(scene, scenario=nudged_scenario), setup=setup)
-        cones = {}
+        motions = {}
         for name in {basis.baseline.cone, rival.cone}:
             base = with_setting(model, replace(basis.baseline, cone=name))
-            cone = basis.cones[name]
-            exact = known_motion.find_nearby(base, near, cone.reference, quick=quick)
+            reference = basis.cones[name].reference
+            exact = known_motion.find_nearby(base, near, reference, quick=quick)
             if exact is None:
                 return None
-            reference = replace(cone.reference, states=exact)
-            cones[name] = replace(cone, reference=reference, sticks=None)
+            motions[name] = exact
+        count, cones = min(len(exact.times) for exact in motions.values()), {}
+        for name, exact in motions.items():
+            reference = replace(basis.cones[name].reference, states=exact.head(count))
+            cones[name] = replace(basis.cones[name], reference=reference, sticks=None)
         near_basis, pair = replace(basis, pilot=near, cones=cones), []
         for setting in (basis.baseline, rival):
             row, _ = measure_setting(near_basis, setting)

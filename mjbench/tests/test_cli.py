@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -223,6 +224,16 @@ def test_what_is_known_is_printed_when_the_user_interrupts(tmp_path: Path) -> No
     assert f"not known: {', '.join(parts)}, " in out
     assert "delays: stopped before it was done" in out
     assert "the scenario step was not measured" not in out
+
+
+def test_minutes_that_are_over_stop_it_as_the_user_does(tmp_path: Path, capsys: Any) -> None:
+    (tmp_path / "spring.xml").write_text(SPRING)
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as for a job in the background
+    try:
+        assert main([str(tmp_path / "spring.xml"), "--quick", "--minutes", "0"]) == 130
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert "mjbench: stopped" in capsys.readouterr().err
 
 
 @pytest.mark.long

@@ -222,7 +222,8 @@ def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
     mend = "Euler at 2 ms, elliptic cone errs 83 times less in all and takes 1.2 times as long"
     assert report.parts.mend == mend
     assert report.verdict.lines[1].endswith(
-        "and by 8.3 with the model of contacts; most of it is the model of contacts': " + mend
+        "and by at most 8.3 with the model of contacts; most of it is the model of contacts': "
+        + mend
     )
     small = judged(masked(), contact_model=CONES, parts=ErrorParts(1e-4, None, None, None, 0.001))
     assert small.parts is not None and small.parts.dominant == "", "none is resolved"
@@ -336,7 +337,7 @@ def test_a_mend_of_the_model_of_contacts_says_that_steps_err_more() -> None:
     rows[0] = replace(rows[0], seen=130.0, step_error=7.0)
     report = judged(rows, contact_model=CONES, parts=ErrorParts(7.0, None, 130.0, 1e-9, 0.001))
     assert report.verdict.lines[1].startswith("errs by 7 in what is seen of steps (1: just visible")
-    assert ", and by 130 with the model of contacts; " in report.verdict.lines[1]
+    assert ", and by at most 130 with the model of contacts; " in report.verdict.lines[1]
     assert (
         "in all and takes about as long, but what is seen of steps is 7.1 times as large"
         in (report.verdict.lines[1])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from mjbench.cones import find_references
 from mjbench.known_motion import KnownMotion, find_reference, self_reference
 from mjbench.pilot import run_pilot
 from mjbench.problem import Integrator
@@ -195,6 +196,32 @@ def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else(
             reference_of(model, toml)
         assert caught.value.message.startswith(message)
         assert str(caught.value.place) == "models/a.toml: scenario.0.reference"
+
+
+SLIDING = """\
+<mujoco>
+  <option timestep="0.002"/>
+  <worldbody>
+    <geom type="plane" size="9 9 1"/>
+    <body pos="0 0 0.05"><freejoint/><geom type="box" size="0.1 0.07 0.05"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_errors_under_each_cone_count_over_the_same_time() -> None:
+    """Under the pyramid this motion is known for a third of the time for which it is else."""
+    model = mujoco.MjModel.from_xml_string(SLIDING)
+    table = '[[scenario]]\nname = "a"\nduration = 0.3\nsample = 0.01\nqvel = [1, 1, 0, 0, 0, 0]\n'
+    (scene,) = scenes(model, parse_declared(table), quick=True)
+    pilot = run_pilot(model, scene)
+    pyramidal, elliptic = find_references(model, pilot, quick=True).values()
+    times = elliptic.reference.states.times
+    assert np.array_equal(pyramidal.reference.states.times, times)
+    assert len(elliptic.reference.second_states.times) == len(times)
+    assert pyramidal.reference.horizon == elliptic.reference.horizon == times[-1] < 0.3
+    model.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    assert find_reference(model, pilot, quick=True).horizon > times[-1], "known for longer alone"
 
 
 TWO_POINTS = """<body><joint axis="0 1 0"/>

@@ -49,7 +49,7 @@ What it costs, as [the model's page](model:box#measured-awkward) has it.
   ```bench box show=table
   ```
 """
-PAGE, NUMERICS, SCENARIO_LESSON = "models/box.html", "numerics/index.html", "lessons/1.2-two.html"
+PAGE, NUMERICS, SCENARIO_LESSON = "models/box.html", "numerics/case-5.html", "lessons/1.2-two.html"
 
 
 class Course:

@@ -48,7 +48,8 @@ class PageEntry(Struct, frozen=True):
     kind: str
     """One of `CORE_PAGES`, or the name of a `PageKind`."""
     id: str = ""
-    """The id of its level, lesson, model or page; empty if there is only one page of its kind."""
+    """The id of its level, lesson, model, page or part; empty if it is the only one or the first of
+    its kind."""
 
     def inputs(self, library: Library) -> PageInputs:
         """The inputs of the page; summaries of documents are enough."""
@@ -77,10 +78,14 @@ class PageEntry(Struct, frozen=True):
                     return not_found_inputs(library)
         key = f"{kind.name}.description"
         description = library.words(key) if library.words.has(key) else ""
-        title, home = page_title(library, kind), urls.Place(kind.path).href(urls.HOME)
-        values = {"home": home, **kind.values(library)}
-        template = "added.html" if kind.draw is not None else f"{kind.name}.html"
-        head = PageHead(kind.path, kind.name, title, description, indexed=kind.indexed)
+        title, home = page_title(library, kind), urls.Place(self.path).href(urls.HOME)
+        if self.id:
+            values = {"home": home, **kind.part_values(library, self.id)}
+            title, template = str(values["title"]), f"{kind.name}-part.html"
+        else:
+            values = {"home": home, **kind.values(library)}
+            template = "added.html" if kind.draw is not None else f"{kind.name}.html"
+        head = PageHead(self.path, kind.name, title, description, indexed=kind.indexed)
         return PageInputs(head, template, values)
 
     def may_show_notes(self, library: Library) -> bool:
@@ -118,6 +123,8 @@ def page_list(library: Library) -> Iterator[PageEntry]:
         yield PageEntry(urls.model_page_path(model.name), "model", model.name)
     for kind in added_pages(library):
         yield PageEntry(kind.path, kind.name)
+        for part in kind.parts(library):
+            yield PageEntry(kind.part_path(part), kind.name, part)
     for page in course.pages:
         if page.document is not None and not page.is_home:
             yield PageEntry(urls.page_path(page), "page", page.id)

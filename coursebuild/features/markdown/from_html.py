@@ -102,11 +102,14 @@ class _Converter:
         rows = [cells for row in node.nearest("tr") if (cells := list(row.nearest("th", "td")))]
         if not rows:
             return ""
-        width = max(map(len, rows))
-        texts = [
-            [" ".join(" ".join(self.blocks(cell.children)).split()) for cell in cells]
-            for cells in rows
-        ]
+        texts = []
+        for cells in rows:
+            row = list[str]()
+            for cell in cells:
+                row.append(" ".join(" ".join(self.blocks(cell.children)).split()))
+                row += [""] * (int(cell.attributes.get("colspan") or 1) - 1)
+            texts.append(row)
+        width = max(map(len, texts))
         texts = [[*row, *[""] * (width - len(row))] for row in texts]
         has_head = not any(cell.name == "td" for cell in rows[0])
         head = texts.pop(0) if has_head else [""] * width

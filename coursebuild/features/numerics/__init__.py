@@ -1,10 +1,11 @@
-"""The page of the hard cases: measurements of MuJoCo beside theory.
+"""The pages of the hard cases: measurements of MuJoCo beside theory.
 
-The page exists where hard cases are recorded.
+They exist where hard cases are recorded: one picture of all cases, and a page for each family.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from itertools import groupby
 from operator import attrgetter
@@ -37,12 +38,10 @@ class CaseView(Struct, frozen=True):
     name: str
     """Its id."""
     title: str
-    matrix: tuple[tuple[str, ...], ...]
-    """Cells in the table of all cases: orders, largest stable timesteps, costs, by integrator."""
     sentences: tuple[str, ...]
     """What the plots say, and a note on the case."""
     plots: tuple[Markup, ...]
-    """The error against time and against evaluations."""
+    """The error against time."""
     folded_plots: tuple[Markup, ...]
     tables: tuple[grids.Grid, ...]
     notes: tuple[str, ...]
@@ -50,60 +49,120 @@ class CaseView(Struct, frozen=True):
     """The address of the model's page, for a case of the course's own; else empty."""
 
 
-class CaseGroup(Struct, frozen=True):
-    """Cases of one number, or of the course's own."""
+class MatrixCell(Struct, frozen=True):
+    """What an integrator comes to in a case, among all integrators."""
 
-    number: int
-    """0: of the course's own."""
+    text: str
+    shade: int
+    """0 for the best of them, one more for each factor of two from it, at most `_SHADES`."""
+
+
+class MatrixRow(Struct, frozen=True):
+    """A case in the picture of all cases."""
+
     title: str
-    cases: tuple[CaseView, ...]
+    href: str
+    groups: tuple[tuple[MatrixCell, ...], ...]
+    """Largest stable timesteps, orders and costs, by integrator."""
+
+
+class CaseFamily(Struct, frozen=True):
+    """Cases of one number, or of the course's own, in the picture of all cases."""
+
+    title: str
+    href: str
+    rows: tuple[MatrixRow, ...]
+
+
+_SHADES = 3
+
+
+def _families(library: Library) -> dict[str, tuple[CaseReport, ...]]:
+    """The cases by the id of their family, which names its page."""
+    scenes: Mapping[str, SceneReport] = library.reports.scenes
+    course_reports = [report for name in sorted(scenes) for report in scenes[name].cases]
+    cases = [*sorted(library.reports.cases, key=attrgetter("case")), *course_reports]
+    return {
+        f"case-{number}": tuple(reports)
+        for number, reports in groupby(cases, key=attrgetter("case"))
+    }
+
+
+def _family_title(words: Strings, reports: tuple[CaseReport, ...]) -> str:
+    number, key = reports[0].case, f"numerics.case_{reports[0].case}"
+    has_own_title = (not number or len(reports) > 1) and words.has(key)
+    return words(key) if has_own_title else reports[0].title
 
 
 def numerics_values(library: Library) -> dict[str, object]:
-    """The values for the template of the page."""
-    words, place = library.words, urls.Place(urls.NUMERICS)
-    scenes: Mapping[str, SceneReport] = library.reports.scenes
-    course_reports = [report for name in sorted(scenes) for report in scenes[name].cases]
-    cases: list[CaseReport] = [
-        *sorted(library.reports.cases, key=attrgetter("case")),
-        *course_reports,
-    ]
-    groups = []
-    for number, group_reports in groupby(cases, key=attrgetter("case")):
-        views = tuple(case_view(words, place, report) for report in group_reports)
-        key = f"numerics.case_{number}"
-        has_own_title = (not number or len(views) > 1) and words.has(key)
-        groups.append(CaseGroup(number, words(key) if has_own_title else views[0].title, views))
-    tables = []  # of all cases: name, column of `matrix`, and by group the cases with cells
-    for column, name in enumerate(("order", "largest", "cost")):
-        bodies = [[case for case in group.cases if any(case.matrix[column])] for group in groups]
-        if any(bodies):
-            tables.append((name, column, [members for members in bodies if members]))
+    """The values for the template of the first page."""
+    words, place, families = library.words, urls.Place(urls.NUMERICS), []
+    for part, reports in _families(library).items():
+        href = place.href(KIND.part_path(part))
+        rows = tuple(
+            MatrixRow(report.title, f"{href}#{urls.encode(report.name)}", _matrix(words, report))
+            for report in reports
+        )
+        families.append(CaseFamily(_family_title(words, reports), href, rows))
     return {
-        "groups": tuple(groups),
-        "tables": tuple(tables),
+        "families": tuple(families),
+        "columns": ("largest", "order", "cost"),
         "integrators": INTEGRATORS,
-        "where": dict.fromkeys(grids.machine_text(words, report.machine) for report in cases),
-        "file": place.href(urls.file_path(STABILITY.path())),
+        **_sources(library, place),
     }
 
 
-def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[str, ...], ...]:
+def family_values(library: Library, part: str) -> dict[str, object]:
+    """The values for the template of the page of a family."""
+    words, place = library.words, urls.Place(KIND.part_path(part))
+    reports = _families(library)[part]
+    return {
+        "title": _family_title(words, reports),
+        "up": place.href(KIND.path),
+        "cases": tuple(case_view(words, place, report) for report in reports),
+        **_sources(library, place),
+    }
+
+
+def _sources(library: Library, place: urls.Place) -> dict[str, object]:
+    """What was measured where, and the file with all of it."""
+    reports = [report for family in _families(library).values() for report in family]
+    machines = dict.fromkeys(grids.machine_text(library.words, r.machine) for r in reports)
+    return {"where": machines, "file": place.href(urls.file_path(STABILITY.path()))}
+
+
+def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[MatrixCell, ...], ...]:
     part = report.main if report.main != "energy_drift" else ""
-    fits = {row.integrator: getattr(row, part) for row in report.orders} if part else {}
+    orders = {
+        row.integrator: (fit.value, f"{fit.value:.2f}")
+        for row in (report.orders if part else ())
+        if (fit := getattr(row, part)) is not None
+    }
     limits = {
-        line.integrator: words(f"numerics.{line.largest}")
+        line.integrator: (
+            math.inf if line.largest == "all" else -math.inf,
+            words(f"numerics.{line.largest}"),
+        )
         if isinstance(line.largest, str)
-        else line.shown.partition(";")[0]
+        else (math.log2(line.largest), line.shown.partition(";")[0])
         for line in report.boundaries
     }
-    orders = (fits.get(integrator) for integrator in INTEGRATORS)
-    costs = map(dict(report.reached).get, INTEGRATORS)
-    return (
-        tuple("" if fit is None else f"{fit.value:.2f}" for fit in orders),
-        tuple(limits.get(integrator, "") for integrator in INTEGRATORS),
-        tuple("" if cost is None else seconds_text(cost, _DIGITS) for cost in costs),
-    )
+    costs = {name: (-math.log2(cost), seconds_text(cost, _DIGITS)) for name, cost in report.reached}
+    return tuple(map(_cells, (limits, orders, costs)))
+
+
+def _cells(figures: Mapping[str, tuple[float, str]]) -> tuple[MatrixCell, ...]:
+    """Texts by integrator, and how many factors of two each is from the best; none without any."""
+    if not figures:
+        return ()
+    best = max(size for size, _ in figures.values())
+    cells = []
+    for integrator in INTEGRATORS:
+        size, text = figures.get(integrator, (-math.inf, ""))
+        is_best = size == best > -math.inf
+        shade = 0 if is_best else int(min(_SHADES, best - size))
+        cells.append(MatrixCell(text, shade))
+    return tuple(cells)
 
 
 def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
@@ -134,14 +193,12 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
         Markup(chart_svg(chart, f"{name}-{number}", PAIR_SIZE))
         for number, chart in enumerate(report.charts, 1)
     ]
-    first = sum(chart.axes[1] == report.charts[0].axes[1] for chart in report.charts)
     return CaseView(
         name,
         report.title,
-        _matrix(words, report),
         tuple(_describe(words, report)),
-        tuple(filter(None, drawings[:first])),
-        tuple(filter(None, drawings[first:])),
+        tuple(filter(None, drawings[:1])),
+        tuple(filter(None, drawings[1:])),
         tuple(grid for grid in tables if grid is not None),
         tuple(_notes(words, report)),
         place.href(urls.model_page_path(model)) if model else "",
@@ -207,17 +264,19 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
     return [*notes, *scenario_view.lost_runs(runs)]
 
 
+KIND = PageKind(
+    name="numerics",
+    values=numerics_values,
+    exists=lambda library: bool(library.reports.cases),
+    parts=_families,
+    part_values=family_values,
+    order=40,
+)
+
 FEATURE = Feature(
     name="numerics",
     needs=("bench",),
-    pages=(
-        PageKind(
-            name="numerics",
-            values=numerics_values,
-            exists=lambda library: bool(library.reports.cases),
-            order=40,
-        ),
-    ),
+    pages=(KIND,),
     commands=(
         Command(
             name="stability",

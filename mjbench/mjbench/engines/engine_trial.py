@@ -21,8 +21,9 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
+from mjbench.cones import find_references
 from mjbench.costs import Clock, time_jobs
-from mjbench.known_motion import KnownMotion, find_references
+from mjbench.known_motion import KnownMotion
 from mjbench.measure import energy_drift, errors
 from mjbench.pilot import Pilot, nudges, position_distances, run_pilot
 from mjbench.problem import Array, Scenario

@@ -164,10 +164,11 @@ def test_what_was_measured_in_part(make: Make) -> None:
 
 
 def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
-    page = site["numerics/index.html"]
+    first = text(site["numerics/index.html"])
+    assert first.index("Damped spring") > first.index("A &lt;top&gt;"), "in the order of numbers"
+    page = site["numerics/case-5.html"]
     words = text(page)
-    assert "3 A &lt;top&gt;" in words and "5 Damped spring" in words
-    assert words.index("5 Damped spring") > words.index("3 A &lt;top&gt;")
+    assert words.startswith("Course map Hard cases Damped spring ")
     assert (
         "References: the oscillator; Bulirsch–Stoer. The motion is known to "
         "1 × 10<sup>−13</sup> in position and 4 × 10<sup>−13</sup> in velocity."
@@ -187,48 +188,43 @@ def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
     assert 'href="numerics/index.html"' in site["index.html"]
 
 
-def first_tables(page: str) -> dict[str, dict[str, list[str]]]:
-    """The tables of all cases by their headings: the cells of each row by its first one."""
-    start = page[page.index('id="matrix"') : page.index("</section>")]
-    tables = {}
-    for part in start.split("<h3 ")[1:]:
-        title = re.findall(r">(.*?)</h3>", part)[0]
-        rows = re.findall(r"<tr>(.*?)</tr>", part)
-        cells = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in rows]
-        tables[title] = {re.sub("<.*?>", "", row[0]): row[1:] for row in cells}
-    return tables
+def picture(page: str) -> dict[str, list[str]]:
+    """What the picture of all cases says and how it is coloured, by the title of a row."""
+    rows = re.findall(r'<tr><th scope="row">(.*?)</th>(.*?)</tr>', page)
+    cells = r'<td (?:class="shade-(.)"|colspan="5")>(.*?)</td>'
+    return {
+        re.sub("<.*?>", "", title): [
+            text if shade == "3" else f"{text}{shade and f' ({shade})'}"
+            for shade, text in re.findall(cells, row)
+        ]
+        for title, row in rows
+    }
 
 
-def test_the_page_begins_with_tables_of_cases_and_integrators(make: Make) -> None:
+def test_the_page_begins_with_a_picture_of_cases_and_integrators(make: Make) -> None:
     lost = replace(case().boundaries[0], largest="none")
     costs = (StepCost("RK4", interval(1e-6)),)
     cheap = case("cheap", 4, errors=(run(integrator="RK4", position=(1e-4, 1e-4)),), costs=costs)
     cases = (case("spring", 5), replace(case("lost", 5), boundaries=(lost,), orders=()), cheap)
-    page = pages(make, Reports(cases=cases))["numerics/index.html"]
-    tables = first_tables(page)
-    assert list(tables) == ["Order", "Largest stable timestep", "Cost of an error of 1e-3"]
-    order, largest, cost = tables.values()
-    for table in tables.values():
-        assert table["Case"] == ["Euler", "implicit", "implicitfast", "RK4", "discrete"]
-    assert order["A &lt;spring&gt;"] == ["1.00", "–", "–", "–", "–"]
-    assert "A &lt;lost&gt;" not in order, "of which none was fitted"
-    assert largest["A &lt;spring&gt;"] == [
-        "200 ms",
-        "any",
+    outputs = make("## A\n\nText.\n").site(reports=Reports(cases=cases))
+    files = {path: data.decode() for path, data in outputs.items() if path.endswith(("html", "md"))}
+    page = files["numerics/index.html"]
+    rows = picture(page)
+    assert rows["A &lt;spring&gt;"] == [
+        *("200 ms", "any (0)", "–", "250 ms", "any (0)"),
+        *("1.00 (0)", "–", "–", "–", "–"),
         "–",
-        "250 ms",
-        "any",
     ]
-    assert largest["A &lt;lost&gt;"] == ["none", "–", "–", "–", "–"]
-    assert list(cost) == ["Case", "A &lt;cheap&gt;"], "no other run comes to an error of 1e-3"
-    assert [cell != "–" for cell in cost["A &lt;cheap&gt;"]] == [False] * 3 + [True, False]
-    assert page.index('href="#spring"') < page.index('id="spring"')
-
-
-def test_a_table_of_cases_without_a_row_is_not_shown(site: dict[str, str]) -> None:
-    page = site["numerics/index.html"]
-    assert list(first_tables(page)) == ["Order", "Largest stable timestep"]
-    assert not re.search(r"<tbody>\s*</tbody>", page)
+    assert rows["A &lt;lost&gt;"] == ["none", "–", "–", "–", "–", "–", "–"]
+    *_, cost = rows["A &lt;cheap&gt;"][-5:-1]
+    assert rows["A &lt;cheap&gt;"][-1] == "–" and cost.endswith("s (0)"), "the only one so exact"
+    table = [line.split(" | ") for line in files["numerics/index.md"].splitlines()]
+    [column] = [n for line in table for n, cell in enumerate(line) if cell == cost[:-4]]
+    assert column == 14, "in the same column as on the page"
+    heads = re.findall(r'<th scope="col">(.*?)</th>', page)
+    assert heads[1:] == ["Euler", "implicit", "implicitfast", "RK4", "discrete"] * 3
+    assert 'href="case-5.html#spring"' in page and 'id="spring"' in files["numerics/case-5.html"]
+    assert "numerics/case-6.html" not in files, "of which nothing is recorded"
 
 
 def test_errors_and_energy_are_drawn_against_time_and_evaluations(make: Make) -> None:
@@ -240,8 +236,8 @@ def test_errors_and_energy_are_drawn_against_time_and_evaluations(make: Make) ->
     lost = run(timestep=0.2, status="diverged")
     costs = tuple(StepCost(name, interval(1e-6)) for name in ("Euler", "RK4"))
     site_reports = Reports(cases=(case("a", 4, errors=(lost, *runs), costs=costs),))
-    page = pages(make, site_reports)["numerics/index.html"]
-    assert page.count("<svg") == 4
+    page = pages(make, site_reports)["numerics/case-4.html"]
+    assert page.count("<svg") == 4 and page.index("<svg") < page.index("more-figures")
     assert "Euler: 0.1 at 10 µs, 0.025 at 40 µs. RK4: 0.0001 at 10 µs" in page
     assert "error of position (m or rad) against processor time" in page
     assert "energy drift, relative against processor time" in page
@@ -254,17 +250,19 @@ def test_errors_and_energy_are_drawn_against_time_and_evaluations(make: Make) ->
 def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> None:
     last_case = case("c", 99, boundaries=(), figures=())
     site_reports = Reports(cases=(case("a", 4), case("b", 99), last_case))
-    words = text(pages(make, site_reports)["numerics/index.html"])
-    assert "4 A &lt;a&gt; No timestep" in words
-    assert "99 A &lt;b&gt; A &lt;b&gt; No timestep" in words
+    files = pages(make, site_reports)
+    assert "Hard cases A &lt;a&gt; No timestep" in text(files["numerics/case-4.html"])
+    assert "Hard cases A &lt;b&gt; A &lt;b&gt; No timestep" in text(files["numerics/case-99.html"])
 
 
 def test_a_scenario_whose_motion_the_course_knows_is_a_hard_case(make: Make) -> None:
     case_report = case("box/swing", 0, title="box: A pendulum swings")
     model = scene(swing(), replace(awkward(), name="awkward"), model="box", cases=(case_report,))
-    page = pages(make, Reports({"box": model}, cases=(case("a", 4),)))["numerics/index.html"]
+    files = pages(make, Reports({"box": model}, cases=(case("a", 4),)))
+    page = files["numerics/case-0.html"]
     words = text(page.replace("<details", "<div").replace("</details", "</div"))
     assert "Cases of this course box: " in words and "coursebuild" not in words
-    assert 'href="#box/swing"' in page and 'id="box/swing"' in page
+    assert 'href="case-0.html#box/swing"' in files["numerics/index.html"]
+    assert 'id="box/swing"' in page
     assert 'href="../models/box.html">box: ' in page and "box/awkward" not in page
     assert "References: the oscillator; " in words and "error of position" in page
