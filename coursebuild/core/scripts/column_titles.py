@@ -130,11 +130,11 @@ def misplaced_titles(
     a name may be of what follows as well, and a word may stand behind its number; not so if
     another title of the line shows where its names stand.
     """
-    found: list[tuple[int, int, bool]] = []
+    verdicts: list[tuple[int, int, bool]] = []
     for column, place in places.items():
         title, own_name = titles[column], numbers[place]
-        named = [at for at, name in enumerate(numbers) if title.is_printed_as(name.text)]
-        at = named[0] if named and place not in named else place
+        matches = [at for at, name in enumerate(numbers) if title.is_printed_as(name.text)]
+        at = matches[0] if matches and place not in matches else place
         if at < place and words_of(own_name.text):
             are_titles = any(title.is_printed_as(own_name.text) for title in titles)
             is_certain = own_name.is_certain or are_titles
@@ -145,9 +145,9 @@ def misplaced_titles(
             continue
         has_unit = is_same_unit(title.unit, numbers[at].unit)
         is_certain |= has_unit and not is_same_unit(title.unit, own_name.unit)
-        found.append((column, at, is_certain))
-    any_certain = any(is_certain for *_, is_certain in found)
-    return ((column, at, any_certain) for column, at, _ in found)
+        verdicts.append((column, at, is_certain))
+    any_certain = any(is_certain for *_, is_certain in verdicts)
+    return ((column, at, any_certain) for column, at, _ in verdicts)
 
 
 @lru_cache(maxsize=4096)

@@ -230,9 +230,9 @@ class TableMatcher:
         if len(text.lines[at].numbers) != len(self.text.lines[at].numbers):
             text = self.text
         cells = (re.escape(c.mapped.text) for c in self.rows[0] if not c.canonical.numbers)
-        others = re.compile(rf"(?<!\w)(?:{'|'.join(cells) or '(?!)'})(?!\w)")
+        cell_pattern = re.compile(rf"(?<!\w)(?:{'|'.join(cells) or '(?!)'})(?!\w)")
         return [
-            PrintedName(others.sub(",", lead), text.title(at, n), n.text, text.unit(at, n))
+            PrintedName(cell_pattern.sub(",", lead), text.title(at, n), n.text, text.unit(at, n))
             for lead, n in zip(text.leads(at), text.lines[at].numbers, strict=True)
         ]
 
