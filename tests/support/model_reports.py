@@ -41,7 +41,6 @@ def finding(kind: str = "sensor-unread", **overrides: object) -> Finding:
         "saving": Saving(1.07, 0.01, True, 120, 40),
         "edits": (),
         "fixable": True,
-        "unfixed": "",
         "kept": "",
         "doubt": "",
         **overrides,

@@ -53,7 +53,6 @@ class Finding(Struct, frozen=True):
     saving: Saving
     edits: tuple[TextEdit, ...]
     fixable: bool
-    unfixed: str
     kept: str
     doubt: str
     shown: str = ""

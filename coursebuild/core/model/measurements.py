@@ -189,9 +189,7 @@ class FigureLine(Struct, frozen=True):
 class RowVerdict(Struct, frozen=True):
     """What is said of the scene's own setting."""
 
-    on_front: bool
     better: int | None
-    noticeable: bool | None
     text: str
 
 

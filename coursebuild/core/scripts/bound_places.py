@@ -213,7 +213,7 @@ class BoundNumber(Struct, frozen=True, dict=True):
         binding, texts = self.binding, [text for group in self.groups for text in group]
         with_comma = BoundText.of(binding.text, binding.comma)
         as_printed = BoundText.of(binding.text)
-        may_be_list = with_comma.comma and bool(as_printed.numbers)  # none in `1.234.567`
+        may_be_list = len(as_printed.numbers) > len(with_comma.numbers)  # not `4,096`
         is_list = may_be_list and as_printed.is_in(texts) and not with_comma.is_in(texts)
         return as_printed if is_list else with_comma
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -22,6 +22,9 @@ from coursebuild.core.text.quantities import (
 from coursebuild.core.text.source import Span
 
 _WORD = re.compile(r"[^\W_]+")
+_PARTS = re.compile(r"[,;|]|[:=](?=.*\w)")
+"""Between the parts of what stands before a number."""
+_SIGN = re.compile(r"[:=](?=\s*\Z)")
 HEADER_HELP = (
     "write the unit that is printed, or put the columns in order; where a unit is not meant, mark "
     'it: `` `s`{given="…"} ``'
@@ -82,75 +85,81 @@ class ColumnTitle(Struct, frozen=True):
         return True if is_same_unit(self.unit, unit) else None
 
 
-class PrintedNames(NamedTuple):
-    """What a printed number is called: its label, the title above it, its unit."""
+class PrintedName(NamedTuple):
+    """What a printed number is called: by what stands before it in its line, or above it."""
 
-    label: str
+    before: str
+    """From the number before it, behind that one's unit."""
     above: str
+    number: str
     unit: UnitText
 
+    @property
+    def label(self) -> str:
+        """The last part of what stands before it."""
+        return _PARTS.split(self.before)[-1].lstrip(" ([{")
 
-def swapped_columns(
-    titles: Sequence[ColumnTitle], labels: Sequence[str], places: Mapping[int, int]
-) -> dict[int, int]:
-    """For each column whose title names the number of another one, that column.
+    @property
+    def text(self) -> str:
+        """The title above it, or its label."""
+        return self.above or self.label.rstrip(" :=")
 
-    `places`: the index in the line of the number of each column. Only where titles have changed
-    places among themselves: words may also stand behind numbers.
+    @property
+    def reading(self) -> str:
+        """It with its number, as printed."""
+        return f"{self.above} {self.number}" if self.above else f"{self.label}{self.number}"
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether it is of this number alone: a word may also stand behind one, or name a list."""
+        return bool(self.above or _SIGN.search(self.label))
+
+    def may_follow(self, number: PrintedName) -> bool:
+        """Whether it may be a word behind the number before it."""
+        is_signed_alike = {*_SIGN.findall(self.label)} & {*_SIGN.findall(number.label)}
+        is_word = self.before.lstrip()[:1].isalnum() and not _PARTS.search(self.before)
+        return is_word and not is_signed_alike and not self.above
+
+
+def misplaced_titles(
+    titles: Sequence[ColumnTitle], numbers: Sequence[PrintedName], places: Mapping[int, int]
+) -> Iterator[tuple[int, int, bool]]:
+    """The columns whose title is the name of another number of the line, and of which one.
+
+    `places`: the index in the line of the number of each column. Whether it is certain comes last:
+    a name may be of what follows as well, and a word may stand behind its number; not so if
+    another title of the line shows where its names stand.
     """
-    columns = {place: column for column, place in places.items()}
-    target: dict[int, int] = {}
-    for column in places:
-        best = titles[column].best_places(labels)
-        if len(best) == 1 and best[0] in columns:
-            target[column] = columns[best[0]]
-    return {a: b for a, b in target.items() if a != b and _returns(target, a)}
-
-
-def misnamed_columns(
-    titles: Sequence[ColumnTitle], numbers: Sequence[PrintedNames], places: Mapping[int, int]
-) -> list[int]:
-    """The columns whose title is printed with a number of the line that is not shown.
-
-    `places` as above. It is printed above that number, as another is above the one that is shown,
-    or in its label beside the unit, which the one that is shown has not: labels alone may also
-    stand behind numbers.
-    """
-    columns: list[int] = []
+    verdicts: list[tuple[int, int, bool]] = []
     for column, place in places.items():
-        title, own_names = titles[column], numbers[place]
-        candidates = [
-            at
-            for at, number in enumerate(numbers)
-            if (own_names.above and title.is_printed_as(number.above))
-            or (title.words <= words_of(number.label) and _has_unit_alone(title, number, own_names))
-        ]
-        is_told = len(candidates) == 1 and candidates[0] not in places.values()
-        if is_told and title.words and not title.words & words_of(own_names.label):
-            columns.append(column)
-    return columns
-
-
-def _has_unit_alone(title: ColumnTitle, number: PrintedNames, sibling: PrintedNames) -> bool:
-    return is_same_unit(title.unit, number.unit) and not is_same_unit(title.unit, sibling.unit)
-
-
-def _returns(target: Mapping[int, int], start: int) -> bool:
-    at: int | None = start
-    for _ in target:
-        at = None if at is None else target.get(at)
-        if at == start:
-            return True
-    return False
+        title, own_name = titles[column], numbers[place]
+        matches = [at for at, name in enumerate(numbers) if title.is_printed_as(name.text)]
+        at = matches[0] if matches and place not in matches else place
+        if at < place and words_of(own_name.text):
+            are_titles = any(title.is_printed_as(own_name.text) for title in titles)
+            is_certain = own_name.is_certain or are_titles
+        elif at > place:
+            is_next = not any(words_of(name.before) for name in numbers[place + 1 : at])
+            is_certain = not (is_next and numbers[at].may_follow(own_name))
+        else:
+            continue
+        has_unit = is_same_unit(title.unit, numbers[at].unit)
+        is_certain |= has_unit and not is_same_unit(title.unit, own_name.unit)
+        verdicts.append((column, at, is_certain))
+    any_certain = any(is_certain for *_, is_certain in verdicts)
+    return ((column, at, any_certain) for column, at, _ in verdicts)
 
 
 @lru_cache(maxsize=4096)
 def words_of(text: str) -> frozenset[str]:
-    """The words of a title, in one notation: `T\u2080` is `t0`, and `\u03c4` is `tau`."""
-    plain = "".join(map(_spell, unicodedata.normalize("NFKD", text.casefold())))
-    return frozenset(word for word in _WORD.findall(plain) if not word.isdecimal())
+    """The words of a title, in one notation: `T\u2080` is `t0`, and `\u03c4` is `tau`.
+
+    A letter alone keeps its case: `T` is not `t`.
+    """
+    words = _WORD.findall("".join(map(_spell, unicodedata.normalize("NFKD", text))))
+    return frozenset(w.casefold() if len(w) > 1 else w for w in words if not w.isdecimal())
 
 
 def _spell(character: str) -> str:
     name = unicodedata.name(character, "")
-    return name.rpartition(" ")[2].lower() if name.startswith("GREEK SMALL LETTER") else character
+    return name.rpartition(" ")[2] if name.startswith("GREEK") else character

@@ -327,7 +327,7 @@ def _update_table(
         return refusal(change.span, "the header is not what is printed", HEADER_HELP)
     if not edits:
         return None
-    if (title := matcher.doubtful_title(match)) is not None:
+    for title, _, _ in matcher.misplaced_titles(match):
         return refusal(title.span, "another number is printed with this title", HEADER_HELP)
     whole = edits[0].span.to(edits[-1].span)
     at = whole.start

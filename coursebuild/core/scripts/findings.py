@@ -166,7 +166,7 @@ def _judge_table(verdict: Verdict) -> Iterator[Diagnostic]:
         help = "write what is printed, or `\u2026` for what is left out"
         yield diagnose("recording-body", cell.span, message, help=help)
     if verdict.rivals:
-        message = f"`{verdict.recording.script}` printed the rows of this table in several ways"
+        message = f"this table may show several things that `{verdict.recording.script}` printed"
         notes = [Note(f"`{line}`") for line in verdict.rivals[:_MAX_NOTES]]
         help = "write the words and units that are printed with the numbers into the header; where "
         help += 'a word is not of the number behind it, mark it: `` `error`{given="…"} ``'

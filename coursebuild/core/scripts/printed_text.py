@@ -237,14 +237,21 @@ class PrintedText:
         return unit if unit or title is None else title.unit
 
     def _read_labels(self, at: int) -> tuple[str, ...]:
-        """The labels of the numbers of a line: what follows the one before with its unit."""
-        text, start, labels = self.lines[at].text, 0, []
+        """The labels of the numbers of a line: what stands before them, and above."""
+        pairs = zip(self.leads(at), self.lines[at].numbers, strict=True)
+        return tuple(f"{lead} {self.title(at, number)}".strip() for lead, number in pairs)
+
+    def leads(self, at: int) -> list[str]:
+        """What stands before the numbers of a line, behind the one before with its unit."""
+        text, start, leads = self.lines[at].text, 0, []
         for number in self.lines[at].numbers:
-            labels.append(f"{text[start : number.start]} {self.title(at, number)}".strip())
+            leads.append(text[start : number.start])
             start = number.end
-            if unit_behind(text, start):
-                start = len(text) - len(text[start:].lstrip().partition(" ")[2])
-        return tuple(labels)
+            if unit := unit_behind(text, start):
+                rest = text[start:].lstrip()
+                word = unit.text if rest.startswith(unit.text) else rest.partition(" ")[0]
+                start = len(text) - len(rest) + len(word)
+        return leads
 
     # --- addresses
 

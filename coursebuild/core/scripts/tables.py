@@ -28,9 +28,8 @@ from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.column_titles import (
     ColumnTitle,
-    PrintedNames,
-    misnamed_columns,
-    swapped_columns,
+    PrintedName,
+    misplaced_titles,
     words_of,
 )
 from coursebuild.core.scripts.diff import number_change
@@ -54,7 +53,7 @@ from coursebuild.core.scripts.table_cells import (
     table_rows,
 )
 from coursebuild.core.text.numbers import Number, relative_error
-from coursebuild.core.text.quantities import NO_UNIT, UnitText, are_different
+from coursebuild.core.text.quantities import UnitText, are_different
 from coursebuild.core.text.source import Span
 
 _ALIKE_WEIGHT = 6
@@ -118,7 +117,8 @@ def compare_table(
         "drift" if changes else "verified",
         tuple(changes),
         addresses if changes else matcher.addresses(match),
-        match.rivals,
+        match.rivals
+        or tuple(text for _, text, is_sure in matcher.misplaced_titles(match) if not is_sure),
         counts,
     )
 
@@ -214,35 +214,27 @@ class TableMatcher:
         """How well a layout suits the table, in several respects."""
         fit = self._fits_in(0, layout)[0]
         pairs, numbers = self._pairs(0, fit), self.text.lines[fit.line].numbers
-        places = [
-            (cell, PrintedPlace(self.text, fit.line, (n,))) for cell, _, n in pairs if n in numbers
-        ]
-        labels = [self._own_label(0, label) for label in self._labels(fit.line)]
-        verdicts = [
-            self.titles[cell.column].names(labels, place.first, place.units[0])
-            for cell, place in places
-        ]
+        names = self._names(fit.line)
+        labels = [name.text for name in names]
+        places = [(cell.column, numbers.index(n)) for cell, _, n in pairs if n in numbers]
+        verdicts = [self.titles[c].names(labels, at, names[at].unit) for c, at in places]
         share = len(pairs) / max(1, len(numbers))
         return self._right_rows(layout), verdicts.count(True), -verdicts.count(False), share
 
-    def _own_label(self, row: int, label: str) -> str:
-        """A label; empty where it is what another cell of the row holds, under its title."""
-        cells = [cell for cell in self.rows[row] if not cell.canonical.numbers]
-        texts = (text for c in cells for text in (c.mapped.text, self.titles[c.column].text))
-        return "" if words_of(label) <= words_of(" ".join(texts)) else label
+    def _names(self, at: int) -> list[PrintedName]:
+        """What the numbers of the first row's line are called, but for what its cells hold.
 
-    def _labels(self, line: int) -> tuple[str, ...]:
-        """The labels of the numbers of a line; wide gaps tell its titles of several words apart."""
-        labels, plain_labels = self._text_with_gaps.labels(line), self.text.labels(line)
-        return labels if len(labels) == len(plain_labels) else plain_labels
-
-    def _names(self, line: int) -> list[PrintedNames]:
-        """What the numbers of a line are called; wide gaps tell the titles above them apart."""
-        numbers, text = self.text.lines[line].numbers, self._text_with_gaps
-        titles = [text.title(line, number) for number in text.lines[line].numbers]
-        titles = titles if len(titles) == len(numbers) else [""] * len(numbers)
-        units = [self.text.unit(line, number) for number in numbers]
-        return list(map(PrintedNames, self._labels(line), titles, units))
+        Wide gaps tell the titles above them apart.
+        """
+        text = self._text_with_gaps
+        if len(text.lines[at].numbers) != len(self.text.lines[at].numbers):
+            text = self.text
+        cells = (re.escape(c.mapped.text) for c in self.rows[0] if not c.canonical.numbers)
+        cell_pattern = re.compile(rf"(?<!\w)(?:{'|'.join(cells) or '(?!)'})(?!\w)")
+        return [
+            PrintedName(cell_pattern.sub(",", lead), text.title(at, n), n.text, text.unit(at, n))
+            for lead, n in zip(text.leads(at), text.lines[at].numbers, strict=True)
+        ]
 
     def _count_lines(self, layout: LineLayout | None) -> int:
         """How many printed lines have a layout, whatever text their cells hold."""
@@ -368,39 +360,28 @@ class TableMatcher:
     # --- the header
 
     def header_changes(self, match: TableMatch) -> Iterator[Change]:
-        """Units of the header that are not those of its numbers, and titles that are swapped."""
+        """Units of the header that are not those of its numbers, and titles of other numbers."""
         for column, units in sorted(self._column_units(match).items()):
             title = self.titles[column]
             unlike = next((unit for unit in units if are_different(title.unit, unit)), None)
             if unlike is not None:
                 yield Change(DriftKind.TEXT, title.unit_span, title.unit.text, unlike.text)
+        for title, reading, is_certain in self.misplaced_titles(match):
+            if is_certain:
+                yield Change(DriftKind.TEXT, title.span, title.text, reading)
+
+    def misplaced_titles(self, match: TableMatch) -> Iterator[tuple[ColumnTitle, str, bool]]:
+        """The titles of other numbers, each with what is printed, and whether it is certain."""
         for row in match.rows[:1]:
-            numbers = self.text.lines[row.line].numbers
+            line, numbers = self.lines[row.line], self.text.lines[row.line].numbers
             pairs = [(cell.column, n) for cell, _, n in reversed(row.pairs) if n in numbers]
             places = {column: numbers.index(number) for column, number in pairs}
-            columns = swapped_columns(self.titles, self._labels(row.line), places)
-            for column, right in columns.items():
-                title = self.titles[column]
-                back = next((a for a, b in columns.items() if b == column), right)
-                yield Change(DriftKind.TEXT, title.span, title.text, self.titles[back].text)
             names = self._names(row.line)
-            for column in misnamed_columns(self.titles, names, places):
-                title, printed = self.titles[column], names[places[column]]
-                label = printed.above or printed.label
-                yield Change(DriftKind.TEXT, title.span, title.text, label)
-
-    def doubtful_title(self, match: TableMatch) -> ColumnTitle | None:
-        """A title that is the label of another number than a new row has in its column."""
-        for row, addresses in zip(match.rows, self._addresses, strict=True):
-            labels, numbers = self._labels(row.line), self.text.lines[row.line].numbers
-            for cell, _, number in () if addresses else row.pairs:
-                title = self.titles[cell.column]
-                if (
-                    number in numbers
-                    and title.names(labels, numbers.index(number), NO_UNIT) is False
-                ):
-                    return title
-        return None
+            # Where the first number has no name, and words stand behind the last, they all do.
+            are_behind = bool(places) and not names[0].text and words_of(line[numbers[-1].end :])
+            for column, at, is_certain in misplaced_titles(self.titles, names, places):
+                if is_certain or not are_behind:
+                    yield self.titles[column], names[at].reading, is_certain
 
     def unprinted_units(self) -> Iterator[tuple[Span, str]]:
         """The titles whose units nothing prints, and these."""

@@ -220,9 +220,9 @@ def _recorded_view(
         at = words("lab.at_place", place=record.place)
         verification = words("lab.computed", tried=count, parity=parity)
     else:
-        alt = words("lab.picture", title=title, t=words.number(record.time, 4))
+        alt = words("lab.picture", title=title, t=words.number(record.time))
         length = f"{words.number(record.scale[0])} m"
-        at = words("lab.at", t=round(record.end, 3))
+        at = words("lab.at", t=words.number(record.end))
         verification = words("lab.proven", engine=LAB_ENGINE, tried=count, parity=parity)
     return RecordedView(record, place.href(live.picture), alt, length, at, verification)
 
