@@ -112,10 +112,10 @@ export class Instrument extends Shell {
     const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full, this.notices.message)
     const panel = h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element)
     const plots = this.plots.map((plot) => plot.element)
-    const reason = config.still ? h('p', { class: 'lab-reason' }, config.still) : null // why nothing moves when a reader presses Play
+    this.reason = h('p', { class: 'lab-reason', hidden: !config.still }, config.still) // why nothing moves when a reader presses Play
     this.show(
       'lab-live',
-      [screen, this.transport.element, this.tape.element, reason],
+      [screen, this.transport.element, this.tape.element, this.reason],
       [this.motion, this.goal?.element ?? null, ...plots, panel],
       this.makeFoot(),
       (isVisible) => this.simulation.setVisible(isVisible),
@@ -185,6 +185,9 @@ export class Instrument extends Shell {
   onReady({ values, scene }) {
     this.digits = Math.min(4, Math.max(2, digitsOfStep(scene.timestep))) // of the time at rest, so that a step is seen
     this.poses = this.makePoses()
+    const said = scene.coarse.length > 0 ? this.words('lab.live.coarse', { names: scene.coarse.join(', ') }) : ''
+    this.reason.textContent = [this.config.still, said].filter(Boolean).join(' ')
+    this.reason.hidden = this.reason.textContent === ''
     this.update(values)
     const { pendingAction, playRequested: pressed } = this
     this.pendingAction = null
