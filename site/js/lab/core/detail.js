@@ -15,6 +15,7 @@ const FLAT = 0 // mjtTexture
  * A scene (core/scene.js) with no more detail than that; its `coarse` has the names of the meshes and textures that had more.
  *
  * @param {Record<string, any>} scene @param {Record<string, number>} kinds mjtGeom
+ * @returns {Record<string, any>}
  */
 export function limitDetail(scene, { MESH, SDF }, mostFaces = MOST_FACES, mostTexels = MOST_TEXELS) {
   const uses = scene.meshes.map(() => 0)

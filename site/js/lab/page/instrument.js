@@ -12,6 +12,7 @@ import { download, h, icon, textButton } from './dom.js'
 import { curvesText, fillScript } from './export.js'
 import { History } from './history.js'
 import { digitsOfStep, formatReadout, formatTime } from './numbers.js'
+import { Orbit } from './orbit.js'
 import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
@@ -104,7 +105,7 @@ export class Instrument extends Shell {
       look: (camera) => this.view.look(camera),
       seek,
     })
-    this.plots = config.plots.map((plot) => new Plot(plot, words, seek))
+    this.plots = config.plots.map((plot) => (plot.x ? new Orbit(plot, words) : new Plot(plot, words, seek)))
     this.goal = this.makeGoal({ show: () => this.simulation.replay({ values: this.initial, events: config.goal.log }) })
     this.motion = h('p', { class: 'lab-motion', hidden: true })
     this.controls.show(this.values)
@@ -244,7 +245,7 @@ export class Instrument extends Shell {
     let offset = 0
     for (const plot of this.plots) {
       plot.push(times, values, width, offset)
-      offset += plot.config.traces.length
+      offset += plot.count
     }
   }
 
@@ -405,6 +406,7 @@ export class Instrument extends Shell {
     const curves = this.plots.map(({ config, whole }) => ({
       ylabel: config.ylabel,
       labels: config.traces.map(({ label }) => label),
+      across: config.x ? [config.xlabel] : [],
       columns: whole.table(),
     }))
     download(`${this.config.id}.csv`, curvesText(curves), 'text/csv')
