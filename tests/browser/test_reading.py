@@ -70,8 +70,8 @@ def test_far_parts_have_their_sizes_before_a_reader_jumps_to_them(open_page: Ope
     page = open_page(width=390)
     page.evaluate("document.documentElement.style.setProperty('--below', 'visible')")
     height = page.evaluate("document.documentElement.scrollHeight")
-    settled = "height => document.documentElement.scrollHeight === height"
-    until(open_page(width=390), settled, height)
+    condition = "height => document.documentElement.scrollHeight === height"
+    until(open_page(width=390), condition, height)
 
 
 def test_wide_things_scroll_in_themselves(open_page: OpenPage) -> None:

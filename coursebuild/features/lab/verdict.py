@@ -206,13 +206,12 @@ def clipped_curves(lab: Lab, reach: Sequence[tuple[float, float] | None]) -> tup
         if ends is None or trace is None:
             continue
         low, high = ends
-        bottom = low if plot.ymin is None else plot.ymin
-        top = high if plot.ymax is None else plot.ymax
-        width = (top - bottom) / 100
-        if low < bottom - width:
-            texts.append(f"`{trace.label}`, down to {low:.3g} (`ymin` is {bottom:g})")
-        if high > top + width:
-            texts.append(f"`{trace.label}`, up to {high:.3g} (`ymax` is {top:g})")
+        least, most = plot.ymin, plot.ymax
+        width = abs((high if most is None else most) - (low if least is None else least)) / 100
+        if least is not None and low < least - width:
+            texts.append(f"`{trace.label}`, down to {low:.3g} (`ymin` is {least:g})")
+        if most is not None and high > most + width:
+            texts.append(f"`{trace.label}`, up to {high:.3g} (`ymax` is {most:g})")
     return tuple(texts)
 
 

@@ -122,19 +122,19 @@ def recorded_svg(
         return plot_svg(plot, times, traces, decimal, narrow=narrow)
     start = times[-1] - plot.window if times and plot.window is not None else -math.inf
     first = bisect_left(times, start)
-    *lines, across = (column[first:] for column in traces)
+    *lines, places = (column[first:] for column in traces)
     plot = replace(plot, window=None, xlabel=plot.xlabel or plot.x)
-    return plot_svg(plot, *_known(across, lines), decimal, narrow=narrow)
+    return plot_svg(plot, *_interrupt(places, lines), decimal, narrow=narrow)
 
 
-def _known(
-    across: Sequence[float | None], lines: Sequence[Sequence[float | None]]
+def _interrupt(
+    places: Sequence[float | None], lines: Sequence[Sequence[float | None]]
 ) -> tuple[list[float], list[list[float | None]]]:
-    """Interrupt lines where their place is not known."""
-    known = [
-        [None if x is None else y for x, y in zip(across, line, strict=True)] for line in lines
+    """Interrupt lines where their place on the horizontal axis is unknown."""
+    parts = [
+        [None if x is None else y for x, y in zip(places, line, strict=True)] for line in lines
     ]
-    return [x or 0.0 for x in across], known
+    return [x or 0.0 for x in places], parts
 
 
 def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun, decimal: str) -> LabRecord:
@@ -143,7 +143,7 @@ def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun, decimal: st
     for plot, data, source in zip(lab.fields.plots, run.plots, config["plots"], strict=True):
         axis = config["axis"]
         ends = (source["xmin"], source["xmax"]) if source["x"] else (axis["min"], axis["max"])
-        horizontal, lines = _known(data["x"], data["traces"])
+        horizontal, lines = _interrupt(data["x"], data["traces"])
         points = (source["points"] or {"data": ()})["data"]
         svg = plot_svg(
             plot, horizontal, lines, decimal, narrow=lab.fields.dock, ends=ends, marks=points

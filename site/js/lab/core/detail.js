@@ -50,7 +50,7 @@ function fairShare(parts, most) {
 
 /** A mesh with at most so many triangles: of the vertices in each cell of a grid only their mean is left. */
 export function coarsen(mesh, most) {
-  const low = [Infinity, Infinity, Infinity]
+  const low = /** @type {[number, number, number]} */ ([Infinity, Infinity, Infinity])
   const high = [-Infinity, -Infinity, -Infinity]
   mesh.vertices.forEach((x, i) => {
     low[i % 3] = Math.min(low[i % 3], x)

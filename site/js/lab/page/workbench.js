@@ -81,12 +81,12 @@ export class Workbench extends Instrument {
     this.playRequested = play
     const { text } = this.editor
     const isLessons = text === this.config.xml
+    this.opened.hidden = isLessons || this.own === null
     this.simulation.load(text, isLessons ? null : this.own, this.isOther && !isLessons)
   }
 
   /** Put another model into the editor, with the files beside it, and run it. */
   openModel(text, own = null) {
-    this.opened.hidden = own === null
     this.own = own
     this.isOther = text !== this.config.xml
     this.editor.text = text
