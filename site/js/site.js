@@ -10,6 +10,7 @@ import { placeNotes } from './page/notes.js'
 import { followPath } from './page/path.js'
 import { openForPrint } from './page/print.js'
 import { markScrolling } from './page/scroll.js'
+import { settle } from './page/settle.js'
 import { leaveQuizzes, mountQuizzes } from './page/quizzes.js'
 import { addSearch } from './page/search.js'
 import { addThemeSwitch } from './page/theme.js'
@@ -47,6 +48,7 @@ followLines(window)
 followPath(document)
 unfoldLinked(window)
 showVersions(document)
+settle(window)
 
 // In a preview, parts of the page are replaced while it is open.
 document.addEventListener('coursebuild:changed', ({ detail: { added, removed } }) => {

@@ -257,6 +257,7 @@ test('errors of lab code name their entry', (t) => {
   fails({ setup: broken }, ['setup'], start)
   fails({ controls: [{ run: fine }, { set: broken }] }, ['controls', 1], start)
   fails({ plots: [[fine], [fine, broken]] }, ['plots', 1, 'traces', 1, 'expr'], start)
+  fails({ plots: [[fine, broken], [fine, fine]] }, ['plots', 0, 'x'], start)
   fails({ controller: broken }, ['controller'], (lab) => (lab.start(), lab.step(1)))
   fails({ controls: [{ run: broken }, { set: fine }] }, ['controls', 0, 'run'], (lab) => (lab.start(), lab.press(0)))
   fails({ readouts: [fine, broken] }, ['readouts', 1, 'expr'], (lab) => (lab.start(), lab.readouts()))

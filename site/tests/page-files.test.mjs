@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { deflateRawSync } from 'node:zlib'
-import { FilesError, readModel } from '../js/lab/page/files.js'
+import { FilesError, readModels } from '../js/lab/page/files.js'
 import { Lab } from '../js/lab/core/lab.js'
 import { code, config, newEngine } from './helpers.mjs'
 
@@ -40,37 +40,40 @@ function zip(entries) {
   return Buffer.concat([...parts, ...directory, end])
 }
 
-const open = (...entries) => readModel([file('robot.zip', zip(entries))])
+const open = (...entries) => readModels([file('robot.zip', zip(entries))])
+const paths = async (...entries) => [...(await open(...entries)).models.keys()]
 const refused = (promise, key) => assert.rejects(promise, (error) => error instanceof FilesError && error.key === key)
 
 test('a zip is unpacked, and the scene in it is the model', async () => {
-  const { main, text, files } = await open(
+  const { models, files } = await open(
     ['robot/', ''],
     ['robot/robot.xml', model()],
     ['robot/scene.xml', '<mujoco><include file="robot.xml"/></mujoco>'],
     ['robot/assets/hand.obj', 'v 0 0 0', { method: 0 }],
     ['robot/README.xml', '<notes/>'],
   )
-  assert.equal(main, 'robot/scene.xml')
-  assert.match(text, /include/)
-  assert.deepEqual([...files.keys()].sort(), ['robot/README.xml', 'robot/assets/hand.obj', 'robot/robot.xml'])
+  assert.deepEqual([...models], [['robot/scene.xml', '<mujoco><include file="robot.xml"/></mujoco>']])
+  assert.deepEqual([...files.keys()].sort(), ['robot/README.xml', 'robot/assets/hand.obj', 'robot/robot.xml', 'robot/scene.xml'])
   assert.equal(new TextDecoder().decode(files.get('robot/assets/hand.obj')), 'v 0 0 0')
 })
 
-test('without a scene the highest model that no other includes is taken', async () => {
-  const { main } = await open(['a/b/c.xml', model()], ['part.xml', model()], ['whole.xml', '<mujoco><include file="part.xml"/></mujoco>'])
-  assert.equal(main, 'whole.xml')
-  const { main: floor } = await open(['arm.xml', model()], ['arm_fixed.xml', model()], ['on_a_floor.xml', '<mujoco><include file="arm.xml"/></mujoco>'])
-  assert.equal(floor, 'on_a_floor.xml', 'that which includes another')
-  assert.equal((await readModel([file('robot.urdf', '<robot name="r"/>')])).main, 'robot.urdf')
+test('the models of a zip are those that no other includes, the likeliest first', async () => {
+  const including = (path) => `<mujoco><include file="${path}"/></mujoco>`
+  assert.deepEqual(await paths(['a/b/c.xml', model()], ['part.xml', model()], ['whole.xml', including('part.xml')]), ['whole.xml', 'a/b/c.xml'])
+  const order = await paths(['arm.xml', model()], ['arm_fixed.xml', model()], ['on_a_floor.xml', including('arm.xml')])
+  assert.deepEqual(order, ['on_a_floor.xml', 'arm_fixed.xml'], 'first that which includes another')
+  const robots = await paths(['a/scene.xml', including('arm.xml')], ['a/arm.xml', including('./parts/hand.xml')], ['a/parts/hand.xml', model()], ['b/arm.xml', model()])
+  assert.deepEqual(robots, ['a/scene.xml', 'b/arm.xml'], 'another model of the same name')
+  assert.deepEqual(await paths(['a/x/scene.xml', including('../arm.xml')], ['a/arm.xml', model()]), ['a/x/scene.xml'])
+  assert.deepEqual([...(await readModels([file('robot.urdf', '<robot name="r"/>')])).models.keys()], ['robot.urdf'])
 })
 
 test('files that lie elsewhere are left out, and what is no model is told', async () => {
   const { files } = await open(['m.xml', model()], ['../../etc/passwd', 'x'], ['/absolute.obj', 'v'], ['C:\\windows.obj', 'v'])
-  assert.deepEqual([...files.keys()], ['absolute.obj'])
+  assert.deepEqual([...files.keys()], ['m.xml', 'absolute.obj'])
   await refused(open(['notes.xml', '<notes/>'], ['mesh.obj', 'v']), 'file_none')
-  await refused(readModel([]), 'file_none')
-  await refused(readModel([file('m.xml', model(' '.repeat(100_001)))]), 'file_large')
+  await refused(readModels([]), 'file_none')
+  await refused(readModels([file('m.xml', model(' '.repeat(100_001)))]), 'file_large')
 })
 
 test('a zip that unfolds to too much is stopped, whatever it claims', async () => {
@@ -91,18 +94,19 @@ test('zips that are encrypted, cut off or garbled are refused, and nothing else 
   for (let i = 0; i < 300; i++) {
     const bytes = Uint8Array.from(whole.subarray(0, i % 3 === 0 ? draw(whole.length) : whole.length))
     for (let k = 0; k < 1 + draw(4) && bytes.length > 4; k++) bytes[4 + draw(bytes.length - 4)] = draw(256)
-    await readModel([file('m.zip', bytes)]).catch((error) => assert.ok(error instanceof FilesError, String(error.stack)))
+    await readModels([file('m.zip', bytes)]).catch((error) => assert.ok(error instanceof FilesError, String(error.stack)))
   }
 })
 
 test('the engine finds the files beside a model, those that it includes too, and keeps none', async () => {
   const engine = await newEngine()
   const corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]].map((point) => `v ${point.join(' ')}`)
-  const { main, files, text } = await open(
+  const { models, files } = await open(
     ['r/scene.xml', '<mujoco><compiler meshdir="assets"/><include file="parts/body.xml"/></mujoco>'],
     ['r/parts/body.xml', '<mujoco><asset><mesh name="m" file="m.obj"/></asset><worldbody><body><freejoint/><geom type="mesh" mesh="m"/></body></worldbody></mujoco>'],
     ['r/assets/m.obj', [...corners, 'f 1 3 2', 'f 1 2 4', 'f 1 4 3', 'f 2 3 4'].join('\n')],
   )
+  const [[main, text]] = models
   for (let i = 0; i < 2; i++) {
     const lab = new Lab(engine, text, config(), code(), {}, { main, files })
     assert.equal(lab.model.nmeshvert, 4)

@@ -233,6 +233,7 @@ def test_reader_opens_a_model_with_its_meshes_and_nothing_is_sent(page: Page) ->
     expect(text).to_have_value(ROBOT["robot/scene.xml"])
     expect(lab_element).to_have_attribute("data-state", "playing")
     expect(lab_element.locator(".lab-time")).not_to_have_text(re.compile(r"^0\.000* s$"))
+    expect(lab_element.get_by_text("Opened robot/scene.xml, with 2 other files.")).to_be_visible()
     assert violations(page, ".lab") == []
     press(lab_element, "Copy link to this model")
     expect(lab_element.get_by_text("without the files beside it")).to_be_visible()
@@ -251,6 +252,28 @@ def test_reader_opens_a_model_with_its_meshes_and_nothing_is_sent(page: Page) ->
     lab_element.evaluate(DROP, ["garbled.zip", [0x50, 0x4B, 3, 4, *range(99)]])
     expect(lab_element.get_by_role("alert").filter(has_text="cannot be read")).to_be_visible()
     assert [request for request in requests if not request.startswith("GET ")] == []
+
+
+FINE = """<mujoco>
+  <asset><mesh name="pearl" builtin="sphere" params="4" scale="0.04 0.04 0.04"/></asset>
+  <worldbody>
+    <replicate count="40" offset="0.1 0 0"><geom type="mesh" mesh="pearl"/></replicate>
+  </worldbody>
+</mujoco>"""
+
+
+def test_zip_offers_its_models_and_a_model_too_fine_to_draw_is_drawn_coarser(page: Page) -> None:
+    lab_element, text = editor_of(page)
+    files = archive({**ROBOT, "fine.xml": FINE})
+    lab_element.evaluate(DROP, ["robots.zip", list(files)])
+    expect(text).to_have_value(ROBOT["robot/scene.xml"])
+    lab_element.get_by_label("Model of these files").select_option(label="fine.xml")
+    expect(text).to_have_value(FINE)
+    expect(lab_element.get_by_text("Drawn coarser")).to_contain_text("pearl")
+    expect(lab_element).to_have_attribute("data-state", "playing")
+    press(lab_element, "Back to the lesson’s model")
+    expect(lab_element.get_by_text("Drawn coarser")).to_have_count(0)
+    expect(lab_element.get_by_label("Model of these files")).to_be_hidden()
 
 
 def test_every_lab_opens_its_model_in_the_editor(page: Page) -> None:

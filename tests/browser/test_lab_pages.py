@@ -76,6 +76,23 @@ def test_button_and_values_have_their_room_before_the_lab_plays(
         assert swing.evaluate(widths) == room
 
 
+def test_one_quantity_is_plotted_against_another(context: BrowserContext, base: str) -> None:
+    page, console = watch_page(context)
+    page.goto(base + PAGE)
+    itself = lab(page, AUTO, "playing")
+    plot = itself.locator(".lab-live").get_by_role("img", name="rate (rad/s) against angle (rad)")
+    expect(plot.locator(".lab-trace")).to_have_attribute("d", re.compile(r"^M.*L"))
+    expect(plot).to_contain_text("angle (rad)")
+    press(itself, "Pause")
+    with page.expect_download() as download:
+        press(itself, "Curves as CSV")
+    rows = download.value.path().read_text().splitlines()
+    assert rows[0] == "time (s),rate: rate (rad/s),angle (rad)"
+    assert len(rows) > 2
+    assert violations(page, ".lab") == []
+    assert console == []
+
+
 def test_on_a_desk_picture_curves_and_controls_share_a_screen(
     browsers: Mapping[str, Browser], base: str
 ) -> None:

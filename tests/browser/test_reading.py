@@ -66,6 +66,14 @@ def test_no_page_is_wider_than_its_window(
             until(page, FITS)
 
 
+def test_far_parts_have_their_sizes_before_a_reader_jumps_to_them(open_page: OpenPage) -> None:
+    page = open_page(width=390)
+    page.evaluate("document.documentElement.style.setProperty('--below', 'visible')")
+    height = page.evaluate("document.documentElement.scrollHeight")
+    condition = "height => document.documentElement.scrollHeight === height"
+    until(open_page(width=390), condition, height)
+
+
 def test_wide_things_scroll_in_themselves(open_page: OpenPage) -> None:
     page = open_page(width=360)
     page.evaluate(OPEN_ALL)

@@ -79,8 +79,8 @@ def pieces(lab: Lab) -> Iterator[LabCode]:
     for i, readout in enumerate(lab.fields.readouts):
         yield LabCode(("readouts", i, "expr"), "expression", readout.expr)
     for i, plot in enumerate(lab.fields.plots):
-        for j, trace in enumerate(plot.traces):
-            yield LabCode(("plots", i, "traces", j, "expr"), "expression", trace.expr)
+        for entry, expression in _curves(i, plot):
+            yield LabCode(entry, "expression", expression)
     for i, claim in enumerate(lab.fields.expect):
         if claim.expr is not None:
             yield LabCode(("expect", i, "expr"), "expression", claim.expr)
@@ -104,6 +104,7 @@ def compile_lab(lab: Lab, name: str) -> LabModule:
         "plots": [
             {name: getattr(plot, name) for name in _PLOT}
             | {"traces": [{"label": trace.label, "dash": trace.dash} for trace in plot.traces]}
+            | ({} if plot.x is None else {"x": True, "xlabel": plot.xlabel or plot.x})
             for plot in fields.plots
         ],
         "expect": [
@@ -127,6 +128,14 @@ def compile_lab(lab: Lab, name: str) -> LabModule:
     return LabModule(name, code, f"({literal})", data)
 
 
+def _curves(i: int, plot: schema.Plot) -> Iterator[tuple[Entry, str]]:
+    """Yield what is computed for a plot: its traces, then what its horizontal axis shows."""
+    for j, trace in enumerate(plot.traces):
+        yield ("plots", i, "traces", j, "expr"), trace.expr
+    if plot.x is not None:
+        yield ("plots", i, "x"), plot.x
+
+
 def _members(lab: Lab) -> Iterator[tuple[str, str]]:
     functions, fields = {piece.entry: piece.function for piece in pieces(lab)}, lab.fields
     for name in ("setup", "controller"):
@@ -136,7 +145,7 @@ def _members(lab: Lab) -> Iterator[tuple[str, str]]:
     yield "controls", _list(controls)
     yield "readouts", _list(functions["readouts", i, "expr"] for i, _ in enumerate(fields.readouts))
     plots = (
-        _list(functions["plots", i, "traces", j, "expr"] for j, _ in enumerate(plot.traces))
+        _list(functions[entry] for entry, _ in _curves(i, plot))
         for i, plot in enumerate(fields.plots)
     )
     yield "plots", _list(plots)

@@ -246,7 +246,7 @@ def _plot(words: Strings, plot: Plot) -> tuple[str, tuple[str, ...]]:
     title = words(
         "lab.plot",
         ylabel=plot.ylabel or words("lab.value"),
-        xlabel=plot.xlabel or words("lab.time"),
+        xlabel=plot.xlabel or plot.x or words("lab.time"),
     )
     lines = ((line.label, words.number(line.y)) for line in plot.refLines)
     marks = (f"{label} ({y})" if label else y for label, y in lines)

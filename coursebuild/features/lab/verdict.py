@@ -74,6 +74,8 @@ def _entry_name(lab: Lab, entry: Entry) -> str:
             return f"the readout `{lab.fields.readouts[i].label}`"
         case ("plots", int(i), "traces", int(j), *_) if i < len(lab.fields.plots):
             return f"the trace `{lab.fields.plots[i].traces[j].label}`"
+        case ("plots", int(), "x"):
+            return "the horizontal axis of a plot"
         case ("expect", int(i), *_) if i < len(lab.fields.expect):
             return "the claim"
         case ("goal", *_):
@@ -191,22 +193,25 @@ def fallen_bodies(trial: TrialReply) -> tuple[str, ...]:
 def clipped_curves(lab: Lab, reach: Sequence[tuple[float, float] | None]) -> tuple[str, ...]:
     """Name the curves that leave what `ymin` and `ymax` show, and how far they go.
 
-    `reach` is the least and the greatest value of each trace of all plots in turn. By less than a
-    line is wide, a hundredth of what is shown, none leaves.
+    `reach` is the least and the greatest value of all that plots compute, in turn: of each trace
+    and of `x`. By less than a line is wide, a hundredth of what is shown, none leaves.
     """
     texts: list[str] = []
-    traces = [(plot, trace) for plot in lab.fields.plots for trace in plot.traces]
+    traces = [
+        (plot, trace)
+        for plot in lab.fields.plots
+        for trace in (*plot.traces, *(() if plot.x is None else (None,)))
+    ]
     for (plot, trace), ends in zip(traces, reach, strict=False):
-        if ends is None:
+        if ends is None or trace is None:
             continue
         low, high = ends
-        bottom = low if plot.ymin is None else plot.ymin
-        top = high if plot.ymax is None else plot.ymax
-        width = (top - bottom) / 100
-        if low < bottom - width:
-            texts.append(f"`{trace.label}`, down to {low:.3g} (`ymin` is {bottom:g})")
-        if high > top + width:
-            texts.append(f"`{trace.label}`, up to {high:.3g} (`ymax` is {top:g})")
+        least, most = plot.ymin, plot.ymax
+        width = abs((high if most is None else most) - (low if least is None else least)) / 100
+        if least is not None and low < least - width:
+            texts.append(f"`{trace.label}`, down to {low:.3g} (`ymin` is {least:g})")
+        if most is not None and high > most + width:
+            texts.append(f"`{trace.label}`, up to {high:.3g} (`ymax` is {most:g})")
     return tuple(texts)
 
 

@@ -13,9 +13,10 @@ from xml.etree import ElementTree
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from coursebuild.core.drawing.scales import tick_texts, ticks
-from coursebuild.features.lab.picture.static import plot_svg
+from coursebuild.features.lab.picture.static import plot_svg, recorded_svg
 from coursebuild.features.lab.schema import Plot, RefLine, TraceFields
 from support.fixture_cases import check_lines
 
@@ -224,3 +225,16 @@ def test_a_plot_is_named_by_words_of_its_lab_alone() -> None:
     ):
         root = draw_plot([[0.0, 1.0], [1.0, 2.0]], spec=plot("oben", "unten", **fields))
         assert root.attrib["aria-label"] == name
+
+
+def test_plot_of_one_quantity_against_another_has_its_last_column_across() -> None:
+    spec = plot("a", x="data.qpos[0]", xlabel="")
+    times, columns = [0.0, 1.0, 2.0, 3.0], [[1.0, 0.0, 1.0, 2.0], [0.0, 1.0, 0.0, None]]
+    root = ElementTree.fromstring(recorded_svg(spec, times, columns, ".", narrow=False))
+    (first, second, third), _ = zip(*points(root), strict=True)
+    assert first == third < second
+    assert "data.qpos[0]" in texts(root)
+    recent = ElementTree.fromstring(
+        recorded_svg(replace(spec, window=2.0), times, columns, ".", narrow=False)
+    )
+    assert len(points(recent)) == 2

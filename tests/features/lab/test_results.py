@@ -129,7 +129,8 @@ def test_what_falls_through_the_floor_is_told_in_the_labs_line(
 @pytest.mark.engine
 def test_curve_that_leaves_its_plot_is_told_in_the_labs_line(tmp_path: Path, stores: Path) -> None:
     plot = (
-        '{"ymin": -5, "ymax": 1, "traces": [{"label": "height", "expr": "data.qpos[2]"},'
+        '{"ymin": -5, "ymax": 1, "x": "data.time - 9", "traces": ['
+        '{"label": "height", "expr": "data.qpos[2]"},'
         ' {"label": "none", "expr": "null"}, {"label": "still", "expr": "1.0001"}]}'
     )
     curve = """
@@ -139,12 +140,13 @@ x = { name = "x", max = 2 }
 plots = [{ ymax = 3, traces = [{ label = "square", expr = "x**2" }] }]
 ```
 """
-    lab = fence(f'{{"model": "ball", "stopAt": 2, "plots": [{plot}]}}')
+    high = '{"ymax": 1, "traces": [{"label": "high", "expr": "3"}]}'
+    lab = fence(f'{{"model": "ball", "stopAt": 2, "plots": [{plot}, {high}]}}')
     folder = course(tmp_path / "course", stores, f"## Labs\n\n{lab}{curve}")
     folder.write("models/ball.xml", BALL)
     clipped = {line["name"]: line["clipped"] for line in run_check(folder, status=0)["labs"]}
     assert clipped == {
-        "1.2-lab-1": ["`height`, down to -19.6 (`ymin` is -5)"],
+        "1.2-lab-1": ["`height`, down to -19.6 (`ymin` is -5)", "`high`, up to 3 (`ymax` is 1)"],
         "1.2-lab-2": ["`square`, up to 4 (`ymax` is 3)"],
     }
     assert "leaves its plot: `height`, down to -19.6" in folder.main("check").out

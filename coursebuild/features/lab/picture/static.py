@@ -7,6 +7,7 @@ are classes that the style sheet defines for light and dark pages; text has the 
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from itertools import groupby, pairwise
 from typing import Any, TypeGuard
@@ -14,6 +15,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from markupsafe import Markup
 from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from coursebuild.core.drawing.scales import Scale, separate_labels, typeset_number
@@ -91,7 +93,7 @@ def lab_record(lab: Lab, main: MainRun, decimal: str) -> LabRecord:
     first, last = main["pictures"][0], main["pictures"][-1]
     recorded = main["plots"]
     plots = tuple(
-        Markup(plot_svg(plot, recorded["times"], traces, decimal, narrow=lab.fields.dock))
+        Markup(recorded_svg(plot, recorded["times"], traces, decimal, narrow=lab.fields.dock))
         for plot, traces in zip(lab.fields.plots, recorded["plots"], strict=True)
     )
     readouts = tuple(
@@ -107,17 +109,41 @@ def lab_record(lab: Lab, main: MainRun, decimal: str) -> LabRecord:
     return LabRecord(_size(lab), scale, first["time"], readouts, last["time"], plots, arrows=arrows)
 
 
+def recorded_svg(
+    plot: Plot,
+    times: Sequence[float],
+    traces: Sequence[Sequence[float | None]],
+    decimal: str,
+    *,
+    narrow: bool,
+) -> str:
+    """Draw a plot of a main run, against the time or against its last column."""
+    if plot.x is None:
+        return plot_svg(plot, times, traces, decimal, narrow=narrow)
+    start = times[-1] - plot.window if times and plot.window is not None else -math.inf
+    first = bisect_left(times, start)
+    *lines, places = (column[first:] for column in traces)
+    plot = replace(plot, window=None, xlabel=plot.xlabel or plot.x)
+    return plot_svg(plot, *_interrupt(places, lines), decimal, narrow=narrow)
+
+
+def _interrupt(
+    places: Sequence[float | None], lines: Sequence[Sequence[float | None]]
+) -> tuple[list[float], list[list[float | None]]]:
+    """Interrupt lines where their place on the horizontal axis is unknown."""
+    parts = [
+        [None if x is None else y for x, y in zip(places, line, strict=True)] for line in lines
+    ]
+    return [x or 0.0 for x in places], parts
+
+
 def equation_record(lab: Lab, config: dict[str, Any], run: CurveRun, decimal: str) -> LabRecord:
     """Make the record of a lab without an engine from what follows from its start."""
     plots = []
     for plot, data, source in zip(lab.fields.plots, run.plots, config["plots"], strict=True):
         axis = config["axis"]
         ends = (source["xmin"], source["xmax"]) if source["x"] else (axis["min"], axis["max"])
-        horizontal = [0.0 if x is None else x for x in data["x"]]
-        lines = [
-            [None if x is None else y for x, y in zip(data["x"], line, strict=True)]
-            for line in data["traces"]
-        ]
+        horizontal, lines = _interrupt(data["x"], data["traces"])
         points = (source["points"] or {"data": ()})["data"]
         svg = plot_svg(
             plot, horizontal, lines, decimal, narrow=lab.fields.dock, ends=ends, marks=points

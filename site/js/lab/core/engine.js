@@ -147,8 +147,8 @@ function readModel(mj, bytes) {
   return model
 }
 
-/** The largest model that a page draws without becoming slow. */
-const MOST = { ngeom: 2000, nsite: 2000, nlight: 100, nmeshface: 200_000, nhfielddata: 500_000, ntexdata: 64 << 20 }
+/** The largest model that a page draws without becoming slow, and what a browser has room for; meshes and textures are drawn coarser (core/detail.js). */
+const MOST = { ngeom: 2000, nsite: 2000, nlight: 100, nmeshface: 4_000_000, nhfielddata: 500_000, ntexdata: 512 << 20 }
 
 /** Compile MJCF that a reader may have written, and refuse a model that is too large to draw. Of files it finds its own only. */
 function compileModel(mj, text, own) {
@@ -176,8 +176,8 @@ function compileXml(mj, text, own) {
   let paths = []
   try {
     if (own === null) return mj.MjModel.from_xml_string(text)
-    paths = writeFiles(mj, [...own.files, [own.main, text]])
-    return mj.MjModel.from_xml_path(paths.at(-1))
+    paths = writeFiles(mj, new Map(own.files).set(own.main, text))
+    return mj.MjModel.from_xml_path(`${FOLDER}/${own.main}`)
   } catch (error) {
     const message = String(error.message).trim()
     const detail = message.replace(/^MuJoCo Error: (Loading error: )?/, '')

@@ -35,6 +35,9 @@ export function call(entry, code) {
   }
 }
 
+/** The entry of what a plot computes: of a trace or, behind them, of its horizontal axis. */
+export const curveEntry = ({ traces }, i, j) => ['plots', i, ...(j < traces.length ? ['traces', j, 'expr'] : ['x'])]
+
 /** Check a value for a readout: a number or a text, or `null` for none. */
 export function readable(entry, value) {
   if (typeof value === 'number' || typeof value === 'string' || value === null) return value

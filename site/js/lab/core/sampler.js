@@ -6,7 +6,7 @@
  */
 
 import { Goal } from './goal.js'
-import { call, plottable } from './piece.js'
+import { call, curveEntry, plottable } from './piece.js'
 
 const PER_WINDOW = 600 // samples in the width of a plot
 const DEFAULT_WINDOW = 10 // s, for a plot that shows all of its time
@@ -20,7 +20,7 @@ export class Sampler {
    */
   constructor(config, code, site) {
     this.traces = config.plots.flatMap((plot, i) =>
-      plot.traces.map((_, j) => ({ entry: ['plots', i, 'traces', j, 'expr'], run: code.plots[i][j] })),
+      code.plots[i].map((run, j) => ({ entry: curveEntry(plot, i, j), run })),
     )
     const windows = config.plots.map((plot) => plot.window ?? DEFAULT_WINDOW)
     this.interval = Math.min(DEFAULT_WINDOW, ...windows) / PER_WINDOW

@@ -13,12 +13,14 @@ export function fillScript(text, values) {
 /**
  * The curves of a lab as a table, comma-separated as RFC 4180 says.
  *
- * @param {{ylabel: string, labels: string[], columns: Float64Array[]}[]} curves of each plot: what its axis says, the names of its lines,
- *   and its samples: the same times in all, then one column for each line, NaN for a gap
+ * @param {{ylabel: string, labels: string[], across?: string[], columns: Float64Array[]}[]} curves of each plot: what its axis says, the
+ *   names of its lines, that of its horizontal axis unless it is the time, and its samples: the same times in all, then one column for each
+ *   of these, NaN for a gap
  * @returns {string} a header, then one row for each time
  */
 export function curvesText(curves) {
-  const names = curves.flatMap(({ ylabel, labels }) => labels.map((label) => (ylabel && ylabel !== label ? `${label}: ${ylabel}` : label)))
+  const full = (label, ylabel) => (ylabel && ylabel !== label ? `${label}: ${ylabel}` : label)
+  const names = curves.flatMap(({ ylabel, labels, across = [] }) => [...labels.map((label) => full(label, ylabel)), ...across])
   const columns = [curves[0].columns[0], ...curves.flatMap((curve) => curve.columns.slice(1))]
   const rows = Array.from(columns[0], (_, i) => columns.map((column) => (Number.isFinite(column[i]) ? String(column[i]) : '')))
   return [['time (s)', ...names].map(quoted), ...rows].map((row) => `${row.join(',')}\r\n`).join('')

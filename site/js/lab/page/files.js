@@ -1,7 +1,7 @@
 /**
  * A model of the reader's own, from files of this device: MJCF or URDF, alone, with the files that it names, or all of it in a zip.
  *
- *   const { main, text, files } = await readModel(fileList)
+ *   const { models, files } = await readModels(fileList)
  *
  * Nothing is sent anywhere. What is read is bounded, whatever a zip claims of itself.
  */
@@ -24,10 +24,10 @@ export class FilesError extends Error {
 
 /**
  * @param {Iterable<File>} list
- * @returns {Promise<{main: string, text: string, files: Map<string, Uint8Array>}>} the path and the text of the model, and all other files
- *   by their paths
+ * @returns {Promise<{models: Map<string, string>, files: Map<string, Uint8Array>}>} the texts of the models, the likeliest first, and all
+ *   files, by their paths
  */
-export async function readModel(list) {
+export async function readModels(list) {
   const given = [...list]
   if (given.length > MOST_FILES || given.reduce((sum, { size }) => sum + size, 0) > MOST_BYTES) throw new FilesError('file_large')
   const files = new Map()
@@ -43,9 +43,7 @@ export async function readModel(list) {
     if (isZip(bytes)) for await (const [name, part] of unzip(bytes, () => room)) add(name, part)
     else add(file.name, bytes)
   }
-  const { main, text } = mainModel(files)
-  files.delete(main)
-  return { main, text, files }
+  return { models: findModels(files), files }
 }
 
 /** The path of a file inside the folder of the model; null if it has none. */
@@ -54,26 +52,39 @@ function pathOf(name) {
   return parts.length === 0 || parts.includes('..') || /[\0:]/.test(name) ? null : parts.join('/')
 }
 
-/** The model that no other includes; of several that of a scene, then one that includes others, as scenes do, then the one that lies highest. */
-function mainModel(files) {
+/**
+ * The models that no other includes: first those of a scene, then those that include others, as scenes do, then by how high they lie.
+ */
+function findModels(files) {
   const texts = new Map()
   for (const [path, bytes] of files) {
     if (!/\.(?:xml|mjcf|urdf)$/i.test(path)) continue
     const text = new TextDecoder().decode(bytes)
     if (MODEL.test(text)) texts.set(path, text)
   }
-  const included = new Set([...texts.values()].flatMap((text) => [...text.matchAll(INCLUDED)].map(([, file]) => file.split('/').at(-1))))
-  const depth = (path) => path.split('/').length
-  const rank = (path) => [included.has(path.split('/').at(-1)) ? 1 : 0, SCENE.test(path) ? 0 : 1, texts.get(path).match(INCLUDED) ? 0 : 1, depth(path)]
-  const order = [...texts.keys()].sort((a, b) => {
+  const included = new Set([...texts].flatMap(([path, text]) => [...text.matchAll(INCLUDED)].flatMap(([, file]) => placesOf(file, path))))
+  const roots = [...texts.keys()].filter((path) => !included.has(path) && texts.get(path).length <= LONGEST_MODEL)
+  if (roots.length === 0) throw new FilesError(texts.size === 0 ? 'file_none' : 'file_large')
+  const rank = (path) => [SCENE.test(path) ? 0 : 1, texts.get(path).match(INCLUDED) ? 0 : 1, path.split('/').length]
+  roots.sort((a, b) => {
     const [left, right] = [rank(a), rank(b)]
     const i = left.findIndex((value, k) => value !== right[k])
     return i < 0 ? a.localeCompare(b, 'en') : left[i] - right[i]
   })
-  if (order.length === 0) throw new FilesError('file_none')
-  const [main] = order
-  if (texts.get(main).length > LONGEST_MODEL) throw new FilesError('file_large')
-  return { main, text: texts.get(main) }
+  return new Map(roots.map((path) => [path, texts.get(path)]))
+}
+
+/** Where a file may lie that a model names: names count from the folder of the model, or of that which includes it, above it. */
+function placesOf(name, model) {
+  const folders = model.split('/').slice(0, -1)
+  return Array.from({ length: folders.length + 1 }, (_, depth) => {
+    const parts = []
+    for (const part of [...folders.slice(0, depth), ...name.split(/[/\\]/)]) {
+      if (part === '..') parts.pop()
+      else if (part !== '.' && part !== '') parts.push(part)
+    }
+    return parts.join('/')
+  })
 }
 
 // --- zip: the directory at its end, then each file, stored or deflated

@@ -13,6 +13,7 @@ import { curvesText, fillScript } from './export.js'
 import { History } from './history.js'
 import { digitsOfStep, formatReadout, formatTime } from './numbers.js'
 import { followLegend } from './legend.js'
+import { Orbit } from './orbit.js'
 import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
@@ -106,7 +107,7 @@ export class Instrument extends Shell {
       look: (camera) => this.view.look(camera),
       seek,
     })
-    this.plots = config.plots.map((plot) => new Plot(plot, words, seek))
+    this.plots = config.plots.map((plot) => (plot.x ? new Orbit(plot, words) : new Plot(plot, words, seek)))
     this.goal = this.makeGoal({ show: () => this.simulation.replay({ values: this.initial, events: config.goal.log }) })
     this.motion = h('p', { class: 'lab-motion', hidden: true })
     this.controls.show(this.values)
@@ -114,10 +115,10 @@ export class Instrument extends Shell {
     const screen = h('div', { class: 'lab-screen' }, this.view.element, this.transport.full, this.notices.message)
     const panel = h('div', { class: 'lab-panel' }, this.controls.element, boxes, this.readouts.element)
     const plots = this.plots.map((plot) => plot.element)
-    const reason = config.still ? h('p', { class: 'lab-reason' }, config.still) : null // why nothing moves when a reader presses Play
+    this.reason = h('p', { class: 'lab-reason', hidden: !config.still }, config.still) // why nothing moves when a reader presses Play
     this.show(
       'lab-live',
-      [screen, this.transport.element, this.tape.element, reason],
+      [screen, this.transport.element, this.tape.element, this.reason],
       [this.motion, this.goal?.element ?? null, ...plots, panel],
       this.makeFoot(),
       (isVisible) => this.simulation.setVisible(isVisible),
@@ -187,6 +188,9 @@ export class Instrument extends Shell {
   onReady({ values, scene }) {
     this.digits = Math.min(4, Math.max(2, digitsOfStep(scene.timestep))) // of the time at rest, so that a step is seen
     this.poses = this.makePoses()
+    const said = scene.coarse.length > 0 ? this.words('lab.live.coarse', { names: scene.coarse.join(', ') }) : ''
+    this.reason.textContent = [this.config.still, said].filter(Boolean).join(' ')
+    this.reason.hidden = this.reason.textContent === ''
     this.update(values)
     const { pendingAction, playRequested: pressed } = this
     this.pendingAction = null
@@ -243,7 +247,7 @@ export class Instrument extends Shell {
     let offset = 0
     for (const plot of this.plots) {
       plot.push(times, values, width, offset)
-      offset += plot.config.traces.length
+      offset += plot.count
     }
   }
 
@@ -404,6 +408,7 @@ export class Instrument extends Shell {
     const curves = this.plots.map(({ config, whole }) => ({
       ylabel: config.ylabel,
       labels: config.traces.map(({ label }) => label),
+      across: config.x ? [config.xlabel] : [],
       columns: whole.table(),
     }))
     download(`${this.config.id}.csv`, curvesText(curves), 'text/csv')

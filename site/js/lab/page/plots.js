@@ -11,7 +11,7 @@ import { formatLabel, formatTime, superscript } from './numbers.js'
 import { palette, watchTheme } from './palette.js'
 import { spanOf, spread } from './span.js'
 
-const HEIGHT = 170 // CSS pixels where texts have their usual size
+export const HEIGHT = 170 // CSS pixels where texts have their usual size
 const DASHES = [[], [7, 3], [2, 2.5], [9, 3, 2, 3], [4, 4], [12, 3]]
 const FONT = Math.round(0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize)) // CSS pixels; whole, since uPlot scales only the digits next to `px`
 const GAP = 6
@@ -37,32 +37,19 @@ export const PLAIN_PLOT = {
 }
 const PLAYING = { time: 0, resting: false, marks: [] }
 
-export class Plot {
-  /**
-   * @param {any} config a plot of the lab's JSON; `log: true` gives it a logarithmic y axis
-   * @param {(key: string, values?: Record<string, any>) => string} words
-   * @param {((time: number) => void) | null} [seek] the reader points at a time (s)
-   */
-  constructor(config, words, seek = null) {
+/** The samples of a plot, in its window and of the whole run, and those of a run that is kept. */
+export class Samples {
+  /** @param {any} config a plot of the lab's JSON @param {number} [count] numbers of a sample */
+  constructor(config, count = config.traces.length) {
     this.config = config
-    this.recent = new History(config.traces.length, config.window)
-    this.whole = config.window === null ? this.recent : new History(config.traces.length, null)
+    this.count = count
+    this.recent = new History(count, config.window)
+    this.whole = config.window === null ? this.recent : new History(count, null)
     /** @type {{time: number, resting: boolean, marks: {time: number, label: string}[]}} */
     this.now = PLAYING
-    /** @type {number | null} the time under the pointer (s) */
-    this.pointed = null
     /** @type {Float64Array[] | null} the samples of an earlier run */
     this.kept = null
-    this.keptSpan = NO_SPAN
-    this.caption = words('lab.plot', { ylabel: config.ylabel || words('lab.value'), xlabel: config.xlabel || words('lab.time') })
-    this.element = h('figure', { class: 'lab-plot', role: 'img', 'aria-label': `${this.caption}: ${names(config)}` })
-    this.chart = null
     this.dirty = false
-    this.element.style.setProperty('--height', `${(config.height ?? HEIGHT) / 16}rem`)
-    this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
-    this.resizer.observe(this.element)
-    this.unwatch = watchTheme(() => this.recolour())
-    if (seek !== null) this.watchPointer(seek)
   }
 
   /** Add samples: `values` has `width` numbers for each time, those of this plot from `offset` on. */
@@ -90,14 +77,42 @@ export class Plot {
   /** Keep the run, so that its lines stay behind those of the next; or keep none. */
   keep(on) {
     this.kept = on && this.whole.length > 0 ? this.whole.table().map((column) => column.slice()) : null
-    const values = (this.kept ?? []).slice(1).flatMap((column) => [...column].filter(Number.isFinite))
-    this.keptSpan = values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], NO_SPAN)
     this.dirty = true
   }
 
   /** The samples that are shown. */
   get history() {
     return this.now.resting ? this.whole : this.recent
+  }
+
+  /** Take what there is to draw; returns whether it differs from what was drawn before. */
+  take(now) {
+    const { time, resting } = this.now
+    this.now = now
+    if (now.resting !== resting || (resting && now.time !== time)) this.dirty = true
+    return this.dirty
+  }
+}
+
+export class Plot extends Samples {
+  /**
+   * @param {any} config a plot of the lab's JSON; `log: true` gives it a logarithmic y axis
+   * @param {(key: string, values?: Record<string, any>) => string} words
+   * @param {((time: number) => void) | null} [seek] the reader points at a time (s)
+   */
+  constructor(config, words, seek = null) {
+    super(config)
+    /** @type {number | null} the time under the pointer (s) */
+    this.pointed = null
+    this.keptSpan = NO_SPAN
+    this.caption = words('lab.plot', { ylabel: config.ylabel || words('lab.value'), xlabel: config.xlabel || words('lab.time') })
+    this.element = h('figure', { class: 'lab-plot', role: 'img', 'aria-label': `${this.caption}: ${names(config)}` })
+    this.chart = null
+    this.element.style.setProperty('--height', `${(config.height ?? HEIGHT) / 16}rem`)
+    this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
+    this.resizer.observe(this.element)
+    this.unwatch = watchTheme(() => this.recolour())
+    if (seek !== null) this.watchPointer(seek)
   }
 
   /**
@@ -107,12 +122,15 @@ export class Plot {
    *   and when which control was used
    */
   draw(now = PLAYING) {
-    const { time, resting } = this.now
-    this.now = now
-    if (now.resting !== resting || (resting && now.time !== time)) this.dirty = true
-    if (!this.dirty || this.chart === null) return
+    if (!this.take(now) || this.chart === null) return
     this.dirty = false
     this.chart.setData(this.history.data())
+  }
+
+  keep(on) {
+    super.keep(on)
+    const values = (this.kept ?? []).slice(1).flatMap((column) => [...column].filter(Number.isFinite))
+    this.keptSpan = values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], NO_SPAN)
   }
 
   watchPointer(seek) {

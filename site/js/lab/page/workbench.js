@@ -8,7 +8,7 @@
 import { buildControls } from './controls.js'
 import { h, textButton } from './dom.js'
 import { Editor } from './editor.js'
-import { FilesError, MOST_BYTES, readModel } from './files.js'
+import { FilesError, MOST_BYTES, readModels } from './files.js'
 import { Instrument } from './instrument.js'
 import { LONGEST_MODEL, copyLink, writeLink } from './share.js'
 
@@ -65,7 +65,8 @@ export class Workbench extends Instrument {
     })
     const button = textButton(words('lab.live.open_file'), () => picker.click())
     const files = h('div', { class: 'lab-buttons' }, button, picker, h('span', {}, words('lab.live.open_note')))
-    return h('div', { class: 'lab-sources' }, options.length > 1 ? this.starts.element : null, files)
+    this.opened = h('div', { hidden: true }) // which of them is shown, and the others
+    return h('div', { class: 'lab-sources' }, options.length > 1 ? this.starts.element : null, files, this.opened)
   }
 
   onReady(message) {
@@ -80,6 +81,7 @@ export class Workbench extends Instrument {
     this.playRequested = play
     const { text } = this.editor
     const isLessons = text === this.config.xml
+    this.opened.hidden = isLessons || this.own === null
     this.simulation.load(text, isLessons ? null : this.own, this.isOther && !isLessons)
   }
 
@@ -101,14 +103,21 @@ export class Workbench extends Instrument {
     }
   }
 
-  /** Open files of the reader's device. @param {Iterable<File>} files */
-  async openFiles(files) {
-    const { words, editor, notices } = this
+  /** Open files of the reader's device, with the likeliest of their models. @param {Iterable<File>} list */
+  async openFiles(list) {
+    const { words, editor, opened } = this
     try {
-      const { main, text, files: others } = await readModel(files)
-      this.openModel(text, { main, files: others })
+      const { models, files } = await readModels(list)
+      const said = h('p', { role: 'status' })
+      const open = (main) => {
+        said.textContent = words('lab.live.opened', { name: main, n: files.size - 1 })
+        this.openModel(models.get(main), { main, files })
+      }
+      const options = [...models.keys()].map((path) => [path, path])
+      const menu = buildControls([{ type: 'select', label: words('lab.live.models'), options }], { set: (_, path) => open(path) })
+      opened.replaceChildren(said, ...(options.length > 1 ? [menu.element] : []))
+      open(options[0][0])
       this.starts.show([null]) // none of them
-      notices.show(words('lab.live.opened', { name: main, n: others.size }), 'note')
     } catch (error) {
       const limits = { most: MOST_BYTES >> 20, letters: LONGEST_MODEL }
       editor.fail(error instanceof FilesError ? words(`lab.live.${error.key}`, limits) : error.message)
@@ -125,7 +134,7 @@ export class Workbench extends Instrument {
     const { link, only } = await writeLink(config.id, state)
     if (only !== null) return notices.show(words('lab.live.link_long'), 'warning')
     const said = words(await copyLink(link))
-    if (own === null || own.files.size === 0) notices.show(said, 'note')
+    if (own === null || own.files.size === 1) notices.show(said, 'note')
     else notices.show(`${said} ${words('lab.live.link_files')}`, 'warning')
   }
 

@@ -1,5 +1,6 @@
 /** Records a trial's main run for the lab's static form: pictures, samples and readouts. */
 
+import { resize } from '../core/detail.js'
 import { nameOf } from '../core/names.js'
 import { LabError } from '../core/piece.js'
 
@@ -64,38 +65,12 @@ export function record(lab) {
   return { times: indices.map((i) => times[i]), plots }
 }
 
-/** The scene with its textures reduced to what a picture of a few hundred pixels needs. */
-export function withSmallTextures(scene) {
-  return { ...scene, textures: scene.textures.map(shrink) }
-}
-
 const FLAT = 0 // mjtTexture
 const WIDEST = 256 // texels of a flat texture
 const WIDEST_FACE = 64 // of a face of a cube
 
-function shrink(texture) {
-  const { type, width, height, channels, data } = texture
-  const faces = type !== FLAT && height === 6 * width ? 6 : 1
-  const widest = type === FLAT ? WIDEST : WIDEST_FACE
-  const w = Math.min(width, widest)
-  const h = faces * Math.min(height / faces, widest)
-  if (w === width && h === height) return texture
-  return { ...texture, width: w, height: h, data: downsample(data, [width, height], [w, h], channels) }
-}
-
-/** Reduce an image: each new texel is the mean of those that it replaces. */
-function downsample(data, [width, height], [w, h], channels) {
-  const target = new Uint8Array(w * h * channels)
-  for (let j = 0, texel = 0; j < h; j++) {
-    const [top, bottom] = [j, j + 1].map((k) => Math.floor((k * height) / h))
-    for (let i = 0; i < w; i++) {
-      const [left, right] = [i, i + 1].map((k) => Math.floor((k * width) / w))
-      for (let c = 0; c < channels; c++, texel++) {
-        let sum = 0
-        for (let y = top; y < bottom; y++) for (let x = left; x < right; x++) sum += data[(y * width + x) * channels + c]
-        target[texel] = Math.round(sum / ((bottom - top) * (right - left)))
-      }
-    }
-  }
-  return target
+/** The scene with its textures reduced to what a picture of a few hundred pixels needs. */
+export function withSmallTextures(scene) {
+  const widest = ({ type }) => (type === FLAT ? WIDEST : WIDEST_FACE)
+  return { ...scene, textures: scene.textures.map((texture) => resize(texture, (side) => Math.min(side, widest(texture)))) }
 }

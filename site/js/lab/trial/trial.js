@@ -48,7 +48,7 @@ import { EngineError } from '../core/engine.js'
 import { ArrowScales } from '../core/arrows.js'
 import { OVERLAYS } from '../core/frame.js'
 import { Lab } from '../core/lab.js'
-import { LabError, call, current, numeric, plottable, readable } from '../core/piece.js'
+import { LabError, call, current, curveEntry, numeric, plottable, readable } from '../core/piece.js'
 import { Framing } from '../core/framing.js'
 import { act, controlActs, describe } from './acts.js'
 import { packed } from './base64.js'
@@ -240,7 +240,7 @@ class Trial {
   /** The entry whose code changes what labs share, if it does so again. */
   findGuilty(action) {
     const { entry } = this.during
-    const watched = watchedCode(this.code, this.guard)
+    const watched = watchedCode(this.code, this.guard, this.config)
     try {
       this.fresh(this.config, action, watched.code)
     } catch {
@@ -275,7 +275,7 @@ class Trial {
     const env = lab.sync()
     this.code.readouts.forEach((run, i) => this.value(['readouts', i, 'expr'], run, env, readable, this.isIntended))
     this.code.plots.forEach((traces, i) =>
-      traces.forEach((run, j) => this.value(['plots', i, 'traces', j, 'expr'], run, env, plottable, this.isIntended)),
+      traces.forEach((run, j) => this.value(curveEntry(this.config.plots[i], i, j), run, env, plottable, this.isIntended)),
     )
   }
 

@@ -1,5 +1,7 @@
 /** A lab's code, checked by a guard after each piece. */
 
+import { curveEntry } from '../core/piece.js'
+
 /** Ends a run once the guilty piece is known. */
 class Found extends Error {}
 
@@ -8,9 +10,10 @@ class Found extends Error {}
  *
  * @param {Record<string, any>} code
  * @param {import('./guard.js').Guard} guard
+ * @param {Record<string, any>} config the lab's JSON
  * @returns {{code: Record<string, any>, entry: () => (string | number)[] | null}} `entry` of that piece
  */
-export function watchedCode(code, guard) {
+export function watchedCode(code, guard, config) {
   let guilty = null
   const look = (entry) => {
     if (guilty !== null || guard.changes().length === 0) return
@@ -38,7 +41,7 @@ export function watchedCode(code, guard) {
     controller: watch(['controller'], code.controller),
     controls: code.controls.map(({ set, run }, i) => ({ set: watch(['controls', i], set), run: watch(['controls', i, 'run'], run) })),
     readouts: list('readouts'),
-    plots: code.plots.map((traces, i) => traces.map((run, j) => watch(['plots', i, 'traces', j, 'expr'], run))),
+    plots: code.plots.map((traces, i) => traces.map((run, j) => watch(curveEntry(config.plots[i], i, j), run))),
     expect: list('expect'),
     goal: watch(['goal', 'expr'], code.goal),
   }

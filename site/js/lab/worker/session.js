@@ -57,6 +57,7 @@
  */
 
 import { Clock } from '../core/clock.js'
+import { limitDetail } from '../core/detail.js'
 import { Framing } from '../core/framing.js'
 import { Lab } from '../core/lab.js'
 import { Tape } from '../core/tape.js'
@@ -93,7 +94,7 @@ export class Session {
       this.lab.start()
     })
     if (this.lab === null) return
-    const scene = this.lab.scene()
+    const scene = limitDetail(this.lab.scene(), engine.k.geom)
     if (config.isOther) scene.floor = floorOf(this.lab, scene.camera)
     const { values, time } = this.lab
     this.post('ready', { version: engine.version, scene, values: values ?? [], time }, arrayBuffers(scene))
