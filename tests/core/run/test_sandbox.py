@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import platform
+import shutil
 import socket
 import subprocess
 import sys
@@ -262,6 +263,12 @@ class TestRefusals:
         assert refused.value.message == (
             "`--sandbox` does not work here: the supervisor is not the first process in the sandbox"
         )
+
+    def test_what_never_starts(self, programs: Path, root: Path) -> None:
+        _write_bwrap(programs, f"exec {shutil.which('sleep', path=os.defpath)} infinity")
+        none, parts = examine_sandbox(root, 0.1)
+        problem = "does not work here: a sandbox does not start and end within 0.1 s"
+        assert (none, parts[-1].problem) == (None, problem)
 
     def test_machine_without_a_filter(
         self, programs: Path, root: Path, monkeypatch: pytest.MonkeyPatch
