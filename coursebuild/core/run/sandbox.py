@@ -146,10 +146,7 @@ def _try_sandbox(sandbox: Sandbox, root: Path, seconds: float) -> str:
     places = visible_places(str(root), library_folder(), None)
     command, environment = sandbox.command(trial, {}, places)
     pipe = gate.PIPE
-    try:
-        process = gate.start(command, environment, stdin=pipe, stdout=pipe, stderr=pipe)
-    except OSError as error:
-        return f"does not work here, Bubblewrap says: {error}"
+    process = gate.start(command, environment, stdin=pipe, stdout=pipe, stderr=pipe)
     try:
         assert process.stdout is not None
         state = process.stdout.readline().split() if wait([process.stdout], seconds) else []
@@ -162,8 +159,8 @@ def _try_sandbox(sandbox: Sandbox, root: Path, seconds: float) -> str:
     finally:
         gate.end(process)
     if not state:
-        output = errors.decode("utf-8", "replace").strip().removeprefix("bwrap: ")
-        return f"does not work here, Bubblewrap says: {output or 'nothing'}"
+        output = gate.last_line(errors).removeprefix("bwrap: ") or "nothing"
+        return f"does not work here, Bubblewrap says: {output}"
     for (fault, value), actual in zip(_FAULTS, state, strict=True):
         if actual != value.encode():
             return f"does not work here: {fault}"
