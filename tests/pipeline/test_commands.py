@@ -242,8 +242,11 @@ def test_a_course_is_found_from_anywhere(make: Make, tmp_path: Path) -> None:
     ):
         folder = Folder(folder.root.rename(folder.root.with_name(name)))
         result = folder.main("build")
-        expected = f"coursebuild: the path of the course {problem}\n"
-        assert (result.status, result.out, result.err) == (2, "", expected)
+        assert (result.status, result.out, result.err) == (
+            2,
+            "",
+            f"coursebuild: the path of the course {problem}\n",
+        )
 
 
 # --- lessons
