@@ -149,7 +149,8 @@ def _try_sandbox(sandbox: Sandbox, root: Path, seconds: float) -> str:
     process = gate.start(command, environment, stdin=pipe, stdout=pipe, stderr=pipe)
     try:
         assert process.stdout is not None
-        state = process.stdout.readline().split() if wait([process.stdout], seconds) else []
+        is_prompt = wait([process.stdout.fileno()], seconds)
+        state = process.stdout.readline().split() if is_prompt else []
         watch = SandboxWatch(process.pid)
         is_watched = watch.is_ready() and not watch.excess(SIZE)
         watch.close()
