@@ -148,9 +148,9 @@ def _try_sandbox(sandbox: Sandbox, root: Path, seconds: float) -> str:
     pipe = gate.PIPE
     process = gate.start(command, environment, stdin=pipe, stdout=pipe, stderr=pipe)
     try:
-        assert process.stdout is not None
-        is_prompt = wait([process.stdout.fileno()], seconds)
-        state = process.stdout.readline().split() if is_prompt else []
+        output = process.stdout
+        assert output is not None
+        state = output.readline().split() if wait([output.fileno()], seconds) else []
         watch = SandboxWatch(process.pid)
         is_watched = watch.is_ready() and not watch.excess(SIZE)
         watch.close()
@@ -160,8 +160,8 @@ def _try_sandbox(sandbox: Sandbox, root: Path, seconds: float) -> str:
     finally:
         gate.end(process)
     if not state:
-        output = gate.last_line(errors).removeprefix("bwrap: ") or "nothing"
-        return f"does not work here, Bubblewrap says: {output}"
+        problem = gate.last_line(errors).removeprefix("bwrap: ") or "nothing"
+        return f"does not work here, Bubblewrap says: {problem}"
     for (fault, value), actual in zip(_FAULTS, state, strict=True):
         if actual != value.encode():
             return f"does not work here: {fault}"
