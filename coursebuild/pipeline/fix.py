@@ -188,15 +188,13 @@ class _Fixer:
 
     def write(self, verb: str, report: Report) -> tuple[str, ...]:
         """Write the files; what was done, as remarks."""
-        changed = {p: text for p, text in self.texts.items() if text != self.originals[p].text}
-        changes = [
-            FileChange(path, self.originals[path].text.encode(), text.encode())
-            for path, text in sorted(changed.items())
-        ]
+        texts = [(self.originals[path], text) for path, text in sorted(self.texts.items())]
+        changed = [(source, text) for source, text in texts if text != source.text]
+        changes = [FileChange.of(*change) for change in changed]
         can_undo = bool(changes) and change_files(
             self.options.root, changes, self.options.progress.say, keep=True
         )
-        remarks = [changed_text(verb, self.originals[c.path], changed[c.path]) for c in changes]
+        remarks = [changed_text(verb, *change) for change in changed]
         rules = Counter(diagnostic.rule for diagnostic in self.fixed)
         names = ", ".join(f"{rule} {n}" if n > 1 else rule for rule, n in sorted(rules.items()))
         left = len(report.diagnostics)

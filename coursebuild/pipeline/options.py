@@ -231,13 +231,15 @@ def find_course(directory: str | None) -> Path:
 def check_path(root: Path) -> None:
     """Refuse a folder that no course can lie in.
 
-    MuJoCo opens no file whose path is not UTF-8, and a script cannot print it.
+    MuJoCo opens no file whose path is not UTF-8, and a script cannot print it; of a path with a
+    backslash MuJoCo takes that for a slash.
     """
-    try:
-        str(root).encode()
-    except UnicodeEncodeError:
-        path_text = os.fsencode(root).decode("utf-8", "backslashreplace")
-        raise UsageError(f"the path of the course is not UTF-8: {path_text}") from None
+    path = os.fsencode(root)
+    text = path.decode("utf-8", "backslashreplace")
+    if text.encode() != path:
+        raise UsageError(f"the path of the course is not UTF-8: {text}")
+    if "\\" in text:
+        raise UsageError(f"the path of the course has a backslash, which MuJoCo misreads: {text}")
 
 
 def open_store(root: Path, location: str | None, size: str | None, *, fresh: bool = False) -> Store:

@@ -106,8 +106,9 @@ def read_timings(file: str) -> dict[str, float]:
     except OSError as error:
         raise UsageError(f"--timings: {file} cannot be read: {reason(error)}") from None
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        message = f"--timings: {file} holds no times; `--write-timings` writes such a file"
-        raise UsageError(message) from None
+        raise UsageError(
+            f"--timings: {file} holds no times; `--write-timings` writes such a file"
+        ) from None
 
 
 def write_timings(file: str, seconds: Mapping[str, float], names: Iterable[str]) -> None:

@@ -135,10 +135,8 @@ def changes_of(
     session: Session, edits: Collection[Edit], drawings: Iterable[FileChange] = ()
 ) -> list[FileChange]:
     """The changes of files by what is accepted, and of those that say what it was recorded with."""
-    changes = [
-        FileChange(source.path, source.text.encode(), text.encode())
-        for source, text in edited_texts(edits).items()  # two outputs may offer the same number
-    ]
+    # Two outputs may offer the same number.
+    changes = [FileChange.of(*change) for change in edited_texts(edits).items()]
     changes += drawings
     with session.condition:
         addresses = dict(session.runs.addresses)

@@ -236,12 +236,17 @@ def test_a_course_is_found_from_anywhere(make: Make, tmp_path: Path) -> None:
     inner.write(MAP, folder.text(MAP))
     inner.write(inner.lesson(), "## Inner\n\n" + block("inner.py", "print(1)", "1"))
     assert "examples/inner.py" in folder.main("check", cwd=inner.root / "content").out
-    odd = Folder(folder.root.with_name("caf\udce9"))
-    folder.root.rename(odd.root)
-    result = odd.main("build")
-    assert (result.status, result.out) == (2, "")
-    assert "the path of the course is not UTF-8: " in result.err
-    assert "caf\\xe9" in result.err
+    for name, problem in (
+        ("caf\udce9", f"is not UTF-8: {tmp_path}/caf\\xe9"),
+        ("a\\b", f"has a backslash, which MuJoCo misreads: {tmp_path}/a\\b"),
+    ):
+        folder = Folder(folder.root.rename(folder.root.with_name(name)))
+        result = folder.main("build")
+        assert (result.status, result.out, result.err) == (
+            2,
+            "",
+            f"coursebuild: the path of the course {problem}\n",
+        )
 
 
 # --- lessons

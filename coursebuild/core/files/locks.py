@@ -19,7 +19,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
-import functools
 import os
 import re
 import shutil
@@ -185,7 +184,6 @@ def temporary_folder() -> Iterator[str]:
     import tempfile  # not above: processes that run scripts import this module, and not that
 
     try:
-        remove_abandoned_folders()
         while True:
             folder = tempfile.mkdtemp(prefix=_PREFIX)
             with contextlib.suppress(FileNotFoundError):  # taken for abandoned, and removed
@@ -203,16 +201,11 @@ def temporary_folder() -> Iterator[str]:
 
 
 def remove_abandoned_folders() -> None:
-    """Remove the temporary folders that this user's processes have left; once in a process."""
+    """Remove the temporary folders that this user's processes have left."""
     import tempfile
 
-    with contextlib.suppress(OSError):  # there is no place for temporary files
-        _remove_abandoned(tempfile.gettempdir())
-
-
-@functools.cache
-def _remove_abandoned(place: str) -> None:
-    with contextlib.suppress(OSError), os.scandir(place) as entries:
+    # There may be no place for temporary files.
+    with contextlib.suppress(OSError), os.scandir(place := tempfile.gettempdir()) as entries:
         status, me = os.stat(place), os.geteuid()  # noqa: PTH116
         is_shared = status.st_mode & _OTHERS_WRITE and not status.st_mode & stat.S_ISVTX
         if is_shared or status.st_uid not in (0, me):

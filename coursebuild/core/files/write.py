@@ -36,6 +36,7 @@ from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, FileChangedError, OutsideProjectError, reason
 from coursebuild.core.files.locks import is_abandoned, project_lock, try_lock
 from coursebuild.core.files.trust import FOLDER, replace_file, seal, state_folder, store_key, unseal
+from coursebuild.core.text.source import Source
 from coursebuild.core.values import DAMAGE
 
 PREFIX = ".coursebuild-tmp-"
@@ -201,6 +202,11 @@ class FileChange(Struct, frozen=True):
     old: bytes | None
     new: bytes | None
 
+    @classmethod
+    def of(cls, source: Source, text: str) -> FileChange:
+        """The change of a file that gets another text."""
+        return cls(source.path, source.text.encode(), text.encode())
+
 
 def change_files(
     root: Path,
@@ -320,11 +326,11 @@ def journal_path(root: Path) -> Path | None:
 
 def _undo(root: Path, tell: Callable[[str], None] | None) -> None:
     journal = journal_path(root)
-    try:
-        data = None if journal is None else journal.read_bytes()
-    except OSError:
+    if journal is None:
         return
-    if journal is None or data is None:
+    try:
+        data = journal.read_bytes()
+    except OSError:
         return
     try:
         changes = _unseal_changes(root, data)

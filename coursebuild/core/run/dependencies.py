@@ -249,12 +249,10 @@ def state_changes(
         if now == before and now != SPECIAL:  # a device may give something else each time
             continue
         match dependency.kind:
-            case Kind.FILE | Kind.OUTSIDE | Kind.EXISTENCE:
-                yield f"{name} {_became(before, now)}"
-            case Kind.STATUS if now == ABSENT or before == ABSENT:
-                yield f"{name} {_became(before, now)}"
-            case Kind.STATUS:
+            case Kind.STATUS if ABSENT not in (before, now):
                 yield f"the size, time or mode of {name} changed"
+            case Kind.FILE | Kind.OUTSIDE | Kind.EXISTENCE | Kind.STATUS:
+                yield f"{name} {_became(before, now)}"
             case Kind.LISTING if ABSENT in (before, now):
                 yield f"the folder {name} {_became(before, now)}"
             case Kind.LISTING:

@@ -23,6 +23,7 @@ import platform
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
+from multiprocessing.connection import wait
 from pathlib import Path
 
 from msgspec import Struct
@@ -32,7 +33,12 @@ from coursebuild.core.model.results import ScriptJob, Trace
 from coursebuild.core.run import gate
 from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.script_environment import Interpreter, library_folder
-from coursebuild.core.run.script_worker import PROCESSES, SUPERVISOR_MEMORY, SandboxWatch
+from coursebuild.core.run.script_worker import (
+    PROCESSES,
+    START,
+    SUPERVISOR_MEMORY,
+    SandboxWatch,
+)
 from coursebuild.core.run.seccomp import compile_filter
 
 SIZE = 1 << 30
@@ -88,8 +94,13 @@ def find_sandbox(root: Path) -> Sandbox:
     return sandbox
 
 
-def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[SandboxPart, ...]]:
-    """The sandbox of this machine, and its parts; none, and those up to the first that lacks."""
+def examine_sandbox(
+    root: Path, seconds: float = START
+) -> tuple[Sandbox | None, tuple[SandboxPart, ...]]:
+    """The sandbox of this machine, and its parts; none, and those up to the first that lacks.
+
+    `seconds` are what its trial start may take.
+    """
     bubblewrap, system_call_filter = "Bubblewrap", "a filter of system calls"
     program, machine = gate.find_program("bwrap"), platform.machine()
     if program is None:
@@ -103,7 +114,7 @@ def examine_sandbox(root: Path) -> tuple[Sandbox | None, tuple[SandboxPart, ...]
         return None, (SandboxPart(bubblewrap), part)
     scope = _find_scope()
     sandbox = Sandbox(program, system_calls.hex(), scope)
-    problem = _try_sandbox(sandbox, root)
+    problem = _try_sandbox(sandbox, root, seconds)
     parts = tuple(map(SandboxPart, (bubblewrap, system_call_filter)))
     if problem:
         return None, (*parts, SandboxPart("namespaces", problem, _ALLOW))
@@ -129,26 +140,28 @@ def _find_scope() -> tuple[str, ...]:
     return () if trial_run.status else scope
 
 
-def _try_sandbox(sandbox: Sandbox, root: Path) -> str:
+def _try_sandbox(sandbox: Sandbox, root: Path, seconds: float) -> str:
     """Start a sandbox; say what does not work, as the end of a sentence."""
     trial = [sys.executable, "-I", "-S", "-c", _TRIAL]
     places = visible_places(str(root), library_folder(), None)
     command, environment = sandbox.command(trial, {}, places)
     pipe = gate.PIPE
+    process = gate.start(command, environment, stdin=pipe, stdout=pipe, stderr=pipe)
     try:
-        process = gate.start(command, environment, stdin=pipe, stdout=pipe, stderr=pipe)
-    except OSError as error:
-        return f"does not work here, Bubblewrap says: {error}"
-    with process:
-        assert process.stdout is not None
-        state = process.stdout.readline().split()
+        output = process.stdout
+        assert output is not None
+        state = output.readline().split() if wait([output.fileno()], seconds) else []
         watch = SandboxWatch(process.pid)
         is_watched = watch.is_ready() and not watch.excess(SIZE)
         watch.close()
-        _, errors = process.communicate()
+        _, errors = process.communicate(timeout=seconds)
+    except gate.StillRunningError:
+        return f"does not work here: a sandbox does not start and end within {seconds:g} s"
+    finally:
+        gate.end(process)
     if not state:
-        output = errors.decode("utf-8", "replace").strip().removeprefix("bwrap: ")
-        return f"does not work here, Bubblewrap says: {output or 'nothing'}"
+        problem = gate.last_line(errors).removeprefix("bwrap: ") or "nothing"
+        return f"does not work here, Bubblewrap says: {problem}"
     for (fault, value), actual in zip(_FAULTS, state, strict=True):
         if actual != value.encode():
             return f"does not work here: {fault}"

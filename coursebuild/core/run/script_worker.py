@@ -25,7 +25,7 @@ from coursebuild.core.run import gate, supervisor
 
 _MAX_REPORT_SIZE = 256 << 20
 """Bytes that a report may have."""
-_START = 60.0
+START = 60.0
 """Seconds that a sandbox may take to start its script."""
 _GRACE = 5.0
 """Seconds that it may take to report, after its script's time limit."""
@@ -120,8 +120,8 @@ class Worker:
         seconds = time.monotonic() - self._start_time
         if self._has_started and seconds > timeout + _GRACE:
             self.excess = Outcome.TIMEOUT, "did not end at its time limit"
-        elif seconds > _START and not (self._has_started and self._watch.is_ready()):
-            self.excess = Outcome.KILLED, f"did not start within {_START:g} s"
+        elif seconds > START and not (self._has_started and self._watch.is_ready()):
+            self.excess = Outcome.KILLED, f"did not start within {START:g} s"
         elif excess := self._watch.excess(memory):
             self.excess = Outcome.KILLED, excess
         if self.excess is not None:

@@ -230,8 +230,12 @@ class Tracer:
 
     def note_library(self, path: object) -> None:
         """Note that native code was loaded from a file, or from all files of a folder."""
+        if not self.is_by_import():
+            self._note_native(path)
+
+    def _note_native(self, path: object) -> None:
         full_path = self._relevant_path(path)
-        if full_path is not None and not self.is_by_import():
+        if full_path is not None:
             self.note(f"r{full_path}")
             if full_path.startswith(self.root):
                 self.note_opaque(NATIVE)
@@ -290,11 +294,7 @@ class Tracer:
     def _on_import(self, args: tuple[object, ...]) -> None:
         name, file = args[:2]
         if file is not None:
-            full_path = self._relevant_path(file)
-            if full_path is not None:
-                self.note(f"r{full_path}")
-                if full_path.startswith(self.root):
-                    self.note_opaque(NATIVE)
+            self._note_native(file)
         elif name in _PROGRAM_STARTERS:
             self.note_opaque(PROGRAMS)
 

@@ -15,8 +15,13 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.files.locks import is_abandoned, project_lock, temporary_folder
-from support.run_code import program, run_code
+from coursebuild.core.files.locks import (
+    is_abandoned,
+    project_lock,
+    remove_abandoned_folders,
+    temporary_folder,
+)
+from support.run_code import program
 from support.runners import SOURCE_TREE
 from support.scratch_course import without_locks
 from support.waiting import wait_until
@@ -139,14 +144,15 @@ def test_children_do_not_inherit_it(tmp_path: Path) -> None:
         child.communicate()
 
 
-MAKE = "from coursebuild.core.files.locks import temporary_folder\n"
 NAME = "coursebuild.tmp.abcdefgh"
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> Path:
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files."""
     place = tmp_path / "tmp"
     place.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
     return place
 
 
@@ -164,12 +170,6 @@ def start(place: Path) -> tuple[subprocess.Popen[str], Path]:
     return process, Path(process.stdout.readline().strip())
 
 
-def make_another(place: Path) -> None:
-    """Make a temporary folder, and remove it."""
-    result = run_code(f"{MAKE}with temporary_folder(): pass\n", TMPDIR=str(place))
-    assert (result.returncode, result.stderr) == (0, "")
-
-
 def test_folders_of_killed_processes_go_and_those_of_others_stay(place: Path) -> None:
     living, survivor = start(place)
     killed, left = start(place)
@@ -177,7 +177,7 @@ def test_folders_of_killed_processes_go_and_those_of_others_stay(place: Path) ->
         killed.kill()
         killed.wait()
         assert {*place.iterdir()} == {survivor, left}
-        make_another(place)
+        remove_abandoned_folders()
         assert [*place.iterdir()] == [survivor]
         living.communicate("")
     assert [*place.iterdir()] == []
@@ -200,7 +200,7 @@ def test_what_is_no_temporary_folder_of_this_user_stays(place: Path, tmp_path: P
     link_holder.mkdir(mode=0o700)
     (link_holder / "link").symlink_to(elsewhere)
     before = {*place.iterdir()}
-    make_another(place)
+    remove_abandoned_folders()
     assert {*place.iterdir()} == before - {link_holder}
     assert (elsewhere / "precious").exists()
 
@@ -209,16 +209,21 @@ def test_what_is_no_temporary_folder_of_this_user_stays(place: Path, tmp_path: P
 def test_where_others_can_move_folders_none_is_removed(place: Path, mode: int) -> None:
     (place / NAME).mkdir(mode=0o700)
     place.chmod(mode)
-    make_another(place)
+    remove_abandoned_folders()
     assert [*place.iterdir()] == [place / NAME]
     place.chmod(0o1777)
-    make_another(place)
+    remove_abandoned_folders()
     assert [*place.iterdir()] == []
 
 
 def test_processes_that_begin_at_once_all_have_their_folders(place: Path) -> None:
     """None takes another's new folder for an abandoned one."""
-    code = f"{MAKE}import os\nwith temporary_folder() as at: assert os.path.isdir(at)\n"
+    code = """
+import os
+from coursebuild.core.files.locks import remove_abandoned_folders, temporary_folder
+remove_abandoned_folders()
+with temporary_folder() as at: assert os.path.isdir(at)
+"""
     environment = {**os.environ, "TMPDIR": str(place)}
     processes = [
         subprocess.Popen([sys.executable, "-c", code], cwd=SOURCE_TREE, env=environment)
@@ -228,8 +233,7 @@ def test_processes_that_begin_at_once_all_have_their_folders(place: Path) -> Non
     assert [*place.iterdir()] == []
 
 
-def test_threads_each_have_a_folder(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tempfile, "tempdir", str(place))
+def test_threads_each_have_a_folder(place: Path) -> None:
     barrier = threading.Barrier(3)
     counts: list[int] = []
 

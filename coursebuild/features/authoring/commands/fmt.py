@@ -55,6 +55,6 @@ def run(arguments: argparse.Namespace) -> int:
     elif arguments.check:
         lines = [f"would format {source.path}" for source in new_texts]
     else:
-        changes = [FileChange(s.path, s.text.encode(), t.encode()) for s, t in new_texts.items()]
+        changes = [FileChange.of(*change) for change in new_texts.items()]
         return max(status, apply_changes(root, changes))
     return write("".join(f"{line}\n" for line in lines), FAILURE if lines else status)

@@ -119,7 +119,7 @@ def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     slug = arguments.slug or _name_from(title, "--slug")
     new_map = with_lesson(course, id, slug, title)
     return [
-        FileChange(course.map.path, course.map.text.encode(), new_map.encode()),
+        FileChange.of(course.map, new_map),
         FileChange(f"content/lessons/{id}-{slug}.md", None, _LESSON.encode()),
     ]
 
@@ -135,7 +135,7 @@ def _new_level(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
         raise UsageError("a level needs an id and a title", help=help)
     _check_text(title)
     new_map = with_level(course, id, title)
-    return [FileChange(course.map.path, course.map.text.encode(), new_map.encode())]
+    return [FileChange.of(course.map, new_map)]
 
 
 def _new_page(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
@@ -145,7 +145,7 @@ def _new_page(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     path = f"content/pages/{id}.md"
     new_map = with_page(course, id, title, path)
     return [
-        FileChange(course.map.path, course.map.text.encode(), new_map.encode()),
+        FileChange.of(course.map, new_map),
         FileChange(path, None, _LESSON.encode()),
     ]
 
@@ -185,7 +185,7 @@ def _new_feature(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     path = f"features/{name}.py"
     templates = {path: "feature.txt", f"tests/test_{name}.py": "test.txt"}
     new_map = with_feature(course, path)
-    changes = [FileChange(course.map.path, course.map.text.encode(), new_map.encode())]
+    changes = [FileChange.of(course.map, new_map)]
     jinja = Environment(trim_blocks=True, keep_trailing_newline=True)
     for path, file in templates.items():
         template = jinja.from_string((_FEATURE / file).read_text(encoding="utf-8"))

@@ -66,10 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
     edits = rename_references(course, lesson, new)
     in_map = [edit for edit in edits if edit.span.source == course.map]
     texts = edited_texts(edits) | {course.map: with_lesson_renamed(course, lesson, new, in_map)}
-    changes = [
-        FileChange(source.path, source.text.encode(), text.encode())
-        for source, text in texts.items()
-    ]
+    changes = [FileChange.of(*change) for change in texts.items()]
     if lesson.document is not None:
         data = read_bytes(root, lesson.path)
         unchanged = FileChange(lesson.path, data, data)

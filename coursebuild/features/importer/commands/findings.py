@@ -90,7 +90,7 @@ class Findings:
         changes = []
         for source, own_edits in edits.items():
             new = apply_edits(source.text, own_edits)
-            changes.append(FileChange(source.path, source.text.encode(), new.encode()))
+            changes.append(FileChange.of(source, new))
             for item in self._items:
                 item.at = _place_after(item.at, own_edits) if item.path == source.path else item.at
             self._texts[source.path] = new
