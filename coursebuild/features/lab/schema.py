@@ -170,9 +170,7 @@ class PlotFields(Struct, frozen=True, forbid_unknown_fields=True):
 class Plot(PlotFields, frozen=True):
     """Plots against simulated time, or one quantity against another."""
 
-    x: Annotated[
-        Text | None, Meta(description="an expression for the horizontal axis; else the time")
-    ] = None
+    x: Annotated[Text | None, Meta(description="an expression in place of the time")] = None
     window: Annotated[Positive | None, Meta(description="seconds shown; else all")] = None
 
 
