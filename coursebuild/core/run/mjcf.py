@@ -117,7 +117,10 @@ class _Compiler(JsonChild):
         self.seconds = self.left = limits.models
 
     def compile(self, path: str, text: str) -> CompileResult:
+        is_shared = self._process is not None
         result = self._try(path, {path: text})
+        if is_shared and result.error.startswith(OWN_FAULT) and not result.timeout:
+            result = self._try(path, {path: text})  # alone: MuJoCo keeps meshes of other models
         if not result.error or result.timeout or result.error.startswith(OWN_FAULT):
             return result
         return replace(result, misspelling=self._find_misspelling(path, text, result))

@@ -216,6 +216,8 @@ def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bo
     if recorded.is_padded and not printed.is_padded:
         return False
     if comparison.mode is Mode.DIGITS:
+        if recorded.value == printed.value and recorded.place < printed.place:
+            return False  # its last zeros were not printed
         return (
             recorded.is_inexact and printed.is_inexact and within_half_unit(recorded, printed.value)
         )

@@ -46,9 +46,11 @@ _PREFIXES = {
 }
 _PREFIX_NAMES = {
     **{"kilo": "k", "milli": "m", "micro": "µ", "mega": "M", "centi": "c", "giga": "G"},
-    **{"nano": "n", "hecto": "h", "deci": "d", "pico": "p", "mikro": "µ", "zenti": "c"},
-    **{"tera": "T", "mili": "m"},
+    **{"nano": "n", "hecto": "h", "deci": "d", "mikro": "µ", "zenti": "c"},
+    **{"tera": "T", "mili": "m", "pico": "p", "femto": "f", "peta": "P", "deca": "da"},
 }
+_MACRO_NAMES = {"degreeCelsius": "°C", "kilogram": "kg", "astronomicalunit": "au", "neper": "Np"}
+"""Units of `siunitx` that have another name here."""
 _BINARY_PREFIXES = {f"{letter}i": 2 ** (10 * n) for n, letter in enumerate("KMGTPE", 1)}
 
 COMMON = tuple(
@@ -178,6 +180,69 @@ def _with_signs(text: str) -> str:
     for pattern, sign in _WORDS:
         text = pattern.sub(sign, text)
     return text
+
+
+_MACRO = re.compile(r"\\([A-Za-z]+)\s*(?:\{([^{}]*)\})?")
+_POWER_MACROS = {"square": "2", "squared": "2", "cubic": "3", "cubed": "3"}
+
+
+def unit_of_macros(tex: str) -> str:
+    r"""A unit of LaTeX's `siunitx`, as `\kilo\metre\per\second`, in symbols; others as they are."""
+    units: list[list[str]] = []
+    prefix = sign = power = ""
+    for name, argument in _MACRO.findall(tex):
+        exponent = _POWER_MACROS.get(name, argument)
+        if name in ("squared", "cubed", "tothe") and units:
+            units[-1][2] = exponent
+        elif name == "per":
+            sign = "-"
+        elif name in (*_POWER_MACROS, "raiseto"):
+            power = exponent
+        elif name in _PREFIX_NAMES:
+            prefix = _PREFIX_NAMES[name]
+        else:
+            is_known = name in _MACRO_NAMES or name in NAMES or find_symbol(name)
+            symbol = _MACRO_NAMES.get(name, NAMES.get(name, name)) if is_known else f"\\{name}"
+            units.append([prefix + symbol.replace("ohm", "Ω"), sign, power])
+            prefix = sign = power = ""
+    powers = ((symbol, sign + (power or "1" * bool(sign))) for symbol, sign, power in units)
+    return " ".join(f"{s}^{{{power}}}" if power else s for s, power in powers) or tex
+
+
+_ARGUMENT = r"\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
+_QUANTITY = re.compile(
+    rf"\\(?:(?P<one>num|ang|unit|si)|qty|SI)(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}"
+    rf"(?(one)|{_ARGUMENT})"
+)
+_DEFINITION = re.compile(r"\\(?:def|[a-z]*command\*?\s*\{?)\s*(\\[A-Za-z]+)")
+_NUMBER_SIGNS = (
+    (re.compile(r"(?<=[\d.])[eEdD]([-+]?\d+)"), r"\\times10^{\1}"),
+    (re.compile(r"\+-"), r"\\pm "),
+    (re.compile(","), "."),
+)
+
+
+def write_quantities(tex: str) -> str:
+    r"""TeX without the commands of `siunitx`: `\qty{3}{\kilo\metre}` is `3\,\mathrm{km}`."""
+    if "\\" not in tex or any(_QUANTITY.match(f"{name}{{}}{{}}") for name in _DEFINITION.findall(tex)):
+        return tex
+
+    def write(match: re.Match[str]) -> str:
+        number, unit = match[2], match[3]
+        if match["one"] in ("unit", "si"):
+            number, unit = "", number
+        elif match["one"] == "ang":
+            parts = zip(number.split(";"), "°′″", strict=False)
+            return "".join(f"{part}{sign}" for part, sign in parts)
+        for sign, replacement in _NUMBER_SIGNS:
+            number = sign.sub(replacement, number)
+        if unit is None:
+            return number
+        symbols = unit_of_macros(unit).replace(" ", r"\,").replace("%", r"\%")
+        space = r"\," if number and symbols[:1] not in "°′″" else ""
+        return rf"{number}{space}\mathrm{{{symbols}}}"
+
+    return _QUANTITY.sub(write, tex)
 
 
 def find_unit(text: str) -> Unit | None:

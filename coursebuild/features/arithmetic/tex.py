@@ -17,6 +17,7 @@ import re
 
 from coursebuild.core.checks import formulas
 from coursebuild.core.text.quantities import plain_unit
+from coursebuild.core.text.units import unit_of_macros
 from coursebuild.features.arithmetic.expressions import (
     OF_QUOTIENT,
     SIDE_BY_SIDE,
@@ -291,6 +292,12 @@ class _Reader:
             index = self.bracket("]") if self.take("[") else _NUMBER_TWO
             root = Expression("/", start, start, (_NUMBER_ONE, index))
             return Expression("^", start, self.at, (self.group(), root))
+        if sign == r"\num":
+            return self.group()
+        if sign in (r"\qty", r"\SI"):
+            number, at = self.group(), self.at
+            text = plain_unit(unit_of_macros(self.raw()))
+            return Expression("*", start, self.at, (number, Expression("unit", at, self.at, text=text)))
         if sign in (r"\underbrace", r"\overbrace"):
             inner = self.group()
             if self.take("_", "^"):
