@@ -52,7 +52,9 @@ _CODE = tuple(
 """The code that compiles models and reads their facts."""
 OWN_FAULT = "MuJoCo's compiler "
 """How messages begin that are about the process that compiles."""
-_NO_MEMORY = re.compile(r"unknown exception|allocate memory|MemoryError|bad_alloc", re.IGNORECASE)
+_NO_MEMORY = re.compile(
+    r"unknown exception|allocate memory|memory allocation|MemoryError|bad_alloc", re.IGNORECASE
+)
 _KIND = "models"
 _TEXT_NAME = ".coursebuild-text.xml"
 TEXT_PATH = f"models/{_TEXT_NAME}"

@@ -329,7 +329,8 @@ class MathEngine(V8Engine):
 
     def _batch(self, formulas: Sequence[Formula]) -> Iterator[str | MathError]:
         jobs = [
-            {"tex": write_quantities(f.tex), "source": f.tex, "display": f.display} for f in formulas
+            {"tex": write_quantities(f.tex), "source": f.tex, "display": f.display}
+            for f in formulas
         ]
         request = json.dumps(jobs)
         seconds = _BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS

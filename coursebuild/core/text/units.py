@@ -186,17 +186,17 @@ _MACRO = re.compile(r"\\([A-Za-z]+)\s*(?:\{([^{}]*)\})?")
 _POWER_MACROS = {"square": "2", "squared": "2", "cubic": "3", "cubed": "3"}
 
 
-def unit_of_macros(tex: str) -> str:
+def _unit_of_macros(tex: str) -> str:
     r"""A unit of LaTeX's `siunitx`, as `\kilo\metre\per\second`, in symbols; others as they are."""
     units: list[list[str]] = []
     prefix = sign = power = ""
-    for name, argument in _MACRO.findall(tex):
+    for name, argument in _MACRO.findall(tex) if not _MACRO.sub("", tex).strip() else ():
         exponent = _POWER_MACROS.get(name, argument)
         if name in ("squared", "cubed", "tothe") and units:
             units[-1][2] = exponent
         elif name == "per":
             sign = "-"
-        elif name in (*_POWER_MACROS, "raiseto"):
+        elif exponent:
             power = exponent
         elif name in _PREFIX_NAMES:
             prefix = _PREFIX_NAMES[name]
@@ -215,32 +215,24 @@ _QUANTITY = re.compile(
     rf"(?(one)|{_ARGUMENT})"
 )
 _DEFINITION = re.compile(r"\\(?:def|[a-z]*command\*?\s*\{?)\s*(\\[A-Za-z]+)")
-_NUMBER_SIGNS = (
-    (re.compile(r"(?<=[\d.])[eEdD]([-+]?\d+)"), r"\\times10^{\1}"),
-    (re.compile(r"\+-"), r"\\pm "),
-    (re.compile(","), "."),
-)
 
 
 def write_quantities(tex: str) -> str:
     r"""TeX without the commands of `siunitx`: `\qty{3}{\kilo\metre}` is `3\,\mathrm{km}`."""
-    if "\\" not in tex or any(_QUANTITY.match(f"{name}{{}}{{}}") for name in _DEFINITION.findall(tex)):
+    if any(_QUANTITY.match(f"{name}{{}}{{}}") for name in _DEFINITION.findall(tex)):
         return tex
 
     def write(match: re.Match[str]) -> str:
-        number, unit = match[2], match[3]
-        if match["one"] in ("unit", "si"):
+        kind, number, unit = match["one"], match[2], match[3] or ""
+        if kind in ("unit", "si"):
             number, unit = "", number
-        elif match["one"] == "ang":
-            parts = zip(number.split(";"), "°′″", strict=False)
-            return "".join(f"{part}{sign}" for part, sign in parts)
-        for sign, replacement in _NUMBER_SIGNS:
-            number = sign.sub(replacement, number)
-        if unit is None:
-            return number
-        symbols = unit_of_macros(unit).replace(" ", r"\,").replace("%", r"\%")
-        space = r"\," if number and symbols[:1] not in "°′″" else ""
-        return rf"{number}{space}\mathrm{{{symbols}}}"
+        elif kind == "ang":
+            number = "".join(map("".join, zip(number.split(";"), "°′″", strict=False)))
+        number = number.replace(",", ".").replace("+-", r"\pm ")
+        number = re.sub(r"(?<=[\d.])[eE]([-+]?\d+)", r"\\times10^{\1}", number)
+        symbols = _unit_of_macros(unit).replace(" ", r"\,").replace("%", r"\%")
+        space = r"\," if number and symbols not in "°′″" else ""
+        return f"{number}{space}" + (rf"\mathrm{{{symbols}}}" if symbols else "")
 
     return _QUANTITY.sub(write, tex)
 

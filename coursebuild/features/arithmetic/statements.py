@@ -36,7 +36,9 @@ _MAY_BE_NUMERIC = re.compile(r"[0-9e]|\\pi")
 """A digit, or a part of one of `CONSTANTS`."""
 _SYMBOL = re.compile(r"(?<![\\A-Za-z])e*[A-DF-Za-df-z]")
 """A letter that is a symbol, unless it stands in a word."""
-_MAY_HOLD_WORDS = re.compile(r"\\(?:math|text|operatorname|begin|underbrace|overbrace|sum|prod|qty|SI)")
+_MAY_HOLD_WORDS = re.compile(
+    r"\\(?:math|text|operatorname|begin|underbrace|overbrace|sum|prod|qty|SI)"
+)
 _RELATIONS = {
     **{sign: sign for sign in "=<>"},
     **dict.fromkeys((r"\approx", r"\simeq", "≈"), "≈"),

@@ -17,7 +17,6 @@ import re
 
 from coursebuild.core.checks import formulas
 from coursebuild.core.text.quantities import plain_unit
-from coursebuild.core.text.units import unit_of_macros
 from coursebuild.features.arithmetic.expressions import (
     OF_QUOTIENT,
     SIDE_BY_SIDE,
@@ -295,9 +294,10 @@ class _Reader:
         if sign == r"\num":
             return self.group()
         if sign in (r"\qty", r"\SI"):
-            number, at = self.group(), self.at
-            text = plain_unit(unit_of_macros(self.raw()))
-            return Expression("*", start, self.at, (number, Expression("unit", at, self.at, text=text)))
+            amount, at = self.group(), self.at
+            text = plain_unit(rf"\unit{{{self.raw()}}}")
+            unit = Expression("unit", at, self.at, text=text)
+            return Expression("*", start, self.at, (amount, unit))
         if sign in (r"\underbrace", r"\overbrace"):
             inner = self.group()
             if self.take("_", "^"):

@@ -115,8 +115,8 @@ def _label_formula(match: re.Match[str]) -> str:
         opening = lead[0] if _WORDS_BEFORE.match(line) else ""
         closing = lead[0] if match["behind"] is not None else ""
         if mark := _MARGIN.match(line):  # which the lines that go on may lack
-            kept = "[ \t]*>" if ">" in mark[0] else mark[0]
-            tex = re.sub(rf"\n(?!{kept})", f"\n{mark[0]}", tex)
+            margin = "[ \t]*>" if ">" in mark[0] else mark[0]
+            tex = re.sub(rf"\n(?!{margin})", f"\n{mark[0]}", tex)
     braces = f" {{#eq:{formula_anchor(label)}}}" if label else ""
     return f"{opening}$${tex}$${braces}{closing}"
 

@@ -315,8 +315,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return convert_role(match["name"], match["body"], context)
         case "image":
             dressing, hover = match["dressing"] or "", match["hover"] or ""
-            described = None if match["alt"] else _ALT.search(dressing)
-            alt = re.sub(r"(?<!\\)[\[\]]", "", described[2]) if described else match["alt"]
+            attribute = _ALT.search(dressing)
+            alt = match["alt"] or re.sub(r"(?<!\\)[\[\]]", "", attribute[2] if attribute else "")
             source = match["source"].strip("<>")
             if source.endswith("#only-dark"):  # a page makes its pictures dark itself
                 return ""

@@ -300,12 +300,15 @@ def test_a_picture_is_described_by_its_attributes(tmp_path: Path) -> None:
 
 def test_formulas_are_whole_whatever_their_lines_begin_with(tmp_path: Path) -> None:
     text = (
-        "# One\n\n\\f$\n\\newcommand{\\w}{\\omega}\n\n\\newcommand{\\v}{u}\n\\f$\n\nSo \\f$\\v\\f$.\n\n"
-        "\\f$\\begin{align*}a&=b\\end{align*}\\f$\n\n1. It is\n\n    $$ a =\nb\n$$\n\n2. It costs $\\$10 \\pm \\$1$.\n"
+        "# One\n\n\\f$\n\\newcommand{\\w}{\\omega}\n\n\\newcommand{\\v}{u}\n\\f$\n\n"
+        "So \\f$\\v\\f$.\n\n"
+        "\\f$\\begin{align*}a&=b\\end{align*}\\f$\n\n"
+        "1. It is\n\n    $$ a =\nb\n$$\n\n2. It costs $\\$10 \\pm \\$1$.\n"
     )
     assert lesson(tmp_path, "a.md", text).strip() == (
         "So $\\newcommand{\\v}{u}\\v$.\n\n"
-        "$\\begin{aligned}a&=b\\end{aligned}$\n\n1. It is\n\n    $$ a =\n    b\n    $$\n\n2. It costs $\\$10 \\pm \\$1$."
+        "$\\begin{aligned}a&=b\\end{aligned}$\n\n"
+        "1. It is\n\n    $$ a =\n    b\n    $$\n\n2. It costs $\\$10 \\pm \\$1$."
     )
 
 
