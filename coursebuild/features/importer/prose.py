@@ -37,7 +37,6 @@ _KEY = r"\w(?:[\w.:/+-]*\w)?"
 """The key of a source."""
 _PLACE = r"(?:<[^<>\n]+>|(?:[^()\s<]|\([^()\s]*\))(?:[^()\s]|\([^()\s]*\))*)"
 _ALT = re.compile(r"\balt=(['\"])(.*?)\1")
-"""What Pandoc's attributes say of a picture."""
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
 # A formula holds no beginning of another: so each character is looked at a few times, not once for
 # each beginning before it.
@@ -315,8 +314,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return convert_role(match["name"], match["body"], context)
         case "image":
             dressing, hover = match["dressing"] or "", match["hover"] or ""
-            attribute = _ALT.search(dressing)
-            alt = match["alt"] or re.sub(r"(?<!\\)[\[\]]", "", attribute[2] if attribute else "")
+            alt = match["alt"] or "".join(words for _, words in _ALT.findall(dressing))
             source = match["source"].strip("<>")
             if source.endswith("#only-dark"):  # a page makes its pictures dark itself
                 return ""

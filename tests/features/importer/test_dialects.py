@@ -294,7 +294,7 @@ def test_links_and_signs_that_cannot_stay_are_told(tmp_path: Path) -> None:
 def test_a_picture_is_described_by_its_attributes(tmp_path: Path) -> None:
     text = "# One\n\n![](p.png){alt='A [bent] graph'}\n\n![B](p.png){alt=\"C\" width=3}\n"
     assert lesson(tmp_path, "a.md", text, **{"p.png": "\x89PNG"}) == (
-        "![A bent graph](../files/p.png)\n\n![B](../files/p.png)\n"
+        "![A [bent] graph](../files/p.png)\n\n![B](../files/p.png)\n"
     )
 
 
