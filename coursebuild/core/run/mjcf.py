@@ -52,7 +52,9 @@ _CODE = tuple(
 """The code that compiles models and reads their facts."""
 OWN_FAULT = "MuJoCo's compiler "
 """How messages begin that are about the process that compiles."""
-_NO_MEMORY = re.compile(r"unknown exception|allocate memory|MemoryError|bad_alloc", re.IGNORECASE)
+_NO_MEMORY = re.compile(
+    r"unknown exception|allocate memory|memory allocation|MemoryError|bad_alloc", re.IGNORECASE
+)
 _KIND = "models"
 _TEXT_NAME = ".coursebuild-text.xml"
 TEXT_PATH = f"models/{_TEXT_NAME}"
@@ -117,7 +119,10 @@ class _Compiler(JsonChild):
         self.seconds = self.left = limits.models
 
     def compile(self, path: str, text: str) -> CompileResult:
+        is_shared = self._process is not None
         result = self._try(path, {path: text})
+        if is_shared and result.error.startswith(OWN_FAULT) and not result.timeout:
+            result = self._try(path, {path: text})  # alone: MuJoCo keeps meshes of other models
         if not result.error or result.timeout or result.error.startswith(OWN_FAULT):
             return result
         return replace(result, misspelling=self._find_misspelling(path, text, result))

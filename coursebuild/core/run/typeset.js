@@ -1,8 +1,9 @@
 /**
  * Typesets formulas with Temml and its mhchem, whose global `temml` is loaded before this script.
  *
- *   typeset(json)   json: [{tex, display}, …]; returns as JSON, for each, its MathML (a string) or
- *                   {message, position}, position being an offset in UTF-16 units into tex, or null
+ *   typeset(json)   json: [{tex, source, display}, …]; returns as JSON, for each, its MathML (a string) or
+ *                   {message, position}, position being an offset in UTF-16 units into source, what
+ *                   the author wrote, or null
  *
  * 1. What KaTeX and MathJax take and Temml does not is written as Temml takes it.
  * 2. Temml makes a tree of MathML nodes, or throws.
@@ -30,6 +31,8 @@ const typeset = (() => {
     '\\Z': '\\mathbb{Z}',
     '\\textdegree': '\\degree',
     '\\KaTeX': '\\text{KaTeX}',
+    '\\hfill': '', // by which LaTeX places what a cell of an array holds
+    '\\hfil': '',
   }
   for (const name in MACROS) temml.__defineMacro(name, MACROS[name])
 
@@ -222,7 +225,7 @@ const typeset = (() => {
     return { message: error.message.slice(0, at), position: isHere && original.endsWith(tex.slice(start)) ? place : null }
   }
 
-  function one({ tex, display }) {
+  function one({ tex, source, display }) {
     if (tex.length > MAX_SOURCE) return { message: `it is longer than ${MAX_SOURCE} characters`, position: null }
     const forbidden = isPlain(tex) ? -1 : tex.search(FORBIDDEN)
     if (forbidden >= 0) return { message: 'it holds a control character', position: forbidden }
@@ -230,12 +233,12 @@ const typeset = (() => {
     try {
       const tree = temml.__renderToMathMLTree(text, { ...OPTIONS, displayMode: display })
       mend(tree, 0)
-      tree.children[0].children.at(-1).children[0].text = tex // the annotation is what the author wrote
+      tree.children[0].children.at(-1).children[0].text = source // the annotation is what the author wrote
       const markup = tree.toMarkup()
       if (markup.length > MAX_MARKUP) throw new Refusal('it becomes too long')
       return markup
     } catch (error) {
-      if (error instanceof temml.ParseError) return explain(error, text, tex)
+      if (error instanceof temml.ParseError) return explain(error, text, source)
       if (error instanceof Refusal) return { message: error.message, position: null }
       if (error instanceof RangeError && /call stack/.test(error.message)) {
         return { message: 'it is nested too deeply', position: null }

@@ -26,6 +26,7 @@ from typing import Any, NamedTuple, Self
 from coursebuild.core.files.errors import AddressLimitError, EffectError, lacking
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.text.units import write_quantities
 
 _FLAGS = (
     "--single-threaded",
@@ -327,7 +328,11 @@ class MathEngine(V8Engine):
             return [results[formula] for formula in formulas]
 
     def _batch(self, formulas: Sequence[Formula]) -> Iterator[str | MathError]:
-        request = json.dumps([{"tex": f.tex, "display": f.display} for f in formulas])
+        jobs = [
+            {"tex": write_quantities(f.tex), "source": f.tex, "display": f.display}
+            for f in formulas
+        ]
+        request = json.dumps(jobs)
         seconds = _BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS
         try:
             replies = json.loads(self._running_isolate().call("typeset", request, seconds))

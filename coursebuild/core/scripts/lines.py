@@ -216,9 +216,10 @@ def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bo
     if recorded.is_padded and not printed.is_padded:
         return False
     if comparison.mode is Mode.DIGITS:
-        return (
-            recorded.is_inexact and printed.is_inexact and within_half_unit(recorded, printed.value)
-        )
+        are_rounded = recorded.is_inexact and printed.is_inexact
+        if recorded.place < printed.place and recorded.value == printed.value:
+            return False  # its last zeros were not printed
+        return are_rounded and within_half_unit(recorded, printed.value)
     if comparison.mode is Mode.TOLERANCE:
         if recorded.is_finite and printed.is_finite:
             return within_tolerance(recorded.value, printed.value, comparison.rtol, comparison.atol)

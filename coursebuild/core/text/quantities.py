@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from coursebuild.core.text.numbers import Number, only_number, scan
 from coursebuild.core.text.unit_table import NAMES
-from coursebuild.core.text.units import PER, Unit, find_units, is_name
+from coursebuild.core.text.units import PER, Unit, find_units, is_name, write_quantities
 
 _SECOND_READINGS = {
     "m": ("min",),
@@ -118,6 +118,7 @@ def read_unit(text: str) -> UnitText:
 
 def plain_unit(tex: str) -> str:
     r"""The text of a unit that may be written in TeX: `\mathrm{m\,s^{-1}}` is `m s^{-1}`."""
+    tex = write_quantities(tex)
     for sign, replacement in _TEX_SIGNS:
         tex = sign.sub(replacement, tex)
     return " ".join(tex.split())

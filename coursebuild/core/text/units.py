@@ -46,9 +46,11 @@ _PREFIXES = {
 }
 _PREFIX_NAMES = {
     **{"kilo": "k", "milli": "m", "micro": "µ", "mega": "M", "centi": "c", "giga": "G"},
-    **{"nano": "n", "hecto": "h", "deci": "d", "pico": "p", "mikro": "µ", "zenti": "c"},
-    **{"tera": "T", "mili": "m"},
+    **{"nano": "n", "hecto": "h", "deci": "d", "mikro": "µ", "zenti": "c"},
+    **{"tera": "T", "mili": "m", "pico": "p", "femto": "f", "peta": "P", "deca": "da"},
 }
+_MACRO_NAMES = {"degreeCelsius": "°C", "kilogram": "kg", "astronomicalunit": "au", "neper": "Np"}
+"""Units of `siunitx` that have another name here."""
 _BINARY_PREFIXES = {f"{letter}i": 2 ** (10 * n) for n, letter in enumerate("KMGTPE", 1)}
 
 COMMON = tuple(
@@ -178,6 +180,61 @@ def _with_signs(text: str) -> str:
     for pattern, sign in _WORDS:
         text = pattern.sub(sign, text)
     return text
+
+
+_MACRO = re.compile(r"\\([A-Za-z]+)\s*(?:\{([^{}]*)\})?")
+_POWER_MACROS = {"square": "2", "squared": "2", "cubic": "3", "cubed": "3"}
+
+
+def _unit_of_macros(tex: str) -> str:
+    r"""A unit of LaTeX's `siunitx`, as `\kilo\metre\per\second`, in symbols; others as they are."""
+    units: list[list[str]] = []
+    prefix = sign = power = ""
+    for name, argument in _MACRO.findall(tex) if not _MACRO.sub("", tex).strip() else ():
+        exponent = _POWER_MACROS.get(name, argument)
+        if name in ("squared", "cubed", "tothe") and units:
+            units[-1][2] = exponent
+        elif name == "per":
+            sign = "-"
+        elif exponent:
+            power = exponent
+        elif name in _PREFIX_NAMES:
+            prefix = _PREFIX_NAMES[name]
+        else:
+            is_known = name in _MACRO_NAMES or name in NAMES or find_symbol(name)
+            symbol = _MACRO_NAMES.get(name, NAMES.get(name, name)) if is_known else f"\\{name}"
+            units.append([prefix + symbol.replace("ohm", "Ω"), sign, power])
+            prefix = sign = power = ""
+    powers = ((symbol, sign + (power or "1" * bool(sign))) for symbol, sign, power in units)
+    return " ".join(f"{s}^{{{power}}}" if power else s for s, power in powers) or tex
+
+
+_ARGUMENT = r"\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
+_QUANTITY = re.compile(
+    rf"\\(?:(?P<one>num|ang|unit|si)|qty|SI)(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}"
+    rf"(?(one)|{_ARGUMENT})"
+)
+_DEFINITION = re.compile(r"\\(?:def|[a-z]*command\*?\s*\{?)\s*(\\[A-Za-z]+)")
+
+
+def write_quantities(tex: str) -> str:
+    r"""TeX without the commands of `siunitx`: `\qty{3}{\kilo\metre}` is `3\,\mathrm{km}`."""
+    if any(_QUANTITY.match(f"{name}{{}}{{}}") for name in _DEFINITION.findall(tex)):
+        return tex
+
+    def write(match: re.Match[str]) -> str:
+        kind, number, unit = match["one"], match[2], match[3] or ""
+        if kind in ("unit", "si"):
+            number, unit = "", number
+        elif kind == "ang":
+            number = "".join(map("".join, zip(number.split(";"), "°′″", strict=False)))
+        number = number.replace(",", ".").replace("+-", r"\pm ")
+        number = re.sub(r"(?<=[\d.])[eE]([-+]?\d+)", r"\\times10^{\1}", number)
+        symbols = _unit_of_macros(unit).replace(" ", r"\,").replace("%", r"\%")
+        space = r"\," if number and symbols not in "°′″" else ""
+        return f"{number}{space}" + (rf"\mathrm{{{symbols}}}" if symbols else "")
+
+    return _QUANTITY.sub(write, tex)
 
 
 def find_unit(text: str) -> Unit | None:

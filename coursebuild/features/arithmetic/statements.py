@@ -28,7 +28,7 @@ _ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x
 """Digits and the decimal sign, as they are written in Arabic and Persian."""
 _ENVIRONMENT = re.compile(r"\\(?:begin|end)\{(?:aligned|split|align\*?|gathered|equation\*?)\}")
 _WORDS = re.compile(
-    r"\\(?:mathrm|text|textrm|begin|end)\s*(?:\{[^{}]*\}|\w)"
+    r"\\(?:mathrm|text|textrm|begin|end|(?:qty|SI)\{[^{}]*\})\s*(?:\{[^{}]*\}|\w)"
     rf"|\\(?!(?:{'|'.join(SYMBOLS - {'pi', 'infty'})})(?![A-Za-z]))[A-Za-z]+"
 )
 """Commands and words whose letters are no symbols."""
@@ -36,7 +36,9 @@ _MAY_BE_NUMERIC = re.compile(r"[0-9e]|\\pi")
 """A digit, or a part of one of `CONSTANTS`."""
 _SYMBOL = re.compile(r"(?<![\\A-Za-z])e*[A-DF-Za-df-z]")
 """A letter that is a symbol, unless it stands in a word."""
-_MAY_HOLD_WORDS = re.compile(r"\\(?:math|text|operatorname|begin|underbrace|overbrace|sum|prod)")
+_MAY_HOLD_WORDS = re.compile(
+    r"\\(?:math|text|operatorname|begin|underbrace|overbrace|sum|prod|qty|SI)"
+)
 _RELATIONS = {
     **{sign: sign for sign in "=<>"},
     **dict.fromkeys((r"\approx", r"\simeq", "≈"), "≈"),

@@ -47,12 +47,10 @@ _DEGREES = re.compile(r"\\circ|\{\s*\\circ\s*\}")
 _FUNCTIONS = frozenset("sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln".split())
 SYMBOLS = formulas.GREEK | {"ell", "hbar", "infty"}
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
-_FRACTIONS = frozenset((r"\frac", r"\tfrac", r"\dfrac"))
 _BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
 """What holds all that a function is of: brackets, perhaps in braces, as other programs write."""
 _BRACKETS = {"(": ")", "[": "]", "{": "}", "|": "|", r"\lvert": r"\rvert"}
 _QUOTIENT_SIGNS = ("/", r"\div")
-_UNIT_SIGNS = ("/", r"\cdot")
 _PRODUCT_SIGNS = (r"\cdot", r"\times", "*", "⋅", "×", *_QUOTIENT_SIGNS)
 _NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^") | {r"\rvert", *_PRODUCT_SIGNS}
 _NUMBER_ONE, _NUMBER_TWO = (Expression("number", 0, 0, text=digit) for digit in "12")
@@ -60,9 +58,7 @@ _REASONS = {
     ",": "a comma between digits may part two numbers",
     r"\pm": "`\\pm` has two values",
     r"\mp": "`\\mp` has two values",
-    r"\mathbf": "it is a vector",
-    r"\boldsymbol": "it is a vector",
-    r"\vec": "it is a vector",
+    **dict.fromkeys((r"\mathbf", r"\boldsymbol", r"\vec"), "it is a vector"),
     r"\lVert": "it is a norm",
     r"\begin": "it is an array",
     r"\log": "`\\log` has no one base: only `\\ln` is computed",
@@ -174,7 +170,7 @@ class _Reader:
             if is_quotient:
                 raise self.not_understood("what `/` divides by can be read in two ways")
             start = self.at
-            unit = None if sign and sign not in _UNIT_SIGNS else self.unit()
+            unit = None if sign and sign not in ("/", r"\cdot") else self.unit()
             if sign and unit is not None:
                 product = join_units(product, sign, unit)
                 continue
@@ -278,23 +274,27 @@ class _Reader:
             if _E_NOTATION.match(self.tex, self.at, self.end):
                 raise NotUnderstood("it may be a power of ten", start, self.at)
             return Expression("number", start, self.at, text=digits)
+        self.at += len(sign)
         if sign in _BRACKETS:
-            self.at += len(sign)
             inner = self.bracket(_BRACKETS[sign])
             if sign in ("|", r"\lvert"):
                 return Expression("abs", start, self.at, (inner,), inner.text)
             return Expression(inner.kind, start, self.at, inner.parts, inner.text)
-        self.at += len(sign)
-        if sign in _FRACTIONS:
+        if sign in (r"\frac", r"\tfrac", r"\dfrac"):
             return self.fraction(start)
         if sign == r"\sqrt":
             index = self.bracket("]") if self.take("[") else _NUMBER_TWO
             root = Expression("/", start, start, (_NUMBER_ONE, index))
             return Expression("^", start, self.at, (self.group(), root))
+        if sign == r"\num":
+            return self.group()
+        if sign in (r"\qty", r"\SI"):
+            amount, at, text = self.group(), self.at, plain_unit(rf"\unit{{{self.raw()}}}")
+            parts = amount, Expression("unit", at, self.at, text=text)
+            return Expression("*", start, self.at, parts)
         if sign in (r"\underbrace", r"\overbrace"):
             inner = self.group()
-            if self.take("_", "^"):
-                self.raw()
+            _ = self.take("_", "^") and self.raw()
             return inner
         if sign in (r"\binom", r"\tbinom", r"\dbinom"):
             return Expression("binom", start, self.at, (self.group(), self.group()))

@@ -144,7 +144,7 @@ _FRAGMENT = re.compile(
     re.DOTALL,
 )
 """What is about bodies, and has none."""
-_INCLUDE = re.compile(r"<include\s[^<>]*?\bfile\s*=\s*[\"']([^\"'<>]+)")
+_PART = re.compile(r"<(?:include|mesh|hfield|texture|skin)\s[^<>]*?\bfile\s*=\s*[\"']([^\"'<>]+)")
 
 
 def _find_models(files: SourceFiles) -> Mapping[str, str]:
@@ -174,17 +174,17 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
         elif lack or path in pieces or _FRAGMENT.search(texts[path]):
             message = "a fragment of a model, which no whole one includes: it is compiled with none"
             if lack:
-                message = f"a model that includes `{lack}`, which the folder does not hold"
+                message = f"a model that needs `{lack}`, which the folder does not hold"
             files.leave(path, message, "fragment of a model")
             models.pop(path, None)
     return models
 
 
 def _find_lack(path: str, parts: Sequence[str], texts: Mapping[str, str]) -> str:
-    """Return the name of a file that a model includes and the folder lacks; empty for none."""
+    """Return the name of a file that a model is made of and the folder lacks; empty for none."""
     part_names = {*map(posixpath.basename, parts)}
     whole = _COMMENT.sub("", "".join(texts.get(name, "") for name in (path, *parts)))
-    names = _INCLUDE.findall(whole)
+    names = _PART.findall(whole)
     return next((name for name in names if posixpath.basename(name) not in part_names), "")
 
 

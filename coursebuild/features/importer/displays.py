@@ -39,7 +39,8 @@ _BRACKETS = re.compile(
 _LABEL = re.compile(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
 """A label of LaTeX, or of mdBook's preprocessor `numeq`."""
 _EMPTY = re.compile(r"[ \t]*\n?[ \t]*")
-_QUOTATION = re.compile(r"[ \t]*>[ \t>]*")
+_MARGIN = re.compile(r"[ \t]*>[ \t>]*|[ \t]+\Z")
+"""The mark of a quotation, or what a line of a list begins with."""
 _LEAD = re.compile(r"\n[ \t>]*\Z")
 """What stands before the mark that ends a formula, on a line of its own."""
 _WORDS_BEFORE = re.compile(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
@@ -73,7 +74,9 @@ def define_operators(text: str) -> str:
 
     def define(match: re.Match[str]) -> str:
         if match["inline"] or match["display"]:
-            return f"${match['inline']}$" if match["inline"] else f"$${match['display']}$$"
+            inline = re.sub(r"\n(?:[ \t]*\n)+", "\n", (match["inline"] or "").strip())
+            inline = re.sub(r"(\\(?:begin|end)\{align)\*?\}", r"\1ed}", inline)
+            return f"${inline}$" if inline else f"$${match['display']}$$"
         operator = rf"\operatorname{match['star']}{{{match['word']}}}"
         return rf"\def{match['name']}{{{operator}}}" if match["name"] else match[0]
 
@@ -111,8 +114,9 @@ def _label_formula(match: re.Match[str]) -> str:
         line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]
         opening = lead[0] if _WORDS_BEFORE.match(line) else ""
         closing = lead[0] if match["behind"] is not None else ""
-        if quotation := _QUOTATION.match(line):  # whose mark the lines that go on may lack
-            tex = re.sub(r"\n(?![ \t]*>)", f"\n{quotation[0]}", tex)
+        if mark := _MARGIN.match(line):  # which the lines that go on may lack
+            margin = "[ \t]*>" if ">" in mark[0] else mark[0]
+            tex = re.sub(rf"\n(?!{margin})", f"\n{mark[0]}", tex)
     braces = f" {{#eq:{formula_anchor(label)}}}" if label else ""
     return f"{opening}$${tex}$${braces}{closing}"
 

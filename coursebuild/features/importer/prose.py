@@ -43,6 +43,7 @@ _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
 _KEY = r"\w(?:[\w.:/+-]*\w)?"
 """The key of a source."""
 _PLACE = r"(?:<[^<>\n]+>|(?:[^()\s<]|\([^()\s]*\))(?:[^()\s]|\([^()\s]*\))*)"
+_ALT = re.compile(r"\balt=(['\"])(.*?)\1")
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
 # A formula holds no beginning of another: so each character is looked at a few times, not once for
 # each beginning before it.
@@ -53,7 +54,7 @@ _LINE = re.compile(
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
     rf"\((?P<address>(?:@ref[ ]+)?{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
-    r"|(?P<digits>\$(?P<tex>[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
+    r"|(?P<digits>\$(?P<tex>(?!\\\$)[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
     r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
@@ -308,7 +309,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "role":
             return convert_role(match["name"], match["body"], context)
         case "image":
-            alt = match["alt"]
+            dressing, hover = match["dressing"] or "", match["hover"] or ""
+            alt = match["alt"] or "".join(words for _, words in _ALT.findall(dressing))
             source = match["source"].strip("<>")
             if source.endswith("#only-dark"):  # a page makes its pictures dark itself
                 return ""
@@ -319,7 +321,6 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
                 alt = alt or source.partition("?")[0].rpartition("/")[2] or source
                 return alt if is_in_link else f"[{alt}]({source})"
-            dressing, hover = match["dressing"] or "", match["hover"] or ""
             hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             label = dressing if dressing.startswith("{#fig-") else ""
             if address := context.resolve_picture(source):

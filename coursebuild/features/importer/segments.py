@@ -18,6 +18,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import UsageError
+from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.displays import read_macros
 from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
@@ -230,6 +231,7 @@ def _find_blocks(text: str) -> Iterator[tuple[list[int], str, str, str]]:
             continue
         head = token.info.strip()
         is_plain = token.type == "fence" and head[:1] != "{" and " " not in head
+        is_plain &= not missing_package(head)
         if quotation is not None:
             if not is_plain:
                 texts = (_QUOTE.sub("", line) for line in lines[slice(*quotation)])

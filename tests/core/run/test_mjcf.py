@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError
@@ -164,6 +165,16 @@ def test_a_model_without_end_or_of_any_size_is_ended(root: Path) -> None:
             break
     message = "MuJoCo's compiler takes more than 896 MiB of memory for it"
     assert [result.error for result in results[1:]] == [message, ""]
+
+
+def test_what_other_models_have_taken_is_not_what_a_model_takes(root: Path) -> None:
+    """MuJoCo keeps pictures and meshes for the next model."""
+    xmls = []
+    for level in range(5):
+        Image.new("RGB", (3000, 3000), (level, 0, 0)).save(root / f"models/{level}.png")
+        texture = f'<texture name="t" type="2d" file="{level}.png"/>'
+        xmls.append(f"<mujoco><asset>{texture}</asset></mujoco>")
+    assert [r.error for r in texts(root, xmls, Limits(memory=256))] == [""] * 5
 
 
 def test_what_a_model_reserves_is_not_what_its_compiler_takes(root: Path) -> None:

@@ -37,6 +37,7 @@ I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168
 \sum_{n=0}^{10} \frac{1}{n!} \approx 2.7182818, \quad \prod_{i=1}^{5} i = 5!
 2\times10^{-6} = 2\,\mathrm{ppm}, \quad 10^{-9} = 1\,\mathrm{ppb}
 \sum_{i=1}^{3} 2^i\ \mathrm{m} = 14\ \mathrm m, \quad \sum_{i=3}^{2} i = 0
+\qty{2}{\kilo\gram}\cdot\SI{3}{m/s^2} = \qty{6}{\newton}, \quad \num{12}\cdot\num{12} = 144
 26! \approx 10^{26}, \quad 26^{25} \approx 10^{35}
 """
 SILENT = r"""

@@ -35,6 +35,7 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
             "loose/part.xml": "<mujocoinclude><asset/></mujocoinclude>",
             "made/task.xml": "<mujoco><include file='made.xml'/><include file='a.xml'/></mujoco>",
             "made/a.xml": "<mujoco><worldbody><geom material='m' size='1'/></worldbody></mujoco>",
+            "made/mesh.xml": "<mujoco><asset><mesh file='no.obj'/></asset><worldbody/></mujoco>",
             "loose/keys.xml": "<mujoco><keyframe><key qpos='1 2'/></keyframe></mujoco>",
         },
     )
@@ -48,7 +49,8 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
     assert "- fragment of a model: beside the models that include it (1 time)" in account
     fragments = "a fragment of a model, which no whole one includes: it is compiled with none\n"
     assert f"{fragments}  - loose/keys.xml\n  - loose/part.xml\n  - made/a.xml\n" in account
-    assert "a model that includes `made.xml`, which the folder does not hold" in account
+    assert "a model that needs `made.xml`, which the folder does not hold" in account
+    assert "a model that needs `no.obj`, which the folder does not hold" in account
     assert not any(word in path for path in course.files for word in ("loose", "keys", "made"))
     assert "used by no text" not in account
 

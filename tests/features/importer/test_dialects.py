@@ -304,3 +304,29 @@ def test_links_and_signs_that_cannot_stay_are_told(tmp_path: Path) -> None:
     left = account_of(course).partition("## Left")[2]
     assert "- `:smile:`, shown as written: write the sign, if its tool draws one\n" in left
     assert "- the link of a figure to `https://a.org`, which has a number here\n" in left
+
+
+def test_a_picture_is_described_by_its_attributes(tmp_path: Path) -> None:
+    text = "# One\n\n![](p.png){alt='A [bent] graph'}\n\n![B](p.png){alt=\"C\" width=3}\n"
+    assert lesson(tmp_path, "a.md", text, **{"p.png": "\x89PNG"}) == (
+        "![A [bent] graph](../files/p.png)\n\n![B](../files/p.png)\n"
+    )
+
+
+def test_formulas_are_whole_whatever_their_lines_begin_with(tmp_path: Path) -> None:
+    text = (
+        "# One\n\n\\f$\n\\newcommand{\\w}{\\omega}\n\n\\newcommand{\\v}{u}\n\\f$\n\n"
+        "So \\f$\\v\\f$.\n\n"
+        "\\f$\\begin{align*}a&=b\\end{align*}\\f$\n\n"
+        "1. It is\n\n    $$ a =\nb\n$$\n\n2. It costs $\\$10 \\pm \\$1$.\n"
+    )
+    assert lesson(tmp_path, "a.md", text).strip() == (
+        "So $\\newcommand{\\v}{u}\\v$.\n\n"
+        "$\\begin{aligned}a&=b\\end{aligned}$\n\n"
+        "1. It is\n\n    $$ a =\n    b\n    $$\n\n2. It costs $\\$10 \\pm \\$1$."
+    )
+
+
+def test_a_block_in_a_list_that_nothing_reads_is_text(tmp_path: Path) -> None:
+    text = "# One\n\n- It goes\n\n  ```ipywidget\n  A\n  ```\n\n  ```mermaid\n  A --> B\n  ```\n"
+    assert "  ```text\n  A --> B\n  ```" in lesson(tmp_path, "a.md", text)
