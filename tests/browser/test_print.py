@@ -77,7 +77,7 @@ def test_a_lesson_is_a_handout(sites: Mapping[str, Site], page: Page) -> None:
 
 def test_what_is_long_is_printed_if_it_is_open(sites: Mapping[str, Site], page: Page) -> None:
     for lesson, fold, phrase in (
-        (REAL, ".further-text > summary >> nth=-1", "a triangular factor"),
+        (REAL, ".further-text > summary >> nth=-1", "kept as logarithms"),
         (WALL, ".fold:has-text('spring presses against') > summary", "spring presses against"),
     ):
         page.goto(sites["real"].url(lesson))

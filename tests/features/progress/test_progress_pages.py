@@ -72,7 +72,7 @@ def test_each_page_carries_the_words_that_it_shows(pages: dict[str, str]) -> Non
         parts = (key.split(".") for key in words[path])
         return {".".join(p[:2]) for p in parts if p[0] in ("progress", "review")}
 
-    lesson = {"progress.lesson", "progress.trouble"}
+    lesson = {"progress.lesson", "progress.map", "progress.trouble"}
     assert groups("about.html") == set()
     assert groups("index.html") == groups("levels/0.html") == {"progress.map"}
     assert groups("lessons/0.1-falling.html") == lesson
