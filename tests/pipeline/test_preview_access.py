@@ -116,13 +116,15 @@ def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> No
 def test_whoever_asks_needs_the_token_of_the_link(preview: Preview) -> None:
     """On this machine too, at any address, and whatever name led to it."""
     denied = b"open the address that the terminal shows, which lets this browser in\n"
-    paths = ("/", "/?token=x", "/?token=", "/lessons/1.1-one.html", "/.coursebuild/events", "//[")
+    places = ("/lessons/1.1-one.html", "/.coursebuild/events")
+    in_disguise = (f"{place}{end}/service-worker.js" for place in places for end in "?#")
+    paths = ("/", "/?token=x", "/?token=", *places, *in_disguise, "//[")
     for cookie in ("", "a=b", f"{preview.cookie}x", preview.cookie[:-1], preview.cookie[12:]):
         for path in (*paths, "http://evil.example?token=x"):
             status, headers, body = preview.get(path, Host="evil.example", Cookie=cookie)
             assert (status, body, headers | PRIVATE == headers) == (403, denied, True), path
         own_origin = {"Origin": "http://localhost", "Host": "localhost", "Cookie": cookie}
-        for command in ("accept", "open", "else"):
+        for command in ("accept", "open", "else", "service-worker.js"):
             assert preview.get(f"/.coursebuild/{command}", "POST", b"{}", **own_origin)[0] == 403
     assert preview.get("/", Cookie=f"a=b; {preview.cookie}", Host="laptop.local")[0] == 200
     assert preview.get("/", **{SITE: "cross-site"})[0] == 403
