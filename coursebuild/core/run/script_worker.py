@@ -45,6 +45,8 @@ class ChildReport(Struct, frozen=True):
     watched), and each figure of the job; `None` for one that it did not draw."""
     part_starts: tuple[int, ...] = ()
     """Where in its output each part begins that it reached, but the first."""
+    errno: int = 0
+    """The system's number for why it was not started, if the system refused that."""
 
 
 class Worker:

@@ -199,7 +199,8 @@ class _Supervisor:
                 parent = os.getppid()  # now, since a script may end it as soon as it runs
                 script = self._launch(job, environment | {"TMPDIR": folder})
             except (OSError, ValueError) as error:  # a ValueError: an argument has a null character
-                return _report_unstartable(f"the script cannot be started: {error}\n")
+                number = getattr(error, "errno", None) or 0
+                return _report_unstartable(f"the script cannot be started: {error}\n", number)
             if isinstance(script, ScriptProcess):
                 return script
             _send(self.reports, STARTED)
@@ -362,8 +363,8 @@ def missing_modules(names: Sequence[str], folders: Sequence[str], library: str) 
     return [name for name in names if not is_importable(name)]
 
 
-def _report_unstartable(text: str) -> bytes:
-    return _report("failed", 2, parts=(b"", text.encode(), b""))
+def _report_unstartable(text: str, number: int = 0) -> bytes:
+    return _report("failed", 2, parts=(b"", text.encode(), b""), number=number)
 
 
 def _report(
@@ -373,9 +374,11 @@ def _report(
     missing: Sequence[str] = (),
     parts: Sequence[bytes | None] = (b"", b"", b""),
     part_starts: Sequence[int] = (),
+    number: int = 0,
 ) -> bytes:
     report = {
         "outcome": outcome,
+        "errno": number,
         "status": status,
         "seconds": seconds,
         "missing": list(missing),
