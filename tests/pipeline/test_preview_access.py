@@ -116,9 +116,8 @@ def test_origin_that_may_embed_the_preview_shows_it_in_a_frame(make: Make) -> No
 def test_whoever_asks_needs_the_token_of_the_link(preview: Preview) -> None:
     """On this machine too, at any address, and whatever name led to it."""
     denied = b"open the address that the terminal shows, which lets this browser in\n"
-    places = ("/lessons/1.1-one.html", "/.coursebuild/events")
-    in_disguise = (f"{place}{end}/service-worker.js" for place in places for end in "?#")
-    paths = ("/", "/?token=x", "/?token=", *places, *in_disguise, "//[")
+    paths = ["/", "/?token=x", "/?token=", "/lessons/1.1-one.html", "/.coursebuild/events", "//["]
+    paths += [f"{paths[n]}{end}/service-worker.js" for n in (3, 4) for end in "?#"]
     for cookie in ("", "a=b", f"{preview.cookie}x", preview.cookie[:-1], preview.cookie[12:]):
         for path in (*paths, "http://evil.example?token=x"):
             status, headers, body = preview.get(path, Host="evil.example", Cookie=cookie)
@@ -160,15 +159,9 @@ def test_link_stays_good_after_a_restart(make: Make) -> None:
     assert len({*tokens}) == 4
 
 
-def test_another_user_can_neither_read_nor_press_anything(
+def test_list_of_running_programs_does_not_tell_the_token(
     preview: Preview, held_back: Path
 ) -> None:
-    """Nor does the list of running programs tell the token."""
-    origin = {"Origin": f"http://127.0.0.1:{preview.port}", "Cookie": ""}
-    assert preview.get("/", Cookie="")[0] == 403
-    assert preview.get("/.coursebuild/events?page=index.html", Cookie="")[0] == 403
-    for command in ("accept", "open"):
-        assert preview.get(f"/.coursebuild/{command}", "POST", b"{}", **origin)[0] == 403
     for program in Path("/proc").glob("[0-9]*/cmdline"):
         with contextlib.suppress(OSError):
             assert preview.token.encode() not in program.read_bytes()

@@ -310,7 +310,7 @@ class _Work:
         report = worker.take_report()
         if report is None:
             return
-        if lack := lacking(OSError(report.errno, "")):  # which is no mistake of the script
+        if lack := lacking(OSError(report.errno, None)):  # which is no mistake of the script
             raise lack
         job = self.jobs[index]
         parts = (None if part is None else part.encode("latin-1") for part in report.parts)
