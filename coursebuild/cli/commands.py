@@ -23,8 +23,8 @@ from typing import TYPE_CHECKING, NoReturn
 
 from coursebuild import MANUAL
 from coursebuild.core.files.errors import (
-    AddressLimitError,
     EffectError,
+    LackError,
     PublishRefusedError,
     UsageError,
     lacking,
@@ -102,22 +102,22 @@ def run(directory: str | None, words: list[str], *, alone: bool) -> int:
             limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
             if limit < _FILES_NEEDED:
                 text = f"only {limit} files may be open at a time, and {_FILES_NEEDED} are needed"
-                return fail(FAILURE, text, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
+                return fail(USAGE, text, f"`ulimit -n {4 * _FILES_NEEDED}` raises the limit")
             if not resource.getrlimit(resource.RLIMIT_FSIZE)[0]:
                 text = "nothing may be written into any file"
-                return fail(FAILURE, text, "`ulimit -f unlimited` removes the limit")
+                return fail(USAGE, text, "`ulimit -f unlimited` removes the limit")
             remove_abandoned_folders()
             return _choose_command(directory, words)
         except UsageError as error:
             return fail(USAGE, str(error))
         except EffectError as error:
-            is_refused = isinstance(error, PublishRefusedError | AddressLimitError)
+            is_refused = isinstance(error, PublishRefusedError | LackError)
             return fail(USAGE if is_refused else FAILURE, error.message, error.help)
         except (MemoryError, OSError, RuntimeError) as error:
             lack = lacking(error)
             if lack is None:
                 raise
-            return fail(FAILURE, lack.message, lack.help)
+            return fail(USAGE, lack.message, lack.help)
         finally:
             if not alone:
                 gc.set_threshold(*thresholds)

@@ -124,12 +124,12 @@ _TYPES = MimeTypes().types_map[True] | {
 _WORKER = "/service-worker.js"
 
 
-def is_worker(address: str) -> bool:
-    """Whether an address is of the script that takes the place of a published site's worker.
+def is_worker(path: str) -> bool:
+    """Whether a path is of the script that takes the place of a published site's worker.
 
     It is for everybody: until it has come, the browser shows that site, and no link gets through.
     """
-    return address.partition("?")[0].endswith(_WORKER)
+    return path.endswith(_WORKER)
 
 
 _NEXT_PAGE = '<!DOCTYPE html><title>…</title><meta http-equiv="refresh" content="0; url={}">'
@@ -153,7 +153,7 @@ class Answers:
 
     def find(self, path: str) -> tuple[HTTPStatus, str, bytes]:
         """Return the status, content type and bytes for the path of an address."""
-        if path.endswith(_WORKER):
+        if is_worker(path):
             path = f"{PREFIX}worker.js"
         if path in self._preview_files:
             return HTTPStatus.OK, _type_of(path), self._preview_files[path]

@@ -185,7 +185,7 @@ class _Handler(BaseHTTPRequestHandler):
             path, query = parts.path, parse_qs(parts.query)
         except ValueError:
             path, query = "", {}  # not the address of a page
-        if not self._is_allowed():
+        if not self._is_allowed(path):
             return
         if path == f"{PREFIX}events":
             self._stream_events(query.get("page", ["index.html"])[0])
@@ -225,8 +225,8 @@ class _Handler(BaseHTTPRequestHandler):
             self.send_header(name, value)
         super().end_headers()
 
-    def _is_allowed(self) -> bool:
-        """Whether a request may be answered; if not, answer why."""
+    def _is_allowed(self, path: str = "") -> bool:
+        """Whether a request may be answered, with what is at a path; if not, answer why."""
         access = self.server.access
         refusal = access.refusal(self.command, self.path, self.headers)
         exchange = None if refusal else access.exchange(self.path, self.headers)
@@ -234,7 +234,7 @@ class _Handler(BaseHTTPRequestHandler):
             cookie, page = exchange
             self._send(HTTPStatus.OK, HTML, page, {"Set-Cookie": cookie})
             return False
-        if not refusal and (access.has_token(self.headers) or is_worker(self.path)):
+        if not refusal and (access.has_token(self.headers) or is_worker(path)):
             return True
         message = refusal or "open the address that the terminal shows, which lets this browser in"
         self._send(HTTPStatus.FORBIDDEN, TEXT, f"{message}\n".encode())

@@ -142,14 +142,14 @@ def run_limited(folder: Folder, limit: str, *arguments: str) -> tuple[int, str]:
 def test_limits_of_files_are_told_and_as_many_as_said_are_enough(make: Make) -> None:
     folder = make(GOOD + "$a_{17}$\n\n" + block("two.py", "print(2)", "2"))
     assert run_limited(folder, "-n 12", "check") == (
-        1,
+        2,
         "coursebuild: only 12 files may be open at a time, and 64 are needed\n"
         "  help: `ulimit -n 256` raises the limit\n",
     )
     status, output = run_limited(folder, "-n 64", "build", "--jobs", "2")
     assert status == 0, output
     assert run_limited(folder, "-f 0", "check") == (
-        1,
+        2,
         "coursebuild: nothing may be written into any file\n"
         "  help: `ulimit -f unlimited` removes the limit\n",
     )

@@ -31,8 +31,8 @@ class OutsideProjectError(EffectError):
     """A path leads out of the project."""
 
 
-class AddressLimitError(EffectError):
-    """V8 does not fit into the address space that this process may use."""
+class LackError(EffectError):
+    """The machine has run out of something, or allows this process too little of it."""
 
 
 class PublishRefusedError(EffectError):
@@ -60,14 +60,14 @@ def reason(error: OSError) -> str:
     return text[:1].lower() + text[1:]
 
 
-def lacking(error: MemoryError | OSError | RuntimeError) -> EffectError | None:
+def lacking(error: MemoryError | OSError | RuntimeError) -> LackError | None:
     """The error of a machine that has run out of something; `None` for all other errors."""
     if isinstance(error, MemoryError):
-        return EffectError("there is not enough memory")
+        return LackError("there is not enough memory")
     if isinstance(error, OSError) and error.errno in _HELP:
-        return EffectError(reason(error), help=_HELP[error.errno])
+        return LackError(reason(error), help=_HELP[error.errno])
     if str(error) == "can't start new thread":
-        return EffectError(str(error), help=_HELP[errno.EAGAIN])
+        return LackError(str(error), help=_HELP[errno.EAGAIN])
     return None
 
 

@@ -23,7 +23,7 @@ from typing import Self, TypeAlias
 
 from msgspec.structs import replace
 
-from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.errors import EffectError, lacking
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run.gate import Enclose
@@ -310,6 +310,8 @@ class _Work:
         report = worker.take_report()
         if report is None:
             return
+        if lack := lacking(OSError(report.errno, None)):  # which is no mistake of the script
+            raise lack
         job = self.jobs[index]
         parts = (None if part is None else part.encode("latin-1") for part in report.parts)
         out, err, trace, *figures = parts

@@ -43,6 +43,8 @@ class ChildReport(Struct, frozen=True):
     parts: tuple[str | None, ...]
     """Bytes, as Latin-1: its output, the end of its error output, its trace (empty where nobody
     watched), and each figure of the job; `None` for one that it did not draw."""
+    errno: int | None
+    """The system's number for why it was not started, if the system refused that."""
     part_starts: tuple[int, ...] = ()
     """Where in its output each part begins that it reached, but the first."""
 

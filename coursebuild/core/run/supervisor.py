@@ -198,8 +198,8 @@ class _Supervisor:
                 os.mkdir(folder, 0o700)  # noqa: PTH102
                 parent = os.getppid()  # now, since a script may end it as soon as it runs
                 script = self._launch(job, environment | {"TMPDIR": folder})
-            except (OSError, ValueError) as error:  # a ValueError: an argument has a null character
-                return _report_unstartable(f"the script cannot be started: {error}\n")
+            except OSError as error:
+                return _report_unstartable(f"the script cannot be started: {error}\n", error.errno)
             if isinstance(script, ScriptProcess):
                 return script
             _send(self.reports, STARTED)
@@ -227,7 +227,7 @@ class _Supervisor:
     def _launch(self, job: Job, environment: dict[str, str]) -> RunningScript | ScriptProcess:
         """Start a script; in its own process, return the script itself."""
         if any(b"\0" in os.fsencode(argument) for argument in job["args"]):
-            raise ValueError("embedded null byte")
+            raise OSError("an argument has a null character")
         (out, stdout), (err, stderr) = os.pipe(), os.pipe()
         try:
             prepare = functools.partial(self._prepare_script, job, stdout, stderr, os.getpid())
@@ -278,15 +278,17 @@ class _Supervisor:
         for number in _SIGNALS:  # `nohup coursebuild` must not make scripts deaf
             interrupt = number == signal.SIGINT
             signal.signal(number, signal.default_int_handler if interrupt else signal.SIG_DFL)
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file in the project
+        _lower_limit(resource.RLIMIT_CORE, 0)  # a crash leaves no file in the project
         if parent == _FIRST:  # before the tool has seen them; not for root
-            _, most = resource.getrlimit(resource.RLIMIT_NPROC)
-            most = _PROCESSES if most == resource.RLIM_INFINITY else min(most, _PROCESSES)
-            resource.setrlimit(resource.RLIMIT_NPROC, (most, most))
-        memory, (_, most) = job["memory"] << 20, resource.getrlimit(resource.RLIMIT_DATA)
-        if most == resource.RLIM_INFINITY or most > memory:
-            resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
+            _lower_limit(resource.RLIMIT_NPROC, _PROCESSES)
+        _lower_limit(resource.RLIMIT_DATA, job["memory"] << 20)
         os.chdir(job["root"])
+
+
+def _lower_limit(limit: int, number: int) -> None:
+    """Set a limit of this process, unless it may not have as much."""
+    if not 0 <= resource.getrlimit(limit)[1] < number:  # no limit is -1
+        resource.setrlimit(limit, (number, number))
 
 
 def _special_names(folder: str, names: Sequence[str]) -> list[str]:
@@ -362,8 +364,8 @@ def missing_modules(names: Sequence[str], folders: Sequence[str], library: str) 
     return [name for name in names if not is_importable(name)]
 
 
-def _report_unstartable(text: str) -> bytes:
-    return _report("failed", 2, parts=(b"", text.encode(), b""))
+def _report_unstartable(text: str, number: int | None = None) -> bytes:
+    return _report("failed", 2, parts=(b"", text.encode(), b""), number=number)
 
 
 def _report(
@@ -373,9 +375,11 @@ def _report(
     missing: Sequence[str] = (),
     parts: Sequence[bytes | None] = (b"", b"", b""),
     part_starts: Sequence[int] = (),
+    number: int | None = None,
 ) -> bytes:
     report = {
         "outcome": outcome,
+        "errno": number,
         "status": status,
         "seconds": seconds,
         "missing": list(missing),

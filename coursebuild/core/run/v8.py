@@ -23,7 +23,7 @@ from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from coursebuild.core.files.errors import AddressLimitError, EffectError, lacking
+from coursebuild.core.files.errors import EffectError, LackError, lacking
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.text.units import write_quantities
@@ -78,13 +78,13 @@ def start() -> None:
     """Start V8 if it does not run yet; this starts no thread, and copies of this process share it.
 
     Raises:
-        AddressLimitError: the limit on addresses would make it end this process.
+        LackError: the limit on addresses would make it end this process.
         EffectError: it is not installed.
         MemoryError, OSError: the machine has run out of something.
     """
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     if limit != resource.RLIM_INFINITY and limit < _ADDRESSES:
-        raise AddressLimitError(
+        raise LackError(
             f"V8 needs more than the {round(limit / (1 << 30), 2):g} GiB of address space that "
             "this process may use",
             help="`ulimit -v unlimited` removes the limit; V8 reserves addresses, not memory",

@@ -29,7 +29,7 @@ from coursebuild.api import (
     diagnose,
     did_you_mean,
 )
-from coursebuild.core.files.errors import AddressLimitError
+from coursebuild.core.files.errors import LackError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model import Limits
@@ -125,7 +125,7 @@ class LabTrials:
             for trial in trials:
                 try:
                     result, lab_diagnostics = self._try_lab(trial)
-                except AddressLimitError as error:
+                except LackError as error:
                     if isinstance(trial.block, Lab) and trial.block.is_of_text:
                         raise
                     self._context.say(f"the pages of models have no labs: {error.message}")

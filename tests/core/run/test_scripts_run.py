@@ -138,6 +138,14 @@ def test_script_that_cannot_be_started_says_why(
         run("print(1)")
 
 
+def test_what_the_machine_lacks_is_no_mistake_of_a_script(run: Run) -> None:
+    """A lack that a script makes for the supervisor, which starts the next one."""
+    limit = "resource.prlimit(os.getppid(), resource.RLIMIT_NOFILE, (3, 3))"
+    assert run(f"import os, resource\n{limit}").outcome is Outcome.OK
+    with pytest.raises(EffectError, match="too many open files"):
+        run("print(1)")
+
+
 PROBE = program("environment")
 """`test_forked_scripts` compares the rest with what a bare Python finds."""
 OUTER = tomllib.loads(fixture_text("scripts/outer_environment.toml"))
