@@ -227,7 +227,10 @@ class PrintedText:
         heading = self._headings[at]
         if heading < 0 or self._words[heading].endswith(":"):
             return ""
-        return title_of_column(self.lines[at].text, number.start, self.lines[heading].text)
+        above = self._headings[heading]
+        headers = [heading, *([above] if above == heading - 1 >= 0 else [])]  # pandas: x, y / name
+        row, texts = self.lines[at].text, (self.lines[header].text for header in headers)
+        return next(filter(None, (title_of_column(row, number.start, text) for text in texts)), "")
 
     def unit(self, at: int, number: Number) -> UnitText:
         """The unit that is printed with a number."""
