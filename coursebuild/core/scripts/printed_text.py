@@ -227,10 +227,11 @@ class PrintedText:
         heading = self._headings[at]
         if heading < 0 or self._words[heading].endswith(":"):
             return ""
-        above = self._headings[heading]
-        headers = [heading, *([above] if above == heading - 1 >= 0 else [])]  # pandas: x, y / name
-        row, texts = self.lines[at].text, (self.lines[header].text for header in headers)
-        return next(filter(None, (title_of_column(row, number.start, text) for text in texts)), "")
+        row = self.lines[at].text
+        title = title_of_column(row, number.start, self.lines[heading].text)
+        if title or not heading or self._headings[heading] != heading - 1:
+            return title
+        return title_of_column(row, number.start, self.lines[heading - 1].text)  # pandas' frames
 
     def unit(self, at: int, number: Number) -> UnitText:
         """The unit that is printed with a number."""
