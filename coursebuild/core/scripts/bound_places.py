@@ -52,7 +52,7 @@ def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ..
         replace(b, unit=b.unit or units.get(b.span.start, ""))
         for b in model.find_inlines(document, model.NumberBinding)
         if b.source is None
-        and (b.script or [True, *(known for start, known in outputs if start < b.span.start)][-1])
+        and (b.script or [True, *(is_read for at, is_read in outputs if at < b.span.start)][-1])
     )
 
 

@@ -228,9 +228,9 @@ class PrintedText:
         if heading < 0 or self._words[heading].endswith(":"):
             return ""
         row = self.lines[at].text
-        title = title_of_column(row, number.start, self.lines[heading].text)
-        if title or not heading or self._headings[heading] != heading - 1:
-            return title
+        words = title_of_column(row, number.start, self.lines[heading].text)
+        if words or not heading or self._headings[heading] != heading - 1:
+            return words
         return title_of_column(row, number.start, self.lines[heading - 1].text)  # pandas' frames
 
     def unit(self, at: int, number: Number) -> UnitText:
