@@ -36,7 +36,8 @@ from coursebuild.core.text.quantities import unit_behind, unit_of_label
 def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ...]:
     """The bound numbers of a document, in order: also in footnotes, tables and quizzes.
 
-    One that ends its cell in a table has the unit of the column.
+    One that ends its cell in a table has the unit of the column. One that depends on an output
+    without a readable script is left out: that mistake is reported by itself.
     """
     units = {
         inline.span.start: ColumnTitle.of(header).unit.text
@@ -45,8 +46,14 @@ def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ..
         for cell, header in zip(row, table.header, strict=False)
         for inline in cell.children[-1:]
     }
-    bindings = (b for b in model.find_inlines(document, model.NumberBinding) if b.source is None)
-    return tuple(replace(b, unit=b.unit or units.get(b.span.start, "")) for b in bindings)
+    recordings = model.find_blocks(document, model.Recording)
+    outputs = sorted((recording.span.start, bool(recording.script)) for recording in recordings)
+    return tuple(
+        replace(b, unit=b.unit or units.get(b.span.start, ""))
+        for b in model.find_inlines(document, model.NumberBinding)
+        if b.source is None
+        and (b.script or [True, *(is_read for at, is_read in outputs if at < b.span.start)][-1])
+    )
 
 
 def bound_values(

@@ -227,7 +227,11 @@ class PrintedText:
         heading = self._headings[at]
         if heading < 0 or self._words[heading].endswith(":"):
             return ""
-        return title_of_column(self.lines[at].text, number.start, self.lines[heading].text)
+        row = self.lines[at].text
+        words = title_of_column(row, number.start, self.lines[heading].text)
+        if words or not heading or self._headings[heading] != heading - 1:
+            return words
+        return title_of_column(row, number.start, self.lines[heading - 1].text)  # pandas' frames
 
     def unit(self, at: int, number: Number) -> UnitText:
         """The unit that is printed with a number."""

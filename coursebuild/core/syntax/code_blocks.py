@@ -144,8 +144,7 @@ def _build_part(
 def _check_path(fence: Fence, file: Word, diagnostics: list[Diagnostic]) -> bool:
     path = file.value or ""
     mistake = path_mistake(path, is_python=fence.kind == PYTHON)
-    help = "a script is written to `examples/`, for example "
-    help += "`examples/l4_2_inertia.py`"
+    help = "write `examples/` and a name of its own, for example `examples/l4_2_inertia.py`"
     if fence.nested:
         mistake, help = "a text of a quiz or lab cannot hold a script", ""
     if mistake:
