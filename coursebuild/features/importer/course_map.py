@@ -272,7 +272,7 @@ def _read_file(
         if has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
             files.account.changed["hidden lines of Rust", "dropped: readers did not see them"] += 1
             source = visible_text
-        read = read_segments(source, text.file)
+        read = read_segments(source, text.file, title)
     except RecursionError:
         raise UsageError(f"{text.file} is nested too deeply") from None
     lost = {**read.lost, **({} if id or not read.summary else {"description": read.summary})}

@@ -78,8 +78,8 @@ class ReadText(Struct, frozen=True):
     """The definitions of its macros."""
 
 
-def read_segments(text: str, name: str) -> ReadText:
-    """Read the file of a lesson.
+def read_segments(text: str, name: str, title: str = "") -> ReadText:
+    """Read the file of a lesson, which the map may give a title.
 
     Raises:
         UsageError: it is no notebook, but is called so.
@@ -104,6 +104,7 @@ def read_segments(text: str, name: str) -> ReadText:
     else:
         metadata, size = read_front_matter(text)
         segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
+    segments = _raise_title(segments, title)
     # The first heading of level 1, and the segments without it; from the next on, all go down by 1
     titles: list[str] = []
     own_title = " ".join(str(metadata.get("title") or "").split())
@@ -139,6 +140,19 @@ def read_segments(text: str, name: str) -> ReadText:
         {str(key): str(v) for key, v in words.items() if isinstance(v, str | int | float)},
         read_macros(metadata),
     )
+
+
+def _raise_title(segments: list[Segment], title: str) -> list[Segment]:
+    """Bring headings up where the title of the map begins the text as one of a lower level."""
+    start = segments[0].text if segments and segments[0].kind == "prose" else ""
+    first = re.match(r"\s*\#(\#+)[ \t]+(.*?)[ \t#]*(?:\n|\Z)", start)
+    if first is None or first[2].casefold() != title.casefold():
+        return segments
+    surplus = re.compile(rf"^{first[1]}(?=\#)", re.MULTILINE)
+    return [
+        replace(each, text=surplus.sub("", each.text)) if each.kind == "prose" else each
+        for each in segments
+    ]
 
 
 _GATES = re.compile(

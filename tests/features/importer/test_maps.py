@@ -250,3 +250,21 @@ def test_the_site_of_docusaurus_may_stand_beside_its_texts(tmp_path: Path) -> No
     assert outline == [("B", ["Two", "One"])]
     text = convert(SourceFiles(tmp_path)).files["content/lessons/1.2-one.md"].decode()
     assert text == "It costs \\$1 or \\$2: [Two](lesson:1.1).\n"
+
+
+def test_a_title_of_the_map_that_begins_a_text_as_a_lower_heading_is_its_title(
+    tmp_path: Path,
+) -> None:
+    files = {
+        "SUMMARY.md": "# Summary\n\n- [Two cones](cones.md)\n- [Walls](walls.md)\n",
+        "cones.md": "\n## Two cones\n\nText.\n\n### In a plane\n\n```sh\n## not raised\n```\n",
+        "walls.md": "## Of stone\n\nText.\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    course = convert(SourceFiles(tmp_path))
+    cones, walls = (
+        course.files[path].decode() for path in sorted(course.files) if path.startswith("content/l")
+    )
+    assert cones.startswith("Text.\n\n## In a plane\n") and "\n## not raised\n" in cones
+    assert walls.startswith("## Of stone\n")
