@@ -150,8 +150,8 @@ def _raise_title(segments: list[Segment], title: str) -> list[Segment]:
         return segments
     surplus = re.compile(rf"^{first[1]}(?=\#)", re.MULTILINE)
     return [
-        replace(each, text=surplus.sub("", each.text)) if each.kind == "prose" else each
-        for each in segments
+        replace(segment, text=surplus.sub("", segment.text)) if segment.kind == "prose" else segment
+        for segment in segments
     ]
 
 
