@@ -26,6 +26,7 @@ const CODE = {
     { run: ({ data, sim }) => ((data.qvel[0] += 2), sim.step(3)) },
     { run: ({ sim }) => sim.reset() },
   ],
+  plots: [[]],
   goal: ({ data }) => Math.abs(data.qvel[0]) > 5,
 }
 const made = (t, goal = { hold: 0.05, log: [] }) => {

@@ -111,6 +111,8 @@ def test_each_kind_of_change_arrives(make: Make, browser: Browser) -> None:
               const page = document.querySelector('main').cloneNode(true)
               page.querySelectorAll('.copy').forEach((button) => button.remove())
               for (const element of page.querySelectorAll('*')) {
+                element.style.removeProperty('--below')
+                if (element.style.length === 0) element.removeAttribute('style')
                 for (const name of ['tabindex', 'data-more', 'aria-current', 'open']) {
                   element.removeAttribute(name)
                 }
