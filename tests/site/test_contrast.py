@@ -95,6 +95,10 @@ def colours(value: str, theme: str) -> list[Colour]:
     if match := re.fullmatch(r"color-mix\(in srgb, (.*) (\d+)%, transparent\)", value):
         share = int(match[2]) / 100
         return [(r, g, b, a * share) for r, g, b, a in colours(match[1], theme)]
+    if match := re.fullmatch(r"color-mix\(in srgb, (.*) (\d+)%, (var\(--[\w-]+\))\)", value):
+        share = int(match[2]) / 100
+        tops = [(r, g, b, a * share) for r, g, b, a in colours(match[1], theme)]
+        return [blend(top, c) for top in tops for c in colours(match[3], theme)]
     if match := re.fullmatch(r"#([0-9a-f]{3}|[0-9a-f]{6})", value):
         digits = match[1] if len(match[1]) == 6 else "".join(2 * digit for digit in match[1])
         red, green, blue = (int(digits[i : i + 2], 16) / 255 for i in (0, 2, 4))
