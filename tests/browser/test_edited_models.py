@@ -274,6 +274,8 @@ def test_zip_offers_its_models_and_a_model_too_fine_to_draw_is_drawn_coarser(pag
     press(lab_element, "Back to the lesson’s model")
     expect(lab_element.get_by_text("Drawn coarser")).to_have_count(0)
     expect(lab_element.get_by_label("Model of these files")).to_be_hidden()
+    press(lab_element, "Back to my model")
+    expect(text).to_have_value(FINE)
 
 
 def test_every_lab_opens_its_model_in_the_editor(page: Page) -> None:
