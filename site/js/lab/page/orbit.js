@@ -1,7 +1,8 @@
 /** A plot of one quantity against another, while a lab runs: the samples of a run, drawn as the curves of labs without an engine are. */
 
 import { Chart } from './chart.js'
-import { HEIGHT, Samples } from './plots.js'
+import { Samples } from './history.js'
+import { HEIGHT } from './plots.js'
 
 export class Orbit extends Samples {
   /** @param {any} config a plot of the lab's JSON with an `x`, whose numbers come behind those of the traces */
