@@ -1,0 +1,3 @@
+print("exactly   this")
+print()
+print("trailing white space   ")

@@ -1,0 +1,2 @@
+for i in range(9):
+    print("line", i, "of 9")

@@ -1,0 +1,1 @@
+print("a page may have scripts")
