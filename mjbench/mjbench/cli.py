@@ -5,6 +5,7 @@ from __future__ import annotations
 import _thread
 import argparse
 import hashlib
+import math
 import shutil
 import signal
 import sys
@@ -54,8 +55,6 @@ Measures MuJoCo models: speed against error of every integrator and timestep, th
 timestep, and what a model could do without. `mjbench MODEL.xml` is `mjbench bench MODEL.xml`.
 """
 _T = TypeVar("_T")
-_MONTH = 30 * 24 * 60.0
-"""Minutes, after which a measurement ends that has no other limit."""
 _STOPPED = 130
 """The exit status of a command that the user stopped."""
 
@@ -84,6 +83,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"  help: {error.help}", file=sys.stderr)
         return 1
     return status
+
+
+def positive(text: str) -> float:
+    number = float(text)
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text} is no number above 0")
+    return number
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -115,7 +121,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--engines", nargs="?", const="", metavar="NAMES", help=help)
     command.add_argument("--quick", action="store_true", help="fewer settings and rough times")
     help = "after which it stops, as with Ctrl-C, and says what is known"
-    command.add_argument("--minutes", type=float, default=_MONTH, metavar="M", help=help)
+    command.add_argument("--minutes", type=positive, metavar="M", help=help)
     help = "say where the time goes, by phase, under the settings that the verdict compares"
     command.add_argument("--profile", action="store_true", help=help)
     help = "write a page with verdicts, plots and tables"
@@ -223,15 +229,18 @@ def _measure_scene(
     quick: bool,
     timed: bool,
     profile: bool,
-    minutes: float,
+    minutes: float | None,
 ) -> tuple[SceneReport, bool]:
     """A model in all of its scenarios and sweeps, and whether the user or the time stopped it."""
     scenarios: list[ScenarioReport] = []
-    parts, limit = Parts(), threading.Timer(60 * minutes, _thread.interrupt_main)
-    limit.daemon = True
-    if minutes < _MONTH:  # a job in the background ignores what stops it
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    limit.start()
+    parts, limit = Parts(), None
+    if minutes is not None:
+        signal.signal(
+            signal.SIGINT, signal.default_int_handler
+        )  # a job in the background ignores it
+        limit = threading.Timer(60 * minutes, _thread.interrupt_main)
+        limit.daemon = True
+        limit.start()
 
     def scenario(number: int) -> None:
         try:
@@ -256,7 +265,8 @@ def _measure_scene(
         run = partial(bench.run_sweep, compiled_model, sweep.name, host, quick=quick, timed=timed)
         report = parts.run(f"the sweep {sweep.name}", run, None)
         sweeps += [] if report is None else [report]
-    limit.cancel()
+    if limit is not None:
+        limit.cancel()
     join = partial(bench.join_parts, compiled_model, scenarios, sweeps, host, quick=quick)
     return join(card=not parts.stopped, failures=parts.failures), parts.stopped
 

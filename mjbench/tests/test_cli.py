@@ -230,7 +230,7 @@ def test_minutes_that_are_over_stop_it_as_the_user_does(tmp_path: Path, capsys: 
     (tmp_path / "spring.xml").write_text(SPRING)
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as for a job in the background
     try:
-        assert main([str(tmp_path / "spring.xml"), "--quick", "--minutes", "0"]) == 130
+        assert main([str(tmp_path / "spring.xml"), "--quick", "--minutes", "1e-9"]) == 130
     finally:
         signal.signal(signal.SIGINT, before)
     assert "mjbench: stopped" in capsys.readouterr().err
