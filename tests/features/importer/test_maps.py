@@ -260,8 +260,7 @@ def test_a_title_of_the_map_that_begins_a_text_as_a_lower_heading_is_its_title(
         "cones.md": "\n## Two cones\n\nText.\n\n### In a plane\n\n```sh\n## not raised\n```\n",
         "walls.md": "## Of stone\n\nText.\n",
     }
-    for name, text in files.items():
-        (tmp_path / name).write_text(text, encoding="utf-8")
+    import_map(tmp_path, files)
     course = convert(SourceFiles(tmp_path))
     cones, walls = (
         course.files[path].decode() for path in sorted(course.files) if path.startswith("content/l")
