@@ -139,8 +139,11 @@ def test_script_that_cannot_be_started_says_why(
 
 
 def test_what_the_machine_lacks_is_no_mistake_of_a_script(run: Run) -> None:
-    """A lack that a script makes for the supervisor, which starts the next one."""
-    limit = "resource.prlimit(os.getppid(), resource.RLIMIT_NOFILE, (3, 3))"
+    """A lack that a script makes for the supervisor, which starts the next one.
+
+    With fewer files than these six it could not even wait for the first script's end.
+    """
+    limit = "resource.prlimit(os.getppid(), resource.RLIMIT_NOFILE, (6, 6))"
     assert run(f"import os, resource\n{limit}").outcome is Outcome.OK
     with pytest.raises(EffectError, match="too many open files"):
         run("print(1)")
