@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import resource
 import selectors
 import signal
@@ -19,7 +20,7 @@ import tempfile
 import time
 from typing import Any, Self
 
-from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.errors import EffectError, lacking
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model import Limits
 from coursebuild.core.run import gate
@@ -81,6 +82,7 @@ class JsonChild:
 
         Raises:
             EffectError: MuJoCo cannot be loaded, or `interrupt` was called.
+            LackError: the machine has too little of what that needs.
         """
         process = self._process or self._start()
         assert process.stdin is not None
@@ -155,7 +157,9 @@ class JsonChild:
                 self.stop()
                 errors.seek(0)
                 cause = self._excess or gate.last_line(errors.read()) or "the import crashed"
-                raise EffectError(f"MuJoCo cannot be loaded: {cause}")
+                number = re.match(r"\w*Error: \[Errno (\d+)\]", cause)
+                lack = number and lacking(OSError(int(number[1]), ""))
+                raise lack or EffectError(f"MuJoCo cannot be loaded: {cause}")
         with contextlib.suppress(AttributeError, OSError):  # only Linux can
             limits = [(resource.RLIMIT_DATA, self.memory << 20), (resource.RLIMIT_CORE, 0)]
             limits += [(resource.RLIMIT_NPROC, 16 * PROCESSES)] if is_enclosed else []

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 
 from coursebuild.core.engine.store import Store
-from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.errors import EffectError, LackError
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import CompileResult, Misspelling, ModelFacts
 from coursebuild.core.run import compile_main, mjcf
@@ -313,6 +313,9 @@ def test_a_compiler_that_crashes_or_cannot_be_loaded(
     with pytest.raises(EffectError) as caught:
         texts(root, [good])
     assert caught.value.message == "MuJoCo cannot be loaded: ImportError: no MuJoCo here"
+    worker.write_text("import errno, os\nraise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))")
+    with pytest.raises(LackError, match="resource temporarily unavailable"):
+        texts(root, [good])
 
 
 TEXT = '<mujoco><include file="part.xml"/></mujoco>'
