@@ -31,7 +31,6 @@ from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages import listings
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageHead
-from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.page_writer import draw
@@ -41,6 +40,7 @@ from coursebuild.core.run.script_environment import cpu_name
 from coursebuild.core.run.v8 import MathEngine
 from coursebuild.core.syntax import python_syntax
 from coursebuild.core.syntax.document import parse_document
+from coursebuild.core.text.python_code import find_imports
 from coursebuild.core.values import encode
 from coursebuild.features.language_server.commands.diagnosis import current_diagnostics
 from coursebuild.pipeline.load import load

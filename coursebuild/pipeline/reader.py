@@ -34,7 +34,6 @@ from coursebuild.core.model.course import Words
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.numbering import items_of
 from coursebuild.core.pages.record import PageRecord, record
@@ -43,6 +42,7 @@ from coursebuild.core.pages.typography import isolate_formulas
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import features, summarize
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.python_code import find_imports
 from coursebuild.core.text.source import Source, key_of
 from coursebuild.core.values import decode, encode
 from coursebuild.pipeline.options import Options

@@ -27,13 +27,13 @@ from coursebuild.core.model.lesson_record import (
     recording_digest,
 )
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.run.packages import distributions
 from coursebuild.core.run.script_environment import conditions
 from coursebuild.core.scripts.bound_places import document_values
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import ReadFile, compare_figure
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.text.python_code import find_imports
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.recordings import read_recorded
 

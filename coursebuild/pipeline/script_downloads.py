@@ -9,14 +9,18 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import platform
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import cast
 
+from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.model import Course
@@ -30,7 +34,6 @@ from coursebuild.core.model.results import (
 from coursebuild.core.model.script_download import DownloadState, ScriptDownload
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library, models_named
-from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.zips import Archive
 from coursebuild.core.run.alone import AloneJob, AloneRun, Runner
 from coursebuild.core.run.packages import distributions, module_files
@@ -39,9 +42,11 @@ from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.module_code import CourseModule, NotOneFileError, is_text
 from coursebuild.core.scripts.single_file import Belongings, single_file
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.python_code import find_imports, python_nodes
+from coursebuild.core.text.source import key_of
 from coursebuild.pipeline.options import Options
 
-_STYLE = "matplotlibrc"
+_KIND, _STYLE = "downloads", "matplotlibrc"
 _MODELS, _EXAMPLES, _LIBRARY = "models/", "examples/", "mjcourse/"
 _MOST_DATA = 1 << 16
 """Bytes of data that stand in a file for people to read; more come in an archive."""
@@ -94,6 +99,11 @@ class _Course:
             if module is not None:
                 return module
         return self._find_top(top).get(name)
+
+    def answer(self, script: str, name: str) -> str:
+        """A name for the module that a script gets; empty where the course has none."""
+        module = self.find_module(script, name)
+        return "" if module is None else key_of(module.path, module.text)
 
     def _read_top(self, top: str) -> dict[str, CourseModule]:
         return {
@@ -188,26 +198,55 @@ def make_archives(
 
 def _make_download(course_files: _Course, extraction: Extraction) -> ScriptDownload:
     path, name = extraction.path, extraction.path.rpartition("/")[2]
-    find_module = functools.partial(course_files.find_module, path)
-    if not extraction.script.archive:
-        try:
-            belongings = _belongings(course_files.files_of(extraction))
-            text = single_file(_dotted(name), extraction.text, find_module, belongings)
-            if "matplotlib" in find_imports(text) and course_files.style:
-                belongings = replace(belongings, style=course_files.style)
-                text = single_file(_dotted(name), extraction.text, find_module, belongings)
-        except (NotOneFileError, RecursionError, SyntaxError):
-            pass
-        else:
-            modules = tuple(sorted(find_imports(text) - sys.stdlib_module_names))
-            packages, unknown = course_files.packages(modules)
-            text = _metadata(packages, unknown, course_files.options) + _rename(text, path, name)
-            files_of_one = ((name, text.encode()),)
-            return ScriptDownload(path, files_of_one, name, packages, modules, unknown)
+    one = None if extraction.script.archive else _one_file(course_files, extraction)
+    if one is not None and one.text:
+        packages, unknown = course_files.packages(one.modules)
+        text = _metadata(packages, unknown, course_files.options) + one.text
+        return ScriptDownload(path, ((name, text.encode()),), name, packages, one.modules, unknown)
     members, modules = _find_members(course_files, [extraction])
     packages, unknown = course_files.packages(modules)
     files = tuple(sorted(members.items()))
     return ScriptDownload(path, files, path, packages, modules, unknown, archive=True)
+
+
+class _OneFile(Struct, frozen=True):
+    """A script as one file, as it is kept; what it depends on beside its own text and files."""
+
+    text: str
+    """Without the packages that it needs; empty where it cannot be one file."""
+    modules: tuple[str, ...]
+    """Those of others that it imports."""
+    answers: dict[str, str]
+    """What each module was, of those of the course that were asked for."""
+
+
+def _one_file(course_files: _Course, extraction: Extraction) -> _OneFile:
+    path, name = extraction.path, extraction.path.rpartition("/")[2]
+    files, style = course_files.files_of(extraction), course_files.style
+    key = step_key("one file", path, extraction.text, files, style)
+    kept = course_files.options.store.get_value(_KIND, key, _OneFile)
+    if kept is not None and all(
+        course_files.answer(path, module) == answer for module, answer in kept.answers.items()
+    ):
+        return kept
+    answers: dict[str, str] = {}
+
+    def find_module(module: str) -> CourseModule | None:
+        answers[module] = course_files.answer(path, module)
+        return course_files.find_module(path, module)
+
+    text, modules = "", tuple[str, ...]()
+    with contextlib.suppress(NotOneFileError, RecursionError, SyntaxError):
+        belongings = _belongings(files)
+        whole = single_file(_dotted(name), extraction.text, find_module, belongings)
+        if "matplotlib" in find_imports(whole) and style:
+            belongings = replace(belongings, style=style)
+            whole = single_file(_dotted(name), extraction.text, find_module, belongings)
+        modules = tuple(sorted(find_imports(whole) - sys.stdlib_module_names))
+        text = _rename(whole, path, name)
+    one = _OneFile(text, modules, answers)
+    course_files.options.store.put_value(_KIND, key, one)
+    return one
 
 
 def _find_members(
@@ -259,7 +298,7 @@ def _belongings(files: Mapping[str, bytes]) -> Belongings:
 
 def _rename(text: str, path: str, name: str) -> str:
     """The text with the file's new place in its docstring."""
-    first = next(iter(ast.parse(text).body), None)
+    first = next(iter(cast(ast.Module, python_nodes(text)[0]).body), None)
     end = (first.end_lineno or 0) if first is not None and is_text(first) else 0
     lines = text.split("\n")
     return "\n".join([*(line.replace(path, name) for line in lines[:end]), *lines[end:]])

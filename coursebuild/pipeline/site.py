@@ -42,7 +42,6 @@ from coursebuild.core.pages.frame import (
     versions,
 )
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.pages.materials import in_language
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import (
@@ -56,6 +55,7 @@ from coursebuild.core.registry import features, parts_by_mark
 from coursebuild.core.syntax.document import read_again
 from coursebuild.core.syntax.html import find_address
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.python_code import find_imports
 from coursebuild.core.text.source import Source, Span, key_of
 from coursebuild.pipeline.downloads import Downloads
 from coursebuild.pipeline.options import Options

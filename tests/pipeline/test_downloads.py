@@ -133,3 +133,22 @@ def test_an_archive_of_a_lesson_holds_what_its_scripts_need(make: Make, tmp_path
     with zipfile.ZipFile(io.BytesIO(folder.read("public/examples.zip"))) as archive:
         paths = {path.partition("/")[2] for path in archive.namelist()}
     assert paths >= {"examples/absent.py", "examples/helped.py", "runs/data.csv"}
+
+
+def test_a_download_is_made_again_when_what_it_imports_or_reads_has_changed(make: Make) -> None:
+    lesson = block("helped.py", HELPED, "a ball 7 1,2") + block("names.py", 'NAME = "a ball"\n')
+    folder = make(f"## One\n\n{lesson}")
+    folder.write("models/ball.xml", MODEL)
+    folder.write("runs/data.csv", "1,2")
+
+    def download() -> str:
+        assert folder.main("build").status == 0
+        return folder.text("public/examples/helped.py")
+
+    assert "1,2" in download()
+    path = "content/lessons/1.1-one.md"
+    folder.write(path, folder.text(path).replace("a ball", "a stone"))
+    assert 'NAME = "a stone"' in download()
+    folder.write("runs/data.csv", "3,4")
+    folder.write(path, folder.text(path).replace("7 1,2", "7 3,4"))
+    assert "1,2" not in download()

@@ -7,10 +7,8 @@ lesson makes on purpose. The many kinds of tokens are mapped to few classes.
 
 from __future__ import annotations
 
-import ast
 import functools
 import re
-import warnings
 from collections.abc import Iterable, Iterator
 from html import escape
 from itertools import pairwise
@@ -143,36 +141,3 @@ def _lexer(language: str) -> Lexer | None:
 @functools.cache
 def _class_of(token: _TokenType) -> str:
     return next((css for kind, css in _CLASSES if token in kind), "")
-
-
-def find_imports(code: str) -> frozenset[str]:
-    """The top-level modules that a Python text imports; none if it does not parse."""
-    modules: set[str] = set()
-    for node in python_nodes(code.rstrip("\n")):  # so that drawing it finds it in the cache
-        if type(node) is ast.Import:
-            modules.update(alias.name.partition(".")[0] for alias in node.names)
-        elif type(node) is ast.ImportFrom and node.module and not node.level:
-            modules.add(node.module.partition(".")[0])
-    return frozenset(modules)
-
-
-@functools.lru_cache(maxsize=8)
-def python_nodes(code: str) -> tuple[ast.AST, ...]:
-    """All nodes of a Python text, the module first, level by level; none if it does not parse.
-
-    Parts that hold nothing, such as `ast.Load`, are left out.
-    """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            nodes: list[ast.AST] = [ast.parse(code)]
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return ()
-    for node in nodes:  # grows in the loop; as `ast.walk`, in half the time
-        for name in node._fields:
-            part = getattr(node, name, None)
-            if type(part) is list:
-                nodes += [item for item in part if isinstance(item, ast.AST)]
-            elif isinstance(part, ast.AST) and part._fields:
-                nodes.append(part)
-    return tuple(nodes)

@@ -10,8 +10,11 @@ import ast
 import functools
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import cast
 
 from msgspec import Struct
+
+from coursebuild.core.text.python_code import python_nodes
 
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
@@ -116,7 +119,10 @@ class ModuleCode:
 @functools.lru_cache(maxsize=256)
 def _read(text: str) -> tuple[Sequence[ast.stmt], Mapping[str, Sequence[int]]]:
     """A module's statements, and the numbers of those that bind a name: many scripts share one."""
-    statements, numbers = ast.parse(text).body, dict[str, list[int]]()
+    nodes, numbers = python_nodes(text), dict[str, list[int]]()
+    if not nodes:
+        raise NotOneFileError("Python cannot read it")
+    statements = cast(ast.Module, nodes[0]).body
     for number, statement in enumerate(statements):
         for bound in bound_names(statement):
             numbers.setdefault(bound, []).append(number)

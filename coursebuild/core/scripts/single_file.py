@@ -29,6 +29,7 @@ from coursebuild.core.scripts.module_code import (
     is_future,
     is_text,
 )
+from coursebuild.core.text.python_code import python_nodes
 
 _OF_THE_FILE = frozenset(("__file__", "__name__", "globals", "locals", "vars"))
 """What gives something else in another file."""
@@ -127,29 +128,29 @@ class _File:
         script, course_lines = self._script, set[int]()
         ours: list[tuple[str, str, str]] = []
         for number, statement in enumerate(script.statements):
-            course_imports = [
-                row
-                for node in ast.walk(statement)
-                if isinstance(node, ast.Import | ast.ImportFrom)
-                for row in script.imported(node)
-                if self._find_module(row[1]) is not None
-            ]
-            if not course_imports:
-                is_import = isinstance(statement, ast.Import | ast.ImportFrom)
+            if not isinstance(statement, ast.Import | ast.ImportFrom):
                 # A module may assign the same.
                 text = ast.unparse(statement) if isinstance(statement, ast.Assign) else "assigned"
+                self._meanings |= dict.fromkeys(bound_names(statement), text)
+            elif not (course_imports := self._course_imports(statement)):
                 for bound in bound_names(statement):
-                    self._meanings[bound] = self._external(script, bound) if is_import else text
-                continue
-            is_whole = isinstance(statement, ast.Import | ast.ImportFrom)
-            names = statement.names if isinstance(statement, ast.Import | ast.ImportFrom) else ()
-            if number >= self._head or not is_whole or len(course_imports) != len(names):
-                raise NotOneFileError(f"what line {statement.lineno} imports cannot stand there")
-            ours += course_imports
-            course_lines |= {*range(statement.lineno, (statement.end_lineno or 0) + 1)}
-        for node in ast.walk(ast.Module([*script.statements], [])):
+                    self._meanings[bound] = self._external(script, bound)
+            elif number >= self._head or len(course_imports) != len(statement.names):
+                message = f"what line {statement.lineno} imports cannot stand there"
+                raise NotOneFileError(message)
+            else:
+                ours += course_imports
+                course_lines |= {*range(statement.lineno, (statement.end_lineno or 0) + 1)}
+        tops = {(s.lineno, s.col_offset) for s in script.statements}
+        for node in python_nodes(script.source.text):
             if isinstance(node, ast.Global):
                 self._meanings |= dict.fromkeys(node.names, "assigned")
+            elif (
+                isinstance(node, ast.Import | ast.ImportFrom)
+                and (node.lineno, node.col_offset) not in tops
+                and self._course_imports(node)
+            ):
+                raise NotOneFileError(f"what line {node.lineno} imports cannot stand there")
         for bound, module_name, name in ours:  # the script's own names come first
             if bound in self._meanings:
                 raise NotOneFileError(f"`{bound}` means two things in it")
@@ -157,6 +158,11 @@ class _File:
         for bound, module_name, name in sorted(ours, key=self._is_whole):
             self._take(bound, module_name, name)
         return course_lines
+
+    def _course_imports(self, statement: ast.Import | ast.ImportFrom) -> list[tuple[str, str, str]]:
+        """What the script imports by a statement of the course."""
+        rows = self._script.imported(statement)
+        return [row for row in rows if self._find_module(row[1]) is not None]
 
     def _origin(self, module_name: str, name: str) -> object:
         """Where a name of a module is defined; a module's own name where it is one."""

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose
+from coursebuild.core.text.python_code import python_nodes
 from coursebuild.core.text.source import Excerpt, Span
 
 _LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
@@ -19,11 +20,7 @@ def find_windows(code: Excerpt) -> Iterator[Diagnostic]:
     """Report the first picture that a script without figures shows and does not save."""
     if not re.search("matplotlib|plotly", code.text):
         return
-    try:
-        tree = ast.parse(code.text)
-    except (SyntaxError, ValueError, MemoryError, RecursionError):
-        return
-    nodes = list(ast.walk(tree))
+    nodes = python_nodes(code.text)
     names: dict[str, str] = {}
     for node in nodes:
         if isinstance(node, ast.Import):

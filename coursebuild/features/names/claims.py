@@ -21,7 +21,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import Span, model
-from coursebuild.core.pages.listings import python_nodes
+from coursebuild.core.text.python_code import python_nodes
 
 Kind: TypeAlias = Literal[
     "word",
@@ -159,7 +159,7 @@ def document_names(document: model.Document) -> DocumentNames | None:
 
 
 def _read_script(script: model.Script, names: CodeNames) -> None:
-    nodes = tuple(python_nodes(script.code.text.rstrip("\n")))
+    nodes = python_nodes(script.code.text)
     for node in nodes:
         if type(node) is ast.Import:
             for alias in node.names:

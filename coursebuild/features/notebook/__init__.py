@@ -282,7 +282,7 @@ def _imported_early(site: SiteContext, scripts: list[str], files: Mapping[str, b
         if re.fullmatch(r"examples/[^/]+\.py", path)
     }
     early: set[str] = set()
-    for number, script in enumerate(scripts, 1):
+    for number, script in enumerate(scripts[:-1], 1):
         visited, pending = set[str](), [script]
         while pending:
             path = pending.pop()

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from coursebuild.core.model import line_anchor, linked_lines, listing_anchor, output_anchor
 from coursebuild.core.model.results import OutputFile
-from coursebuild.core.pages.listings import find_imports, highlight_lines
+from coursebuild.core.pages.listings import highlight_lines
 from coursebuild.core.pages.references import check_links, has_anchor, merge_line_ids
 from coursebuild.core.text.characters import visible
+from coursebuild.core.text.python_code import find_imports
 from coursebuild.features.lab.page import qr_svg
 from support.fixture_cases import fixture_tables
 from support.rendered_course import Make

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.scripts.module_code import CourseModule, NotOneFileError
 from coursebuild.core.scripts.single_file import Belongings, single_file
+from coursebuild.core.text.python_code import find_imports
 from support.fixture_cases import Case, read_cases
 
 CASES = read_cases(Path(__file__).with_name("single_files.md"))

@@ -32,9 +32,9 @@ from coursebuild.api import (
 )
 from coursebuild.core.checks.compiled import mjcf_texts
 from coursebuild.core.files.read import CourseFiles, read_bytes
-from coursebuild.core.pages.listings import find_imports
 from coursebuild.core.run.mjcf import TEXT_PATH, model_files
 from coursebuild.core.scripts.extract import extract
+from coursebuild.core.text.python_code import find_imports
 from coursebuild.features.lab.model import Lab
 from coursebuild.pipeline.load import load, package_files
 from coursebuild.pipeline.options import Progress
