@@ -414,6 +414,8 @@ def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
     baseline = report.own_row
     if not name or sizes[name] <= parts.least * (1 + 1e-9) or baseline is None:
         return parts
+    if baseline.lucky or baseline.seen is None or baseline.seen <= parts.least * (1 + 1e-9):
+        return parts  # nobody knows of what most of it is
     return replace(parts, dominant=name, mend=_mend(report, baseline, name))
 
 
