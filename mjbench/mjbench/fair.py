@@ -23,9 +23,9 @@ from mjbench.problem import Array
 from mjbench.simulation import advance, without_sleep
 
 SEEDS, QUICK_SEEDS = (1, 2, 3), (1, 2)
-_RUNS, _QUICK_RUNS, _PART = 460, 130, 0.25
-"""About how many steps a first run and the references make for each one of the scenario, and the
-part of the time that they may take."""
+_RUNS, _QUICK_RUNS, _PART, _TRIAL = 460, 130, 0.25, 0.02
+"""About how many steps a first run and the references make for each one of the scenario, the part
+of the time that they may take, and that in which steps are counted."""
 _SETTLING = 4.0
 """How long a model may take to come to rest, s."""
 _HOLD = 16
@@ -86,11 +86,15 @@ def fair_declarations(
 
 
 def _most_steps(model: Any, data: Any, *, quick: bool) -> float:
-    """How many timesteps a scenario may have, from how long some take."""
-    began = time.monotonic()
-    step(model, data, _HOLD)
-    seconds = (time.monotonic() - began) / _HOLD * (_QUICK_RUNS if quick else _RUNS)
-    return min(max(_PART * time_left() / seconds, _FEWEST * _HOLD), MOST_STEPS)
+    """How many timesteps a scenario may have, from how many are made in some of the time."""
+    made, left = 0, time_left()
+    if math.isinf(left):
+        return MOST_STEPS
+    while made < MOST_STEPS and time_left() > (1 - _TRIAL) * left:
+        step(model, data, _HOLD)
+        made += _HOLD
+    most = made * _PART / _TRIAL / (_QUICK_RUNS if quick else _RUNS)
+    return min(max(most, _FEWEST * _HOLD), MOST_STEPS)
 
 
 def _begin(model: Any) -> tuple[int | None, str, Any]:

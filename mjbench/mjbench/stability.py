@@ -404,7 +404,7 @@ def stable_rows(
     own = integrator_of(model)  # of which the verdict tells, so it comes first
     for integrator in sorted(STANDARD, key=lambda i: i is not own):
         name = f"{scene.name}: stable timesteps of {integrator.value}"
-        share = 0.4 if integrator is own else 0.25
+        share = 0.5 if integrator is own else 0.25
         rows[integrator] = parts.run(name, partial(row, integrator), None, share=share)
     return tuple(filter(None, rows.values()))
 

@@ -71,15 +71,15 @@ def measure_scenario(
     expected = parts.collect(f"{scene.name}: what theory knows", figures, share=0.1)
     choices = settings(model, pilot, quick=quick)
     measured = _measure_settings(basis, choices, tell)
-    rows = parts.collect(f"{scene.name}: settings", measured, share=0.3)
+    rows = parts.collect(f"{scene.name}: settings", measured, share=0.25)
     rows.sort(key=lambda row: choices.index(row.setting))
     cost_of, no_verdict = None, scene_report.RowVerdict(False, None, None, "")
     if clock is not None and rows:
         timed = partial(_with_costs, basis, rows, clock, quick)
-        result = parts.run(f"{scene.name}: times", timed, None, share=0.4)
+        result = parts.run(f"{scene.name}: times", timed, None, share=0.3)
         rows, cost_of = (rows, None) if result is None else result
     apart = partial(_error_parts, basis)
-    error_parts = parts.run(f"{scene.name}: errors apart", apart, None, share=0.3)
+    error_parts = parts.run(f"{scene.name}: errors apart", apart, None, share=0.2)
     states = reference.states
     largest = stable_rows(model, pilot, states, parts, quick=quick)
     notes = list(_notes(basis, largest, rows, cost_of))
@@ -127,6 +127,7 @@ def measure_scenario(
         contact_model={name: cone.visible_model_error for name, cone in cones.items() if name},
         parts=error_parts,
         drawn=tuple(part.text for part in variants),
+        failures=tuple(parts.failures),
     )
 
     def starts(number: int) -> Sequence[Mapping[Column, float]] | None:
