@@ -10,7 +10,6 @@ is so short that what all errors are measured against is known after a part of t
 from __future__ import annotations
 
 import math
-import time
 from pathlib import Path
 from typing import Any
 

@@ -44,7 +44,6 @@ from mjbench.problem import (
 )
 from mjbench.reports import Reach, reach
 from mjbench.reports.case_report import BoundaryLine
-from mjbench.reports.limits import limit_text, map_text
 from mjbench.reports.scene_report import StableRow
 from mjbench.reports.shown_errors import FEWEST_STEPS
 from mjbench.simulation import (
@@ -218,7 +217,7 @@ def search_row(
     islands = [h for h in steps if h > largest and not laboratory.is_lost(0, h)]
     lost = [h for h in steps if laboratory.is_lost(0, h)]
     is_all = math.isinf(largest)
-    row = StableRow(
+    return StableRow(
         integrator=integrator.value,
         largest=reach(largest),
         reason=laboratory.trial(0, lost[0]).reason if lost else "",
@@ -238,7 +237,6 @@ def search_row(
         gain=gain,
         tries=_tries(laboratory),
     )
-    return replace(row, shown=limit_text(row), map=map_text(row))
 
 
 def _limit_of(

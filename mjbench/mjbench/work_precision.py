@@ -19,7 +19,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench import known_motion, measure, simulation
-from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
+from mjbench.columns import LOST, WHOLE, Column, row_ratios
 from mjbench.cones import find_references, least_known
 from mjbench.costs import Clock, costs
 from mjbench.delays import loop_note
@@ -313,8 +313,8 @@ def _nearby_ratios(
             row, _ = measure_setting(near_basis, setting)
             if row.status != "ok":
                 return result if setting == basis.baseline else [*result, {(LOST, WHOLE): math.inf}]
-            pair.append(columns_of(row, report.contact_model))
-        result.append(ratios(pair[0], pair[1], leasts_of(report)))
+            pair.append(row)
+        result.append(row_ratios(report, *pair))
     return result
 
 
@@ -360,8 +360,7 @@ def _drawn_ratios(
         row, _ = measure_setting(draw.basis, replace(rival, cone=cone))
         if row.status != "ok":
             return [*result, {(LOST, WHOLE): math.inf}]
-        pair = [columns_of(r, report.contact_model) for r in (draw.row, row)]
-        result.append(ratios(pair[0], pair[1], leasts_of(report)))
+        result.append(row_ratios(report, draw.row, row))
     return result
 
 
