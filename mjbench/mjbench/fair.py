@@ -86,13 +86,13 @@ def fair_declarations(
 
 def _most_steps(model: Any, data: Any, *, quick: bool) -> float:
     """How many timesteps a scenario may have, from how many are made in some of the time."""
-    made, left = 0, time_left()
+    count, left = 0, time_left()
     if math.isinf(left):
         return MOST_STEPS
-    while made < MOST_STEPS and time_left() > (1 - _TRIAL) * left:
+    while count < MOST_STEPS and time_left() > (1 - _TRIAL) * left:
         step(model, data, _HOLD)
-        made += _HOLD
-    most = made * _PART / _TRIAL / (_QUICK_RUNS if quick else _RUNS)
+        count += _HOLD
+    most = count * _PART / _TRIAL / (_QUICK_RUNS if quick else _RUNS)
     return min(max(most, _FEWEST * _HOLD), MOST_STEPS)
 
 

@@ -137,8 +137,8 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
         return RowVerdict(False, None, noticeable, text + remark)
     if row.dominated_by is None:
         text, worse = _describe_rival(report, own_place, quantity)
-        measured = " that was measured" if report.failures else ""
-        text = text or f"no other setting{measured} is cheaper without being less accurate"
+        scope = " that was measured" if report.failures else ""
+        text = text or f"no other setting{scope} is cheaper without being less accurate"
         return RowVerdict(True, None, noticeable, text + remark, worse)
     text, is_better, worse = _judge_rival(report, row.dominated_by, starts)
     better = row.dominated_by if is_better else None

@@ -46,8 +46,8 @@ def rotate(quat: ArrayLike, vector: ArrayLike) -> Array:
     """Vectors (..., 3) turned by a rotation, whose quaternion may have any length but zero."""
     quat, vector = np.asarray(quat, float), np.asarray(vector, float)
     pure = np.concatenate((np.zeros((*vector.shape[:-1], 1)), vector), axis=-1)
-    turned = quat_mul(quat_mul(quat, pure), quat_conj(quat))[..., 1:]
-    rotated: Array = turned / np.sum(quat * quat, axis=-1, keepdims=True)
+    product = quat_mul(quat_mul(quat, pure), quat_conj(quat))[..., 1:]
+    rotated: Array = product / np.sum(quat * quat, axis=-1, keepdims=True)
     return rotated
 
 

@@ -399,10 +399,10 @@ def stable_rows(
             search = max(search[0] / _LOWER, least), search[0]
 
     rows = dict.fromkeys(STANDARD)
-    own = integrator_of(model)  # of which the verdict tells, so it comes first
-    for integrator in sorted(STANDARD, key=lambda i: i is not own):
+    baseline = integrator_of(model)  # of which the verdict tells, so it comes first
+    for integrator in sorted(STANDARD, key=lambda i: i is not baseline):
         name = f"{scene.name}: stable timesteps of {integrator.value}"
-        share = 0.5 if integrator is own else 0.25
+        share = 0.5 if integrator is baseline else 0.25
         rows[integrator] = parts.run(name, partial(row, integrator), None, share=share)
     return tuple(filter(None, rows.values()))
 

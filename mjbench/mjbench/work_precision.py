@@ -70,8 +70,8 @@ def measure_scenario(
     figures = measure_expected(model, scene, baseline)
     expected = parts.collect(f"{scene.name}: what theory knows", figures, share=0.1)
     choices = settings(model, pilot, quick=quick)
-    measured = _measure_settings(basis, choices, tell)
-    rows = parts.collect(f"{scene.name}: settings", measured, share=0.25)
+    runs = _measure_settings(basis, choices, tell)
+    rows = parts.collect(f"{scene.name}: settings", runs, share=0.25)
     rows.sort(key=lambda row: choices.index(row.setting))
     cost_of, no_verdict = None, scene_report.RowVerdict(False, None, None, "")
     if clock is not None and rows:
