@@ -142,6 +142,11 @@ class CompiledModel(Struct, frozen=True):
     spec: Any
     """Its `mjSpec`, from which it can be compiled with other parameters; `None` without source."""
 
+    @property
+    def is_fair(self) -> bool:
+        """Whether its scenarios are fair ones, which nobody declared."""
+        return self.subject.fair and not self.subject.declarations_path
+
 
 def compile_subject(
     subject: Subject, host: Host, *, quick: bool, loop: Loop | None = None, task: str = ""
@@ -297,7 +302,7 @@ def join_parts(
 
     `failures`: what was not measured.
     """
-    if compiled_model.subject.fair and not compiled_model.subject.declarations_path:
+    if compiled_model.is_fair:
         scenarios = derive_seeds(scenarios)
     report = SceneReport(
         model=compiled_model.subject.name,

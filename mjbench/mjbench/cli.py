@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import _thread
 import argparse
 import hashlib
 import math
 import shutil
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -23,9 +20,9 @@ from mjbench.bench import CannotMeasureError, Subject
 from mjbench.cases import measure_case
 from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measure_engines
 from mjbench.host import LocalHost
-from mjbench.loop import LoopError, read_loop
+from mjbench.loop import LoopError, TimeLimitError, read_loop, time_limit
 from mjbench.machine import one_processor, package_version, this_machine
-from mjbench.parts import Parts
+from mjbench.parts import LATE, Parts
 from mjbench.problems import all_problems
 from mjbench.reports import PartFailure
 from mjbench.reports.diet_report import DietReport, Keep
@@ -43,7 +40,7 @@ from mjbench.reports.records import (
     read_report,
     scene_departures,
 )
-from mjbench.reports.scene_report import ScenarioReport
+from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.reports.terminal import Style
 from mjbench.schemas import schema_text
 from mjbench.subjects import UsageError, read_subject
@@ -67,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     namespace = _parser().parse_args(words)
     try:
         status: int = namespace.run(namespace)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, TimeLimitError):
         print("mjbench: stopped before anything was known", file=sys.stderr)
         return _STOPPED
     except OSError as error:
@@ -121,7 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     help = "measure other engines instead: all, or some, as in mjx,warp"
     command.add_argument("--engines", nargs="?", const="", metavar="NAMES", help=help)
     command.add_argument("--quick", action="store_true", help="fewer settings and rough times")
-    help = "after which it stops, as with Ctrl-C, and says what is known"
+    help = "which it takes at most; each part has a share of them, and what is known is told"
     command.add_argument("--minutes", type=positive, metavar="M", help=help)
     help = "say where the time goes, by phase, under the settings that the verdict compares"
     command.add_argument("--profile", action="store_true", help=help)
@@ -194,17 +191,13 @@ def _bench(arguments: argparse.Namespace) -> int:
         return 0
     timed = arguments.check is None
     recorded = None if timed else _read(arguments.check, BENCH.decode)
-    compiled_model = bench.compile_subject(
-        subject, host, quick=quick, loop=loop, task=arguments.task
-    )
-    scene, is_stopped = _measure_scene(
-        compiled_model,
-        host,
-        quick=quick,
-        timed=timed,
-        profile=arguments.profile,
-        minutes=arguments.minutes,
-    )
+    with time_limit(60 * (arguments.minutes or math.inf)):
+        compiled_model = bench.compile_subject(
+            subject, host, quick=quick, loop=loop, task=arguments.task
+        )
+        scene, is_stopped = _measure_scene(
+            compiled_model, host, quick=quick, timed=timed, profile=arguments.profile
+        )
     if recorded is not None:
         departures = scene_departures(recorded, scene, compiled_model.declarations.bench)
         _print(arguments, _list(departures), text.departures_text(departures))
@@ -230,18 +223,10 @@ def _measure_scene(
     quick: bool,
     timed: bool,
     profile: bool,
-    minutes: float | None,
 ) -> tuple[SceneReport, bool]:
     """A model in all of its scenarios and sweeps, and whether the user or the time stopped it."""
     scenarios: list[ScenarioReport] = []
-    parts, limit = Parts(), None
-    if minutes is not None:
-        signal.signal(
-            signal.SIGINT, signal.default_int_handler
-        )  # a job in the background ignores it
-        limit = threading.Timer(60 * minutes, _thread.interrupt_main)
-        limit.daemon = True
-        limit.start()
+    parts, sweeps = Parts(), list[SweepReport]()
 
     def scenario(number: int) -> None:
         try:
@@ -259,17 +244,21 @@ def _measure_scene(
             return
         scenarios.append(report)
 
+    declared_sweeps = compiled_model.declarations.sweeps
+    left = len(compiled_model.scenarios) + len(declared_sweeps)
     for number, scene in enumerate(compiled_model.scenarios):
-        parts.run(f"the scenario {scene.name}", partial(scenario, number), None)
-    sweeps = []
-    for sweep in compiled_model.declarations.sweeps:
+        # Another seed asks the same again; what an author declares asks something else.
+        share = 1.0 if compiled_model.is_fair else 1 / (left - number)
+        parts.run(f"the scenario {scene.name}", partial(scenario, number), None, share=share)
+    for number, sweep in enumerate(declared_sweeps):
         run = partial(bench.run_sweep, compiled_model, sweep.name, host, quick=quick, timed=timed)
-        report = parts.run(f"the sweep {sweep.name}", run, None)
+        share = 1 / (len(declared_sweeps) - number)
+        report = parts.run(f"the sweep {sweep.name}", run, None, share=share)
         sweeps += [] if report is None else [report]
-    if limit is not None:
-        limit.cancel()
+    failures = [*parts.failures, *(f for report in scenarios for f in report.failures)]
+    is_stopped = parts.stopped or any(failure.reason == LATE for failure in failures)
     join = partial(bench.join_parts, compiled_model, scenarios, sweeps, host, quick=quick)
-    return join(card=not parts.stopped, failures=parts.failures), parts.stopped
+    return join(card=not is_stopped, failures=parts.failures), is_stopped
 
 
 def _style() -> Style:

@@ -80,6 +80,14 @@ def leasts_of(report: ScenarioReport) -> dict[str, float]:
     }
 
 
+def row_ratios(
+    report: ScenarioReport, baseline: WorkPrecisionRow, rival: WorkPrecisionRow
+) -> dict[Column, float]:
+    """How many times as large the errors of a row are as those of another, see `ratios`."""
+    pair = [columns_of(row, report.contact_model) for row in (baseline, rival)]
+    return ratios(pair[0], pair[1], leasts_of(report))
+
+
 def ratios(
     baseline: Columns, rival_columns: Columns, leasts: Mapping[str, float]
 ) -> dict[Column, float]:
@@ -136,8 +144,9 @@ class Spread(Struct, frozen=True):
         return (figure.partition(" [")[0] or "the figure") if name == "figure" else LABELS[name]
 
 
-def unresolved_columns(columns: Columns, leasts: Mapping[str, float]) -> frozenset[Column]:
+def unresolved_columns(report: ScenarioReport, row: WorkPrecisionRow) -> frozenset[Column]:
     """The columns whose errors are too small for the reference to resolve, and not 0 exactly."""
+    columns, leasts = columns_of(row, report.contact_model), leasts_of(report)
     return frozenset(
         column
         for column, value in columns.items()

@@ -3,7 +3,7 @@
 1. A job is a scenario from its beginning to its end, so that each setting is timed on its own
    states; what takes little time is repeated.
 2. A round makes every job once, forwards and backwards in turn: what slows the machine for a while
-   slows all.
+   slows all. The first one finds out how often each has to be repeated.
 3. Of the times of each job the lowest tenth counts: it forgets those that were disturbed, and does
    not hang on a single lucky one. Intervals come from rounds drawn again at random (bootstrap).
 
@@ -22,6 +22,7 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
+from mjbench.loop import time_left
 from mjbench.problem import Array, Inputs, Scenario
 from mjbench.reports import Interval
 from mjbench.reports.scene_report import MeasuredSetting
@@ -63,24 +64,33 @@ class Timing(Struct, frozen=True):
 def time_jobs(
     jobs: Sequence[Job], baseline: int, clock: Clock, *, quick: bool = False
 ) -> tuple[Timing, ...]:
-    """Time jobs, of which number `baseline` is what the others are compared with."""
+    """Time jobs, of which number `baseline` is what the others are compared with.
+
+    Where time is limited, only the first jobs are made, as many as there is time for.
+    """
     times = np.zeros((MAX_ROUNDS, len(jobs)))
     budget, began = _QUICK_BUDGET if quick else _BUDGET, clock()
+    enough = (1 - 1 / QUICK_MIN_ROUNDS) * time_left()  # for the other rounds
     gc_was_enabled = gc.isenabled()
     gc.disable()
     try:
         repeats = []
-        for job in jobs:  # how often it must be made to take long enough, which warms caches too
+        for index, job in enumerate(jobs):
+            if index > baseline and time_left() < enough:
+                break
             count = 1
-            while _time_job(job, count, clock) < _SHORTEST and count < 1 << 12:
+            while (took := _time_job(job, count, clock)) < _SHORTEST and count < 1 << 12:
                 count *= 2
+            times[0, index] = took
             repeats.append(count)
-        for turn in range(MAX_ROUNDS):
-            order = range(len(jobs))
-            for index in order if turn % 2 else reversed(order):
+        times = times[:, : len(repeats)]
+        order = range(len(repeats))
+        for turn in range(1, MAX_ROUNDS):
+            for index in reversed(order) if turn % 2 else order:
                 times[turn, index] = _time_job(jobs[index], repeats[index], clock)
-            is_late = clock() - began > budget
-            if turn + 1 < (QUICK_MIN_ROUNDS if quick and is_late else MIN_ROUNDS):
+            is_late = time_left() <= 0 or clock() - began > budget
+            is_short = time_left() <= 0 or (quick and is_late)
+            if turn + 1 < (QUICK_MIN_ROUNDS if is_short else MIN_ROUNDS):
                 continue
             timings = _timings(times[: turn + 1] / repeats, baseline)
             widest = max((timing.ratio.half_width for timing in timings), default=0.0)

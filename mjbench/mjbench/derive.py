@@ -13,10 +13,8 @@ from itertools import pairwise
 from msgspec.structs import asdict, replace
 
 from mjbench.columns import (
-    columns_of,
-    leasts_of,
     mark_dominated,
-    ratios,
+    row_ratios,
     spreads,
     unresolved_columns,
     worse_columns,
@@ -158,11 +156,10 @@ def _why_worse(report: ScenarioReport, setting: MeasuredSetting) -> str:
         return f"in {report.name} it is lost"
     if row.parted is not None and baseline.parted is None:
         return f"in {report.name} it is off at {row.parted:.3g} s"
-    pair, leasts = [columns_of(r, report.contact_model) for r in (baseline, row)], leasts_of(report)
-    worse = next(worse_columns(spreads([ratios(pair[0], pair[1], leasts)])), None)
+    worse = next(worse_columns(spreads([row_ratios(report, baseline, row)])), None)
     if worse is None:
         return ""
-    return f"in {report.name} {worse.text(report.figure, unresolved_columns(pair[0], leasts))}"
+    return f"in {report.name} {worse.text(report.figure, unresolved_columns(report, baseline))}"
 
 
 def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) -> ScenarioReport:

@@ -23,8 +23,8 @@ from mjbench.columns import (
     columns_of,
     leasts_of,
     number_text,
-    ratios,
     rounded_text,
+    row_ratios,
     spreads,
     times_text,
     unresolved_columns,
@@ -137,7 +137,8 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
         return RowVerdict(False, None, noticeable, text + remark)
     if row.dominated_by is None:
         text, worse = _describe_rival(report, own_place, quantity)
-        text = text or "no other setting is cheaper without being less accurate"
+        scope = " that was measured" if report.failures else ""
+        text = text or f"no other setting{scope} is cheaper without being less accurate"
         return RowVerdict(True, None, noticeable, text + remark, worse)
     text, is_better, worse = _judge_rival(report, row.dominated_by, starts)
     better = row.dominated_by if is_better else None
@@ -161,11 +162,12 @@ def _judge_rival(
 ) -> tuple[str, bool, tuple[str, ...]]:
     """What is said of a row that is better here, whether it is, and in which columns it is not."""
     baseline, rival = next(r for r in report.rows if r.own), report.rows[number]
-    leasts, figure, none = leasts_of(report), report.figure, "no difference that holds: "
-    pair = [columns_of(row, report.contact_model) for row in (baseline, rival)]
-    own_ratios = ratios(pair[0], pair[1], leasts)
+    figure, none = report.figure, "no difference that holds: "
+    own_ratios, vague = row_ratios(report, baseline, rival), unresolved_columns(report, baseline)
     if baseline.setting.cone == rival.setting.cone:  # the model errs alike under both
         own_ratios.pop(("contact_model", WHOLE), None)
+    pair = [columns_of(row, report.contact_model) for row in (baseline, rival)]
+    leasts = leasts_of(report)
     resolved = [c for c in own_ratios if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
     if not resolved and (baseline.seen is None or report.least_seen >= 1):
         return f"{_UNRESOLVED}{rival.name}, or of the scene's own setting", False, ()
@@ -181,8 +183,7 @@ def _judge_rival(
     everywhere = [own_ratios, *nearby]
     gain, worse = _gain(everywhere), tuple(worse_columns(spreads(everywhere)))
     if worse:
-        unresolved = unresolved_columns(pair[0], leasts)
-        texts = tuple(part.text(figure, unresolved) for part in worse)
+        texts = tuple(part.text(figure, vague) for part in worse)
         return f"{none}{claim} here, but {elsewhere} {texts[0]}", False, texts
     if not is_cheap and gain.high > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, but is no better {elsewhere}", False, ()
@@ -243,9 +244,7 @@ def _describe_rival(
     baseline = report.own_row
     if row is None or baseline is None:
         return "", ()
-    pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
-    leasts = leasts_of(report)
-    own_ratios, unresolved = ratios(pair[0], pair[1], leasts), unresolved_columns(pair[0], leasts)
+    own_ratios, unresolved = row_ratios(report, baseline, row), unresolved_columns(report, baseline)
     worse = worse_columns(spreads([own_ratios]))
     texts = tuple(part.text(report.figure, unresolved) for part in worse)
     if row.lucky or not texts:
@@ -414,6 +413,8 @@ def find_parts(report: ScenarioReport, parts: ErrorParts) -> ErrorParts:
     baseline = report.own_row
     if not name or sizes[name] <= parts.least * (1 + 1e-9) or baseline is None:
         return parts
+    if baseline.lucky or baseline.seen is None or baseline.seen <= parts.least * (1 + 1e-9):
+        return parts  # nobody knows of what most of it is
     return replace(parts, dominant=name, mend=_mend(report, baseline, name))
 
 
@@ -426,8 +427,7 @@ def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
     times = times_text(ratio, math.inf if is_least else ratio)
     text = f"{row.name} errs {times} less in all"
     text += "" if row.cost is None else f" and {_price(row)}"
-    pair = [columns_of(r, report.contact_model) for r in (baseline, row)]
-    worse = next(worse_columns(spreads([ratios(pair[0], pair[1], leasts_of(report))])), None)
+    worse = next(worse_columns(spreads([row_ratios(report, baseline, row)])), None)
     return text if worse is None else f"{text}, but {worse.text(report.figure)}"
 
 

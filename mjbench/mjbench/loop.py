@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 import weakref
 from collections import deque
-from contextlib import AbstractContextManager, redirect_stdout
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, redirect_stdout
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -133,8 +135,36 @@ def close_loop(loop: Loop, model: Any, data: Any) -> None:
     _runs[data] = _LoopRun(loop, model)
 
 
+class TimeLimitError(Exception):
+    """The time of what is measured is over."""
+
+
+_deadlines = [math.inf]
+"""When steps end to be made, the one that holds now last."""
+
+
+@contextmanager
+def time_limit(seconds: float) -> Iterator[None]:
+    """Give what is done here so many seconds at most, or what an outer limit leaves of them."""
+    _deadlines.append(min(time.monotonic() + seconds, _deadlines[-1]))
+    try:
+        yield
+    finally:
+        _deadlines.pop()
+
+
+def time_left() -> float:
+    """What the limit leaves, s; infinite without one."""
+    return _deadlines[-1] - time.monotonic()
+
+
 def step(model: Any, data: Any, steps: int) -> None:
-    """As `mj_step`, with the controller that commands `data`, if one does."""
+    """As `mj_step`, with the controller that commands `data`, if one does.
+
+    A `TimeLimitError` where no time is left.
+    """
+    if time_left() <= 0:
+        raise TimeLimitError
     run = _runs.get(data)
     if run is None:
         mujoco.mj_step(model, data, steps)

@@ -65,8 +65,9 @@ def measure_setting(
         **dict.fromkeys(("front", "same", "idle"), False),
     }
     row = scene_report.WorkPrecisionRow(**figures)
+    iterations = list[int]() if pilot.constrained else None
     try:
-        run = simulation.simulate(pilot.setup, variant)
+        run = simulation.simulate(pilot.setup, variant, iterations)
     except mujoco.FatalError as error:
         return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None
     row = replace(
@@ -79,10 +80,9 @@ def measure_setting(
     )
     if not run.judgement.ok:
         return row, None
-    if pilot.constrained:
+    if iterations is not None:
         # A step of RK4 has four times the iterations of its last evaluation.
-        count = simulation.count_iterations(with_setting(model, setting), pilot.scene.scenario)
-        row = replace(row, iterations=count * row.evaluations / steps)
+        row = replace(row, iterations=sum(iterations) * row.evaluations / steps)
     return _with_errors(basis, row, run), run.states
 
 

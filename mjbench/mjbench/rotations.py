@@ -42,39 +42,13 @@ def axis_angle_to_quat(axis: ArrayLike, angle: ArrayLike) -> Array:
     return np.concatenate((scalar, vector), axis=-1)
 
 
-def quat_to_mat(quat: ArrayLike) -> Array:
-    """The rotation matrix (..., 3, 3)."""
-    w, x, y, z = np.moveaxis(np.asarray(quat, float), -1, 0)
-    rows = (
-        ((w * w + x * x) - (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), (w * w + y * y) - (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), (w * w + z * z) - (x * x + y * y)),
-    )
-    length = w * w + x * x + y * y + z * z
-    matrix: Array = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-    matrix /= length[..., None, None]
-    return matrix
-
-
-def mat_to_quat(matrix: ArrayLike) -> Array:
-    """The quaternion, with w ≥ 0, of a rotation matrix.
-
-    4 q qᵀ follows from the matrix; its column with the largest diagonal entry loses no digits.
-    Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1 (1978).
-    """
-    m = np.asarray(matrix, float)
-    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(m, (-2, -1), (0, 1))
-    rows = (
-        (1 + a + e + i, h - f, c - g, d - b),
-        (h - f, 1 + a - e - i, d + b, c + g),
-        (c - g, d + b, 1 - a + e - i, h + f),
-        (d - b, c + g, h + f, 1 - a - e + i),
-    )
-    table = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-    best = np.argmax(np.diagonal(table, axis1=-2, axis2=-1), axis=-1)
-    column = np.take_along_axis(table, best[..., None, None], axis=-2)[..., 0, :]
-    quat: Array = column / np.linalg.norm(column, axis=-1, keepdims=True)
-    return np.where(quat[..., :1] < 0, -quat, quat)
+def rotate(quat: ArrayLike, vector: ArrayLike) -> Array:
+    """Vectors (..., 3) turned by a rotation, whose quaternion may have any length but zero."""
+    quat, vector = np.asarray(quat, float), np.asarray(vector, float)
+    pure = np.concatenate((np.zeros((*vector.shape[:-1], 1)), vector), axis=-1)
+    product = quat_mul(quat_mul(quat, pure), quat_conj(quat))[..., 1:]
+    rotated: Array = product / np.sum(quat * quat, axis=-1, keepdims=True)
+    return rotated
 
 
 def angular_distance(a: ArrayLike, b: ArrayLike) -> Array:

@@ -138,18 +138,32 @@ def advance(model: Any, data: Any, steps: int = 1) -> None:
         step(model, data, steps)
 
 
-def watch_steps(model: Any, data: Any, steps: int, passages: Passages) -> None:
-    """Make so many steps, and watch what goes through what."""
-    if not passages.needed:
+def watch_steps(
+    model: Any, data: Any, steps: int, passages: Passages, iterations: list[int] | None = None
+) -> None:
+    """Make so many steps, and watch what goes through what.
+
+    `iterations` gets those of the solver, of the last evaluation of each step.
+    """
+    if not passages.needed and iterations is None:
         advance(model, data, steps)
         return
     with silent():
         for _ in range(steps):
             step(model, data, 1)
             passages.look(data)
+            if iterations is not None:
+                iterations.append(int(data.solver_niter.sum()))
 
 
-def advance_watching(model: Any, data: Any, steps: int, peaks: Peaks, passages: Passages) -> Peaks:
+def advance_watching(
+    model: Any,
+    data: Any,
+    steps: int,
+    peaks: Peaks,
+    passages: Passages,
+    iterations: list[int] | None = None,
+) -> Peaks:
     """Make so many steps; stop once the state is not finite. Returns the updated `peaks`.
 
     `passages` watches what goes through what. Only one state in a few is looked at, which suffices:
@@ -158,7 +172,7 @@ def advance_watching(model: Any, data: Any, steps: int, peaks: Peaks, passages: 
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     for done in range(0, steps, _LOOK_INTERVAL):
         if peaks.finite:
-            watch_steps(model, data, min(_LOOK_INTERVAL, steps - done), passages)
+            watch_steps(model, data, min(_LOOK_INTERVAL, steps - done), passages, iterations)
             peaks = update_peaks(data, peaks, passages.thickness)
     return peaks
 
@@ -259,8 +273,8 @@ class Run(Struct, frozen=True):
     judgement: RunJudgement
 
 
-def simulate(setup: Setup, model: Any) -> Run:
-    """Run a scenario with a model under its own options."""
+def simulate(setup: Setup, model: Any, iterations: list[int] | None = None) -> Run:
+    """Run a scenario with a model under its own options; `iterations` as for `watch_steps`."""
     scenario, times = setup.scenario, setup.scenario.times
     steps = scenario.steps(float(model.opt.timestep))
     data, scratch = initial_data(scenario, model), initial_data(scenario, model)
@@ -270,7 +284,7 @@ def simulate(setup: Setup, model: Any) -> Run:
     peaks, passages = Peaks(penetration=deepest_contact(scratch)), Passages(model, setup)
     for index, inputs in enumerate(scenario.inputs(scenario.sample)):
         inputs.give(data)
-        peaks = advance_watching(model, data, steps, peaks, passages)
+        peaks = advance_watching(model, data, steps, peaks, passages, iterations)
         if not peaks.finite:
             break
         qpos[index], qvel[index], act[index] = data.qpos, data.qvel, data.act
@@ -298,16 +312,6 @@ def run_steps(
     data = initial_data(scenario, model)
     advance(model, data, steps)
     return data
-
-
-def count_iterations(model: Any, scenario: Scenario) -> int:
-    """The iterations of the solver in a scenario, of the last evaluation of each step."""
-    data, count = initial_data(scenario, model), 0
-    for inputs in scenario.inputs(float(model.opt.timestep)):
-        inputs.give(data)
-        advance(model, data)
-        count += int(data.solver_niter.sum())
-    return count
 
 
 def invariants(model: Any, scratch: Any, qpos: Array, qvel: Array) -> Array:

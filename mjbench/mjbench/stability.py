@@ -44,12 +44,12 @@ from mjbench.problem import (
 )
 from mjbench.reports import Reach, reach
 from mjbench.reports.case_report import BoundaryLine
-from mjbench.reports.limits import limit_text, map_text
 from mjbench.reports.scene_report import StableRow
 from mjbench.reports.shown_errors import FEWEST_STEPS
 from mjbench.simulation import (
     EngineStates,
     compile_model,
+    integrator_of,
     simulate,
     with_integrator,
 )
@@ -217,7 +217,7 @@ def search_row(
     islands = [h for h in steps if h > largest and not laboratory.is_lost(0, h)]
     lost = [h for h in steps if laboratory.is_lost(0, h)]
     is_all = math.isinf(largest)
-    row = StableRow(
+    return StableRow(
         integrator=integrator.value,
         largest=reach(largest),
         reason=laboratory.trial(0, lost[0]).reason if lost else "",
@@ -237,7 +237,6 @@ def search_row(
         gain=gain,
         tries=_tries(laboratory),
     )
-    return replace(row, shown=limit_text(row), map=map_text(row))
 
 
 def _limit_of(
@@ -373,6 +372,7 @@ def stable_rows(
             else find_theory(model, scene.scenario, visits=partial(_comes_near, motion, model))
         ),
         Theory(),
+        share=0.2,
     )
 
     def row(integrator: Integrator) -> StableRow | None:
@@ -398,11 +398,13 @@ def stable_rows(
                 return row
             search = max(search[0] / _LOWER, least), search[0]
 
-    rows = (
-        parts.run(f"{scene.name}: stable timesteps of {i.value}", partial(row, i), None)
-        for i in STANDARD
-    )
-    return tuple(filter(None, rows))
+    rows = dict.fromkeys(STANDARD)
+    baseline = integrator_of(model)  # of which the verdict tells, so it comes first
+    for integrator in sorted(STANDARD, key=lambda i: i is not baseline):
+        name = f"{scene.name}: stable timesteps of {integrator.value}"
+        share = 0.5 if integrator is baseline else 0.25
+        rows[integrator] = parts.run(name, partial(row, integrator), None, share=share)
+    return tuple(filter(None, rows.values()))
 
 
 def _comes_near(motion: KeptMotion, model: Any, rest: Array) -> bool:

@@ -19,7 +19,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench import known_motion, measure, simulation
-from mjbench.columns import LOST, WHOLE, Column, columns_of, leasts_of, ratios
+from mjbench.columns import LOST, WHOLE, Column, row_ratios
 from mjbench.cones import find_references, least_known
 from mjbench.costs import Clock, costs
 from mjbench.delays import loop_note
@@ -68,27 +68,29 @@ def measure_scenario(
     parts = Parts(tell)
     # A mistake in what is expected is told before all the rest is measured.
     figures = measure_expected(model, scene, baseline)
-    expected = parts.collect(f"{scene.name}: what theory knows", figures)
+    expected = parts.collect(f"{scene.name}: what theory knows", figures, share=0.1)
     choices = settings(model, pilot, quick=quick)
-    rows = parts.collect(f"{scene.name}: settings", _measure_settings(basis, choices, tell))
+    runs = _measure_settings(basis, choices, tell)
+    rows = parts.collect(f"{scene.name}: settings", runs, share=0.25)
     rows.sort(key=lambda row: choices.index(row.setting))
     cost_of, no_verdict = None, scene_report.RowVerdict(False, None, None, "")
     if clock is not None and rows:
         timed = partial(_with_costs, basis, rows, clock, quick)
-        result = parts.run(f"{scene.name}: times", timed, None)
+        result = parts.run(f"{scene.name}: times", timed, None, share=0.3)
         rows, cost_of = (rows, None) if result is None else result
-    error_parts = parts.run(f"{scene.name}: errors apart", partial(_error_parts, basis), None)
+    apart = partial(_error_parts, basis)
+    error_parts = parts.run(f"{scene.name}: errors apart", apart, None, share=0.2)
     states = reference.states
     largest = stable_rows(model, pilot, states, parts, quick=quick)
     notes = list(_notes(basis, largest, rows, cost_of))
     draws = list[_Draw]()
     if variants:
         draw_all = _measure_draws(basis, variants, quick)
-        draws = parts.collect(f"{scene.name}: drawn parameters", draw_all)
+        draws = parts.collect(f"{scene.name}: drawn parameters", draw_all, share=0.5)
         notes += [draw.text for draw in draws]
     if scene.scenario.loop is not None:
         delays = partial(loop_note, model, pilot, states)
-        notes.append(parts.run(f"{scene.name}: delays", delays, ""))
+        notes.append(parts.run(f"{scene.name}: delays", delays, "", share=0.5))
     report = scene_report.ScenarioReport(
         name=scene.name,
         title=scene.title,
@@ -125,12 +127,13 @@ def measure_scenario(
         contact_model={name: cone.visible_model_error for name, cone in cones.items() if name},
         parts=error_parts,
         drawn=tuple(part.text for part in variants),
+        failures=tuple(parts.failures),
     )
 
     def starts(number: int) -> Sequence[Mapping[Column, float]] | None:
         setting = report.rows[number].setting
         nearby = partial(_nearby_ratios, basis, report, setting, quick)
-        near = parts.run(f"{scene.name}: starts nearby", nearby, None)
+        near = parts.run(f"{scene.name}: starts nearby", nearby, None, share=0.8)
         if near is None or len(draws) < len(variants):
             return None
         with_draws = partial(_drawn_ratios, draws, report, setting)
@@ -310,8 +313,8 @@ def _nearby_ratios(
             row, _ = measure_setting(near_basis, setting)
             if row.status != "ok":
                 return result if setting == basis.baseline else [*result, {(LOST, WHOLE): math.inf}]
-            pair.append(columns_of(row, report.contact_model))
-        result.append(ratios(pair[0], pair[1], leasts_of(report)))
+            pair.append(row)
+        result.append(row_ratios(report, *pair))
     return result
 
 
@@ -357,8 +360,7 @@ def _drawn_ratios(
         row, _ = measure_setting(draw.basis, replace(rival, cone=cone))
         if row.status != "ok":
             return [*result, {(LOST, WHOLE): math.inf}]
-        pair = [columns_of(r, report.contact_model) for r in (draw.row, row)]
-        result.append(ratios(pair[0], pair[1], leasts_of(report)))
+        result.append(row_ratios(report, draw.row, row))
     return result
 
 
@@ -427,9 +429,12 @@ def _with_costs(
     alike = [s for s in settings if s == replace(baseline, timestep=s.timestep)]
     base = max(alike, key=lambda s: s.timestep, default=settings[0])
     base = baseline if baseline in settings else base
-    scene = basis.pilot.scene
-    timings = costs(basis.model, scene, settings, settings.index(base), clock, quick=quick)
-    for index, timing in zip(usable, timings, strict=True):
+    scene, first = basis.pilot.scene, settings.index(base)
+    # Where there is no time for all of them, there is for what they are compared with.
+    settings.insert(0, settings.pop(first))
+    usable.insert(0, usable.pop(first))
+    timings = costs(basis.model, scene, settings, 0, clock, quick=quick)
+    for index, timing in zip(usable, timings, strict=False):
         seconds = timing.nanoseconds.scale(1e-9 / scene.scenario.duration)
         timed_rows[index] = replace(rows[index], cost=timing.ratio, seconds=seconds)
     return timed_rows, None if base == baseline else base

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mjbench.fair import fair_declarations
-from mjbench.loop import Loop
+from mjbench.loop import Loop, time_limit
 from mjbench.scene import scenes
 
 ARM = """<mujoco><option timestep="0.002"/><worldbody>
@@ -40,6 +40,18 @@ def test_commands_are_waves_however_long_the_timestep_is() -> None:
         (first, *_) = fair_declarations(model, "arm.xml", quick=True).scenarios
         turns = np.diff(np.sign(np.diff(np.array(first.controls)[:, 1])))
         assert 4 <= np.count_nonzero(turns) <= 12, f"three waves and two periods at {timestep} s"
+
+
+def test_a_scenario_is_as_long_as_there_is_time_for() -> None:
+    text = ARM.replace("0.002", "0.0001").format(MOTORS + KEYS)
+    model = mujoco.MjModel.from_xml_string(text)
+    (usual, *_) = fair_declarations(model, "arm.xml", quick=True).scenarios
+    with time_limit(1):
+        (first, *_) = fair_declarations(model, "arm.xml", quick=True).scenarios
+    assert usual.duration == pytest.approx(2) and first.duration is not None
+    assert 0.0384 <= first.duration < 1.9
+    commands = np.array(first.controls)[:, 1]
+    assert np.count_nonzero(np.diff(np.sign(np.diff(commands)))) >= 4, "they are waves"
 
 
 def test_without_a_keyframe_it_begins_where_the_model_comes_to_rest() -> None:

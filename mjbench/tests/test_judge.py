@@ -227,6 +227,8 @@ def test_the_error_is_taken_apart_and_what_mends_it_is_named() -> None:
     )
     small = judged(masked(), contact_model=CONES, parts=ErrorParts(1e-4, None, None, None, 0.001))
     assert small.parts is not None and small.parts.dominant == "", "none is resolved"
+    hit = judged(rows_of((1, 0.6)), parts=ErrorParts(0.3, None, None, 1.28, 0.6))
+    assert hit.parts is not None and not hit.parts.dominant, "what it errs by is not resolved"
 
 
 def test_what_is_off_before_the_horizon_is_not_better() -> None:

@@ -7,9 +7,13 @@ from collections.abc import Iterator
 import mujoco
 import pytest
 
-from mjbench.parts import STOPPED, Parts
+from mjbench.derive import derive_scenario
+from mjbench.loop import step, time_left, time_limit
+from mjbench.parts import LATE, STOPPED, Parts
+from mjbench.reports import PartFailure
 from mjbench.scene import SceneError, scenes
 from mjbench.work_precision import StoppedError, measure_scenario
+from samples.reports import row, scenario
 from samples.surveys import parse_declared
 
 
@@ -48,6 +52,32 @@ def test_what_has_not_begun_when_the_user_stops_is_skipped() -> None:
         ("first", STOPPED),
         ("second", STOPPED),
     ]
+
+
+def test_a_part_whose_share_of_the_time_is_over_leaves_the_rest_to_others() -> None:
+    model = mujoco.MjModel.from_xml_string(SPRING)
+    data = mujoco.MjData(model)
+
+    def results() -> Iterator[float]:
+        while True:
+            step(model, data, 1)
+            yield data.time
+
+    with time_limit(3600):
+        parts = Parts()
+        assert parts.collect("what never ends", results(), share=0) == []
+        assert parts.run("the next", lambda: next(results()), 0.0) == pytest.approx(0.01)
+        with time_limit(7200):
+            assert time_left() < 3601, "an outer limit holds too"
+    assert [(f.part, f.reason) for f in parts.failures] == [("what never ends", LATE)]
+
+
+def test_a_verdict_claims_nothing_of_settings_that_there_was_no_time_for() -> None:
+    rows = [row("Euler", 0.01, cost=1.0, seen=0.1, own=True)]
+    report = scenario(rows, failures=(PartFailure("drop: settings", LATE),))
+    verdict = derive_scenario(report, lambda _: ()).verdict
+    sentence = "no other setting that was measured is cheaper without being less accurate"
+    assert verdict.text.startswith(f"{sentence};")
 
 
 SPRING = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody><body>

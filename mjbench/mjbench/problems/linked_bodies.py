@@ -40,7 +40,7 @@ from mjbench.problem import (
     model_text,
     motion_without_attitude,
 )
-from mjbench.rotations import quat_conj, quat_mul, quat_to_mat
+from mjbench.rotations import quat_conj, quat_mul, rotate
 from mjbench.simulation import advance, compile_model, initial_data, simulate
 
 
@@ -63,7 +63,7 @@ class Chain(Struct, frozen=True):
         """The motion at the rising times (n,) s."""
         count = len(self.masses)
         tilted = np.array([np.cos(self.bend / 2), 0.0, np.sin(self.bend / 2), 0.0])
-        omega = quat_to_mat(tilted) @ np.array(self.spin or (0.0, 0.0, 0.0))
+        omega = rotate(tilted, self.spin or (0.0, 0.0, 0.0))
         start = np.concatenate([np.tile(tilted, count), np.tile(omega, count)])
         masses = np.array(self.masses)
         tolerance = 1e-13 if np.ptp(masses) == 0 else 1e-10
@@ -76,7 +76,7 @@ class Chain(Struct, frozen=True):
         if self.spin is None:
             angles = 2 * np.arctan2(relative[..., 2], relative[..., 0])
             return Motion(times, angles, np.empty((len(times), 0, 4)), relative_omega[..., 1])
-        velocity = np.einsum("nkji,nkj->nki", quat_to_mat(attitude), relative_omega)
+        velocity = rotate(quat_conj(attitude), relative_omega)
         return Motion(times, np.empty((len(times), 0)), relative, velocity.reshape(len(times), -1))
 
     def _rate(self, state: State) -> State:

@@ -29,7 +29,6 @@ from mjbench.problem import (
     turning_at_rest,
 )
 from mjbench.problems.tops import NEVER_STABLE
-from mjbench.rotations import mat_to_quat
 from mjbench.simulation import advance, compile_model, initial_data, run_steps
 
 SPIN = 6.0
@@ -106,10 +105,13 @@ class Tumbling(Struct, frozen=True):
 
     def attitude(self, times: Array) -> Array:
         """Quaternions (n, 4), body to world; at the beginning the identity."""
+        from scipy.spatial.transform import Rotation
+
         angles = self._precession(times)
         start = self._frame(np.zeros(1), np.zeros(1))[0]
-        matrices: Array = start.T @ self._frame(times, angles)
-        return mat_to_quat(matrices)
+        turns = Rotation.from_matrix(start.T @ self._frame(times, angles))
+        quats: Array = turns.as_quat(canonical=True, scalar_first=True)
+        return quats
 
     def _frame(self, times: Array, angles: Array) -> Array:
         """Rotation matrices (n, 3, 3) from the body to a frame whose z is the angular momentum.

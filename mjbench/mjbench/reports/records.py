@@ -19,7 +19,6 @@ from typing import Any, Generic, TypeAlias, TypeVar
 
 import msgspec
 from msgspec import Struct
-from msgspec.structs import replace
 
 from mjbench.declarations import BenchTable
 from mjbench.reports import model_report, scene_report
@@ -171,17 +170,7 @@ _Report: TypeAlias = dict[tuple[str, str, str], _Figures]
 def scene_departures(
     record: model_report.SceneReport, measurement: model_report.SceneReport, bench: BenchTable
 ) -> tuple[Departure, ...]:
-    """Everything of a model that left its band, in the order of the recorded report.
-
-    One that was recorded before solvers were crossed with timesteps has fewer settings.
-    """
-    if not any(row.evaluations for scenario in record.scenarios for row in scenario.rows):
-        settings = {row.setting for scenario in record.scenarios for row in scenario.rows}
-        scenarios = tuple(
-            replace(scenario, rows=tuple(row for row in scenario.rows if row.setting in settings))
-            for scenario in measurement.scenarios
-        )
-        measurement = replace(measurement, scenarios=scenarios)
+    """Everything of a model that left its band, in the order of the recorded report."""
 
     def figures(report: model_report.SceneReport) -> _Report:
         tables = [(scenario.name, _scenario(scenario, bench)) for scenario in report.scenarios]
