@@ -126,8 +126,7 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     for css, run in groups:
         html = escape(run, quote=False)
         if css:  # an element for each line, without the white space around it
-            element = f'<span class="{css}">'
-            html = _WITHOUT_OUTER_SPACE.sub(rf"{element}\g<0></span>", html)
+            html = _WITHOUT_OUTER_SPACE.sub(rf'<span class="{css}">\g<0></span>', html)
         parts.append(html)
     return tuple(map(Markup, "".join(parts).split("\n")))
 
@@ -165,7 +164,7 @@ def python_nodes(code: str) -> tuple[ast.AST, ...]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            nodes: list[ast.AST] = [ast.parse(code)]
+            nodes: list[ast.AST] = [ast.parse(code, "")]
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return ()
     for node in nodes:  # grows in the loop; as `ast.walk`, in half the time

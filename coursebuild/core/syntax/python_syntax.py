@@ -20,10 +20,9 @@ def find_windows(code: Excerpt) -> Iterator[Diagnostic]:
     if not re.search("matplotlib|plotly", code.text):
         return
     try:
-        tree = ast.parse(code.text)
+        nodes = list(ast.walk(ast.parse(code.text, "")))
     except (SyntaxError, ValueError, MemoryError, RecursionError):
         return
-    nodes = list(ast.walk(tree))
     names: dict[str, str] = {}
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -137,7 +136,7 @@ def _compile_error(code: str) -> SyntaxError | None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            compile(code, "<lesson>", "exec", dont_inherit=True)
+            compile(code, "", "exec", dont_inherit=True)
     except SyntaxError as error:
         return error.with_traceback(None)
     except (ValueError, MemoryError, RecursionError, OverflowError) as error:
