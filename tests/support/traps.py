@@ -17,8 +17,9 @@ from support.workflows import git
 
 PROGRAMS = """
 uv pip3 git node npm chromium chromium-headless-shell google-chrome python python3 gvim bwrap sh
-systemd-run sysctl uname fc-list gcc cc ldconfig emacs subl xdg-open
+systemd-run sysctl uname fc-list gcc cc ldconfig emacs subl xdg-open git-order
 """.split()
+HOOKS = "usercustomize sitecustomize conftest"
 COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "bench": (("bench", "--quick"),),
     "build": (("build",), ("build", "--sandbox")),
@@ -124,8 +125,11 @@ class TrapFolder:
         git(folder.root, "add", ".")
         git(folder.root, "commit", "--quiet", "-m", "a course")
         self._set_module_traps()
-        self._set_program_traps()
+        for program in PROGRAMS:
+            self._set_program(program)
         self._set_settings()
+        # Python opens a file of this name for the line of a mistake: that would never end.
+        os.mkfifo(folder.root / "<unknown>")
 
     def marks(self) -> list[str]:
         """The names of the traps that have run."""
@@ -140,18 +144,12 @@ class TrapFolder:
         return f"open({str(self._file_of_marks)!r}, 'a').write({name!r} + '\\n')\n"
 
     def _set_module_traps(self) -> None:
-        for name in {*sys.stdlib_module_names, *packages_distributions(), "usercustomize"}:
+        for name in {*sys.stdlib_module_names, *packages_distributions(), *HOOKS.split()}:
             if name.isidentifier() and name not in ("mjcourse", "coursebuild"):
                 self.folder.write(f"{name}.py", self._code(f"module {name}"))
         for package in ("pip", "coursebuild", "coursebuild_cluster"):
             for part in ("__init__", "__main__"):
                 self.folder.write(f"{package}/{part}.py", self._code(f"package {package}"))
-        for name in ("sitecustomize", "conftest"):
-            self.folder.write(f"{name}.py", self._code(name))
-
-    def _set_program_traps(self) -> None:
-        for program in PROGRAMS:
-            self._set_program(program)
 
     def _set_program(self, name: str) -> None:
         self.folder.write(
@@ -172,7 +170,6 @@ class TrapFolder:
         write("setup.cfg", "[tool:pytest]\naddopts = -p sitecustomize\n")
         write(".git/info/attributes", "* filter=trap diff=trap\n")
         order = str(self.folder.root / "git-order")
-        self._set_program("git-order")
         config = (self.folder.root / ".git/config").read_text()
         for section, *keys in (
             (

@@ -38,7 +38,7 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
             tell(entry, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
         with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-            for node in ast.walk(ast.parse(code)):
+            for node in ast.walk(ast.parse(code, "")):
                 if isinstance(node, ast.Import):
                     imports.update(alias.name.partition(".")[0] for alias in node.names)
                 elif isinstance(node, ast.ImportFrom) and node.module:
@@ -55,8 +55,9 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
             tell(entry, f"{entry.path}: {reason}")
         else:
             features.append(feature)
-    features_hash = features_digest(root, course) if course.features else ""
-    use_course_features(features, features_hash, frozenset(imports))
+    use_course_features(
+        features, features_digest(root, course) if course.features else "", frozenset(imports)
+    )
     return tuple(diagnostics)
 
 

@@ -124,8 +124,7 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     for css, run in groups:
         html = escape(run, quote=False)
         if css:  # an element for each line, without the white space around it
-            element = f'<span class="{css}">'
-            html = _WITHOUT_OUTER_SPACE.sub(rf"{element}\g<0></span>", html)
+            html = _WITHOUT_OUTER_SPACE.sub(rf'<span class="{css}">\g<0></span>', html)
         parts.append(html)
     return tuple(map(Markup, "".join(parts).split("\n")))
 

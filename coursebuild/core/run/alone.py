@@ -88,8 +88,9 @@ class Runner(Struct, frozen=True):
 
     def _key(self, job: AloneJob) -> str:
         program = file_state(str(_PROGRAM))
-        run_conditions = conditions(os.environ, self.interpreter)
-        return fingerprint((program, run_conditions, job, self.sandbox is not None))
+        return fingerprint(
+            (program, conditions(os.environ, self.interpreter), job, self.sandbox is not None)
+        )
 
     def _run(self, job: AloneJob) -> AloneRun:
         mark = secrets.token_hex()

@@ -158,7 +158,7 @@ class JsonChild:
                 errors.seek(0)
                 cause = self._excess or gate.last_line(errors.read()) or "the import crashed"
                 match = re.match(r"\w*Error: \[Errno (\d+)\]", cause)
-                lack = match and lacking(OSError(int(match[1]), ""))
+                lack = lacking(OSError(int(match[1]), "")) if match else None
                 raise lack or EffectError(f"MuJoCo cannot be loaded: {cause}")
         with contextlib.suppress(AttributeError, OSError):  # only Linux can
             limits = [(resource.RLIMIT_DATA, self.memory << 20), (resource.RLIMIT_CORE, 0)]

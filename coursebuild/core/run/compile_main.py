@@ -26,8 +26,7 @@ _FREE, _BALL, _SLIDE, _HINGE = range(4)
 def main() -> None:
     """Serve until the input closes."""
     replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    null = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 1)  # MuJoCo prints its warnings
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # MuJoCo prints its warnings
     import mujoco
 
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
@@ -38,8 +37,8 @@ def main() -> None:
             enums = (enum for name, enum in vars(mujoco).items() if name.startswith("mjt"))
             members = [name for enum in enums for name in getattr(enum, "__members__", ())]
             keywords = sorted({name.partition("_")[2] for name in members} - {""})
-            vocabulary = (mujoco.mj_printSchema(False, False), keywords)
-            print(json.dumps(vocabulary), file=replies, flush=True)
+            schema = mujoco.mj_printSchema(False, False)
+            print(json.dumps((schema, keywords)), file=replies, flush=True)
             continue
         start = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, seconds)

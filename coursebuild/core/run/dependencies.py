@@ -188,8 +188,7 @@ def sought_files(name: str) -> tuple[str, ...]:
     """The files that were looked for, given the name of a need of kind `SOUGHT`."""
     folder, modules = parse_sought(name)
     prefix = f"{folder}/" if folder else ""  # the project's own folder has no name
-    endings = (".py", "/__init__.py")
-    return tuple(f"{prefix}{module}{ending}" for module in modules for ending in endings)
+    return tuple(f"{prefix}{m}{end}" for m in modules for end in (".py", "/__init__.py"))
 
 
 def reason_forgotten(run: ScriptRun) -> str:

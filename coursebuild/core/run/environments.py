@@ -192,8 +192,8 @@ def _hash_files(prefix: Path) -> Iterator[tuple[str, str]]:
 
 
 def _packages(prefix: Path) -> Path:
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    return prefix / "lib" / f"python{version}" / "site-packages"
+    major, minor, *_ = sys.version_info
+    return prefix / f"lib/python{major}.{minor}/site-packages"
 
 
 def _has_pip() -> bool:

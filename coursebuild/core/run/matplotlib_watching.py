@@ -127,8 +127,8 @@ class _Axes:
 
     def __init__(self, axes: Any) -> None:
         self._axes = axes
-        names = [name for name in "xyz" if hasattr(axes, f"{name}axis")]
-        self._all_axis = [getattr(axes, f"{name}axis") for name in names]
+        names = ("xaxis", "yaxis", "zaxis")
+        self._all_axis = [getattr(axes, name) for name in names if hasattr(axes, name)]
         self._is_flat = axes.name == "rectilinear"
         self._limits = [sorted(map(float, axis.get_view_interval())) for axis in self._all_axis]
         place = axes.transLimits + axes.transAxes if self._is_flat else axes.transAxes

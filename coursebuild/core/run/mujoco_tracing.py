@@ -71,8 +71,7 @@ def wrap(mujoco: ModuleType) -> None:
         )
 
     def note_library(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> None:
-        path = _decode(_get_argument(args, keywords, 0, "path", "directory"))
-        active_tracer().note_library(path)
+        active_tracer().note_library(_decode(_get_argument(args, keywords, 0, "path", "directory")))
 
     for name, position in (("compile", 0), ("recompile", 0), ("attach", 1)):
         wrap_method(spec, name, spec_reader(position))

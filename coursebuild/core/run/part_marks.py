@@ -60,8 +60,7 @@ class PartMark:
         with contextlib.suppress(Exception):  # an error of the script's own may do anything
             text = f"{text}: {error}".strip(": ").splitlines()[0]
             sys.stderr.flush()
-        note = f"\n{FAILURE} {line}\n{text}\n"
-        os.write(2, note.encode("utf-8", "backslashreplace"))
+        os.write(2, f"\n{FAILURE} {line}\n{text}\n".encode("utf-8", "backslashreplace"))
 
     def end(self) -> None:
         """End the script: it has failed where a part has."""

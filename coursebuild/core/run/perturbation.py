@@ -303,5 +303,4 @@ def _states(data: Any) -> tuple[bytes, ...]:
 
 def model_and_data(args: tuple[Any, ...], keywords: Mapping[str, Any]) -> tuple[Any, Any]:
     """The `MjModel` and the `MjData` in the arguments of one of MuJoCo's functions."""
-    model = args[0] if args else keywords["m"]
-    return model, args[1] if len(args) > 1 else keywords["d"]
+    return args[0] if args else keywords["m"], args[1] if len(args) > 1 else keywords["d"]

@@ -415,7 +415,7 @@ def _read_parts(text: str) -> dict[str, list[str]]:
                 add_parts(node.body, f"{name}.")
 
     with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-        add_parts(ast.parse(text).body, "")
+        add_parts(ast.parse(text, "").body, "")
     return parts
 
 

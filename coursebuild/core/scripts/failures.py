@@ -176,7 +176,7 @@ def _parses(extraction: Extraction) -> bool:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            compile(extraction.text, extraction.path, "exec", dont_inherit=True)
+            compile(extraction.text, "", "exec", dont_inherit=True)
     except (SyntaxError, ValueError, MemoryError, RecursionError, OverflowError):
         return False
     return True

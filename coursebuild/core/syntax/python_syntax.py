@@ -134,7 +134,7 @@ def _compile_error(code: str) -> SyntaxError | None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            compile(code, "<lesson>", "exec", dont_inherit=True)
+            compile(code, "", "exec", dont_inherit=True)
     except SyntaxError as error:
         return error.with_traceback(None)
     except (ValueError, MemoryError, RecursionError, OverflowError) as error:

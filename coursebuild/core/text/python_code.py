@@ -31,7 +31,7 @@ def _nodes(code: str) -> tuple[ast.AST, ...]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            nodes: list[ast.AST] = [ast.parse(code)]
+            nodes: list[ast.AST] = [ast.parse(code, "")]
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return ()
     for node in nodes:  # grows in the loop; as `ast.walk`, in half the time

@@ -268,14 +268,14 @@ def _with_new_paths(code: str, context: LessonContext) -> str:
 def _without_host(text: str, context: LessonContext) -> str:
     """Return code without the statements that import or use what only Google's Colab has."""
     try:
-        statements = ast.parse(text).body
+        statements = ast.parse(text, "").body
     except (SyntaxError, ValueError, RecursionError):
         return text
     lines, names = text.split("\n"), set[str]()
     for statement in statements:
         match statement:
             case ast.ImportFrom(module=str(module)) if (
-                module.partition(".")[0::2][0] == "google"
+                module.partition(".")[0] == "google"
                 and "colab" in f"{module} {[a.name for a in statement.names]}"
             ):
                 names |= {alias.asname or alias.name for alias in statement.names}
@@ -360,7 +360,8 @@ def _find_fault(text: str) -> str:
     """Return why a text is no Python; empty where it is."""
     try:
         with warnings.catch_warnings(action="ignore"):
-            compile(text, "cell", "exec", dont_inherit=True)  # `await` outside functions too
+            # Also `await` outside functions. For the line of a mistake, Python opens what is named.
+            compile(text, "/dev/null/cell", "exec", dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError) as error:
         return str(error)
     return ""

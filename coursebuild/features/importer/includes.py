@@ -146,7 +146,7 @@ def lines_of(text: str, options: Mapping[str, str]) -> str:
     lines = text.splitlines()
     if name := options.get("pyobject"):
         with contextlib.suppress(SyntaxError, ValueError):
-            for node in ast.walk(ast.parse(text)):
+            for node in ast.walk(ast.parse(text, "")):
                 if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
                     lines = lines[node.lineno - 1 : node.end_lineno]
                     break

@@ -268,9 +268,10 @@ def _labs_by_model(document: Document) -> dict[str, Lab]:
     """Map models to their first labs; those in questions are left out, as in summaries."""
     labs: dict[str, Lab] = {}
     blocks = [*find_blocks(document, FeatureBlock)]
-    outer_spans = [block.span for block in blocks if not isinstance(block, Lab)]
     for lab in blocks:
-        if isinstance(lab, Lab) and not any(span.contains(lab.span) for span in outer_spans):
+        if isinstance(lab, Lab) and not any(
+            block.span.contains(lab.span) for block in blocks if not isinstance(block, Lab)
+        ):
             for name in lab.models():
                 labs.setdefault(name, lab)
     return labs

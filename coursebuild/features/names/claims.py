@@ -245,7 +245,7 @@ def _find(text: str, page: str) -> Iterator[tuple[Kind, str, str]]:
 
 def _find_python(text: str) -> Iterator[tuple[Kind, str, str]]:
     try:
-        tree = ast.parse(text.replace("…", "_").replace("->", "."))
+        tree = ast.parse(text.replace("…", "_").replace("->", "."), "")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         for word in ENGINE_WORD.findall(text):
             yield "word", word, word

@@ -76,7 +76,7 @@ def _engine(mujoco: ModuleType) -> dict[str, Any]:
 
 def _describe(declaration: Any) -> dict[str, Any]:
     extent = getattr(declaration, "array_extent", None) or ()
-    return {"text": str(declaration), "doc": declaration.doc, "extent": [*map(str, extent)]}
+    return {"text": str(declaration), "doc": declaration.doc, "extent": list(map(str, extent))}
 
 
 def _fields(struct: Any) -> dict[str, Any]:

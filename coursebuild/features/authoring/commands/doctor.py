@@ -46,6 +46,11 @@ data = mujoco.MjData(model)
 mujoco.mj_step(model, data)
 """
 _DRAW = f"""{_STEP}
+import os, threading
+barrier = threading.Barrier(os.cpu_count() + 3)
+for _ in range(barrier.parties - 1):
+    threading.Thread(target=barrier.wait, daemon=True).start()
+barrier.wait()
 renderer = mujoco.Renderer(model, 32, 32)
 renderer.update_scene(data)
 renderer.render()
@@ -103,8 +108,9 @@ def run(arguments: argparse.Namespace) -> int:
             if write(line, CLEAN):
                 return FAILURE
             faults += subject in required and not probe.ok
-    verdict = f"broken: {plural(faults, 'thing')} that every course needs" if faults else ""
-    verdict = verdict or "all that every course needs works"
+    verdict = "all that every course needs works"
+    if faults:
+        verdict = f"broken: {plural(faults, 'thing')} that every course needs"
     return write(
         f"\n{style.paint(verdict, RED if faults else GREEN)}\n", FAILURE if faults else CLEAN
     )
@@ -165,8 +171,11 @@ def _store(folder: Path) -> Iterator[Probe]:
         cure = "set HOME, XDG_STATE_HOME or COURSEBUILD_STORE_KEY"
         yield Probe("nothing is kept: there is no place for your key", False, cure)
     else:
-        text = f"{FOLDER} {reason}; results are kept in {place}"
-        yield Probe(text, False, f"remove {folder / FOLDER}")
+        yield Probe(
+            f"{FOLDER} {reason}; results are kept in {place}",
+            False,
+            f"remove {folder / FOLDER}",
+        )
 
 
 def _locks(folder: Path) -> Iterator[Probe]:
@@ -176,14 +185,16 @@ def _locks(folder: Path) -> Iterator[Probe]:
     except OSError:  # `_folder` reports it
         return
     text = "locks, with which two commands on one course wait for each other"
-    cure = "use a local disk, or run one command at a time"
-    yield Probe(text if ok else f"no {text}", ok, cure)
+    yield Probe(text if ok else f"no {text}", ok, "use a local disk, or run one command at a time")
 
 
 def _disk(folder: Path) -> Iterator[Probe]:
     free = shutil.disk_usage(folder).free
-    cure = "free some space, or limit .coursebuild: `--cache-size 200M`"
-    yield Probe(f"{free / (1 << 30):.1f} GiB free on the disk", free > SIZE, cure)
+    yield Probe(
+        f"{free / (1 << 30):.1f} GiB free on the disk",
+        free > SIZE,
+        "free some space, or limit .coursebuild: `--cache-size 200M`",
+    )
 
 
 def _rendering(_: Path) -> Iterator[Probe]:
@@ -215,11 +226,14 @@ def _sandbox(folder: Path) -> Iterator[Probe]:
 
 
 def _try_code(code: str, **environment: str) -> str:
-    variables = gate.environment(*gate.DESKTOP, **environment)
+    variables = gate.environment(*gate.DESKTOP, OPENBLAS_NUM_THREADS="1", **environment)
     try:
         trial = gate.finish(gate.python_command("-c", code), variables, seconds=_SECONDS)
     except TimeoutError as error:
         return str(error)
     if trial.status == 0:
         return ""
-    return trial.last_line() or f"the process ended with status {trial.status}"
+    line = trial.last_line()
+    if "can't start new thread" in line:
+        raise RuntimeError("can't start new thread")
+    return line or f"the process ended with status {trial.status}"

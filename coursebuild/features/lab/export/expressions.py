@@ -205,7 +205,7 @@ class Expressions:
 
     def index(self, node: Node) -> str:
         """Translate an index, which in Python must be an `int`."""
-        text = ast.unparse(ast.parse(self.expression(node)))
+        text = ast.unparse(ast.parse(self.expression(node), ""))
         return text if self.is_whole(node) else f"int({text})"
 
     def is_whole(self, node: Node) -> bool:

@@ -34,7 +34,7 @@ def translate_statements(
     In the code of a `button`, calls that only concern the page's clock are left out.
     """
     lines = _Statements(engine, fields, value, button).block(js.parse_statements(code))
-    return ast.unparse(ast.parse("\n".join(lines))).splitlines()
+    return ast.unparse(ast.parse("\n".join(lines), "")).splitlines()
 
 
 def translate_expression(
@@ -43,7 +43,7 @@ def translate_expression(
     """Translate an expression, in which there may be `variables`."""
     translator = _Statements(engine, fields, None, button=False)
     translator.scopes.append(set(map(expressions.python_name, variables)))
-    return ast.unparse(ast.parse(translator.expression(js.parse_expression(code))))
+    return ast.unparse(ast.parse(translator.expression(js.parse_expression(code)), ""))
 
 
 def context_fields(pieces: Iterable[str]) -> dict[str, str]:
