@@ -79,7 +79,6 @@ _PAGE_NAME = re.compile("[a-z][a-z0-9-]*")
 
 _of_course: tuple[Feature, ...] = ()
 _digest = ""
-_imports: frozenset[str] = frozenset()
 
 
 @functools.cache
@@ -88,15 +87,12 @@ def features() -> tuple[Feature, ...]:
     return _register((*installed_features(), *_of_course))
 
 
-def use_course_features(
-    course_features: Iterable[Feature], digest: str, imports: frozenset[str]
-) -> None:
-    """Set the course's own features, a hash of their code, and the modules that it imports."""
-    global _of_course, _digest, _imports
+def use_course_features(course_features: Iterable[Feature], digest: str) -> None:
+    """Set the course's own features, and a hash of their code."""
+    global _of_course, _digest
     for name in _names(_of_course, "rules"):
         RULES.pop(name, None)
     _of_course, _digest = _register(map(_name_failures, course_features)), digest
-    _imports = imports
     for table in (features, _by_fence, _by_block, page_kinds, parts_by_mark):
         table.cache_clear()
 
@@ -104,12 +100,6 @@ def use_course_features(
 def features_digest() -> str:
     """A hash over the code of all features except coursebuild's own."""
     return hashlib.sha256("\0".join((_digest, *_package_lines())).encode()).hexdigest()
-
-
-def feature_packages() -> tuple[frozenset[str], frozenset[str]]:
-    """The distributions that offer features, and the modules that the course's own ones import."""
-    names = frozenset(point.dist.name for point in _entry_points() if point.dist is not None)
-    return names, _imports
 
 
 def find_clash(candidate: Feature, installed: Iterable[Feature]) -> str:

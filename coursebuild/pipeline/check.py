@@ -24,11 +24,11 @@ from coursebuild.core.pages.library import named_models
 from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.run.dependencies import sought_files
 from coursebuild.core.run.script_environment import Interpreter
+from coursebuild.core.scripts.bound_places import find_printed
 from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.scripts.extract import extract, is_run
 from coursebuild.core.scripts.findings import unproven_units
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.unbound import find_printed
 from coursebuild.core.syntax.document import read_again
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
 from coursebuild.pipeline.load import Code, load

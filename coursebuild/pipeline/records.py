@@ -27,8 +27,7 @@ from coursebuild.core.model.lesson_record import (
     recording_digest,
 )
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.run.packages import distributions
-from coursebuild.core.run.script_environment import conditions
+from coursebuild.core.run.script_environment import conditions, distributions
 from coursebuild.core.scripts.bound_places import document_values
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import ReadFile, compare_figure

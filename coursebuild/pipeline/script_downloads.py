@@ -36,7 +36,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library, models_named
 from coursebuild.core.pages.zips import Archive
 from coursebuild.core.run.alone import AloneJob, AloneRun, Runner
-from coursebuild.core.run.packages import distributions, module_files
+from coursebuild.core.run.script_environment import distributions, module_files
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.module_code import CourseModule, NotOneFileError, is_text

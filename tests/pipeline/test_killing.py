@@ -13,7 +13,6 @@ import pytest
 
 from coursebuild.cli import main
 from support.mortal_commands import Mortals, mortal_commands
-from support.published_sites import SPARE
 from support.run_code import run_code
 from support.scratch_course import GOOD, Folder, Make, block
 
@@ -93,8 +92,7 @@ class Trials:
         return [
             name
             for name in (path.relative_to(root).as_posix() for path in root.rglob("*"))
-            if any(part in name for part in parts)
-            and (name.startswith(f"{SPARE}/") or not name.startswith(".coursebuild/"))
+            if any(part in name for part in parts) and not name.startswith(".coursebuild/")
         ]
 
 

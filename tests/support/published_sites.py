@@ -1,4 +1,4 @@
-"""A site of a few pages, of which some were published twice, so that there is a spare."""
+"""A site of a few pages."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import pytest
 from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
 from coursebuild.core.model.results import CachedFile, SiteFile
-
-SPARE = ".coursebuild/published/spare"
 
 
 class Pages:
@@ -59,10 +57,8 @@ def pages() -> Pages:
 
 
 @pytest.fixture
-def spared(root: Path, pages: Pages) -> Path:
-    """A course with a site of the files SITE_FILES and a spare, in which one of them is older."""
-    publish(root, root / "public", pages(**SITE_FILES | {"a": "0"}))
+def course(root: Path, pages: Pages) -> Path:
+    """A course with a site of the files SITE_FILES."""
     publish(root, root / "public", pages(**SITE_FILES))
-    assert texts(root / SPARE) == TEXTS | {"a.html": "a.html 0"}
     pages.made_paths.clear()
     return root

@@ -2,30 +2,26 @@
 
 1. The place is checked: it is neither the project nor a folder of the author's, and holds no file
    that we did not put there. One build publishes to a place at a time.
-2. The site is filled into a slot: a folder beside the place, on the same file system, which holds
-   the site before the last one, or nothing. A file stays in it, or is linked from the old site, if
-   the manifest lists it under the same key and it has not changed; all others are made.
+2. The site is filled into a slot: a new folder beside the place, on the same file system. A file is
+   linked from the old site if the manifest lists it under the same key and it has not changed; all
+   others are made.
 3. Slot and site are exchanged in one step. Where the system cannot, the old site is renamed away
    and the new one renamed in; if a build is killed between the two, the next one puts it back.
-4. The old site is put away in `.coursebuild/`, as the slot of the next build, which then has to add
-   only what is missing: linking thousands of files, and removing as many, takes longer than making
-   the few that an edit changes. Its files are checked as those of the site are.
+4. The old site is removed.
 
 A site can be built again, so it is not synced to the disk: after a power cut, build again.
 """
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import errno
 import hashlib
 import os
 import re
-import shutil
 import stat
 import sys
-from collections.abc import Callable, Container, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
@@ -34,8 +30,7 @@ from coursebuild.core.engine.manifest import MARKER, Manifest, ManifestEntry
 from coursebuild.core.engine.page_pool import Workers, can_fork
 from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
-from coursebuild.core.files.locks import folder_lock
-from coursebuild.core.files.trust import find_store
+from coursebuild.core.files.locks import folder_lock, remove_folder
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile, SiteFile
 
 _EXCHANGE = {"linux": "renameat2", "darwin": "renameatx_np"}
@@ -90,7 +85,8 @@ def publish(
                 return ()
             slot = _sibling(place, "new")
             try:
-                open_slot(root, slot)
+                remove_folder(slot)
+                slot.mkdir(0o700)
                 entries, paths = site.fill(slot, jobs, stage)
                 if not manifest.holds(slot, entries):
                     message = f"another process is changing what is being written to {place}"
@@ -100,13 +96,11 @@ def publish(
                     slot.rename(place)
                 elif not exchange(slot, place):
                     old = _sibling(place, "old")
-                    remove(old)
                     place.rename(old)
                     slot.rename(place)
-                    old.rename(slot)
             finally:
                 _recover(place)
-                put_away(root, slot)
+                remove_folder(slot)
             Manifest(place, entries).write(root)
             return tuple(sorted(paths))
     except OSError as error:
@@ -168,13 +162,13 @@ def _recover(place: Path) -> None:
     """Put the last good site back if a build was killed after renaming it away."""
     old = _sibling(place, "old")
     if os.path.lexists(place):
-        remove(old)
+        remove_folder(old)
     elif (old / MARKER).is_file():
         old.rename(place)
 
 
 def _sibling(place: Path, suffix: str) -> Path:
-    """A folder of ours beside the place: `new`, the slot while it is filled, or `old`."""
+    """A folder of ours beside the place: `new`, the slot, or `old`."""
     return place.with_name(f".{place.name}.coursebuild-{suffix}")
 
 
@@ -245,15 +239,14 @@ class _NewSite:
         for folder in list(folders):
             while folder := folder.rpartition("/")[0]:
                 folders.add(folder)
-        folders.discard("")
-        old_entries = {p: e for p, k in self.keys.items() if (e := self.old.entry(p, k))}
-        entries = _remove_stale(f"{slot}/", "", old_entries, folders)
-        for folder in sorted(folders):  # each after its parent
-            (slot / folder).mkdir(exist_ok=True)
+        for folder in sorted(folders - {""}):  # each after its parent
+            (slot / folder).mkdir()
             (slot / folder).chmod(0o755)  # whatever the umask is
-        for path, entry in old_entries.items():
-            if path not in entries and self._link(path, entry, slot):
-                entries[path] = entry
+        entries = {
+            path: entry
+            for path, key in self.keys.items()
+            if (entry := self.old.entry(path, key)) and self._link(path, entry, slot)
+        }
         new_paths = [path for path in self.keys if path not in entries]
         new_files = [self.files[path] for path in new_paths if path in self.files]
 
@@ -299,63 +292,3 @@ def _write_file(path: str, data: bytes) -> None:
     with open(path, "xb") as file:  # noqa: PTH123 - thousands of them
         file.write(data)
         os.fchmod(file.fileno(), 0o644)  # whatever the umask is
-
-
-def open_slot(root: Path, slot: Path) -> None:
-    """Make the slot ready: the one that the last build put away, or an empty folder."""
-    if not os.path.lexists(slot):
-        with contextlib.suppress(OSError):  # none was put away, or it is on another file system
-            _spare(root).rename(slot)
-    if not slot.is_dir() or slot.is_symlink():
-        with contextlib.suppress(FileNotFoundError):
-            slot.unlink()
-        slot.mkdir()
-    slot.chmod(0o700)
-
-
-def put_away(root: Path, slot: Path) -> None:
-    """Keep the slot for the next build, in the store."""
-    with contextlib.suppress(OSError):
-        slot.chmod(0o700)  # a folder that may not be written cannot be moved
-        with contextlib.suppress(OSError):
-            slot.rename(_spare(root))
-            return
-        remove(slot)
-
-
-def _spare(root: Path) -> Path:
-    return Path(find_store(str(root))[0], manifest.KIND, "spare")
-
-
-def _remove_stale(
-    folder: str, prefix: str, old_entries: Mapping[str, ManifestEntry], folders: Container[str]
-) -> dict[str, ManifestEntry]:
-    """Remove everything from a folder but intact files and needed folders; return these files.
-
-    `folder` and `prefix`, its path in the site, end with a slash. `old_entries` are those of the
-    files that may stay, `folders` the folders.
-    """
-    intact: dict[str, ManifestEntry] = {}
-    with os.scandir(folder) as entries:
-        contents = list(entries)
-    for entry in contents:
-        path = prefix + entry.name
-        expected = old_entries.get(path)
-        if not entry.is_dir(follow_symlinks=False):
-            if expected is not None and expected.fits(entry.stat(follow_symlinks=False)):
-                intact[path] = expected
-            else:
-                os.unlink(entry.path)  # noqa: PTH108 - thousands of them
-        elif path in folders:
-            os.chmod(entry.path, 0o755)  # noqa: PTH101
-            intact |= _remove_stale(f"{entry.path}/", f"{path}/", old_entries, folders)
-        else:
-            remove(Path(entry.path))
-    return intact
-
-
-def remove(folder: Path) -> None:
-    """Remove a folder as far as possible."""
-    with contextlib.suppress(OSError):
-        folder.chmod(0o700)
-    shutil.rmtree(folder, ignore_errors=True)

@@ -1,8 +1,8 @@
 """Digests of the tool: of its code, its templates and what it bundles.
 
-A digest covers the packages that the tool and its features may import, by name and version. Of
-files it covers sizes and times, so that none has to be read; a tool that was installed again
-therefore makes everything again, even if it is the same.
+A digest covers all packages that are installed beside the tool, by name and version: any of them
+may be imported. Of files it covers sizes and times, so that none has to be read; a tool that was
+installed again therefore makes everything again, even if it is the same.
 """
 
 from __future__ import annotations
@@ -11,14 +11,13 @@ import contextlib
 import functools
 import hashlib
 import os
-import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from coursebuild.core.files.errors import EffectError, reason
 from coursebuild.core.files.resources import assets_dir, templates_dir
-from coursebuild.core.registry import feature_packages, features_digest
+from coursebuild.core.registry import features_digest
 from coursebuild.core.values import fingerprint
 
 _CORE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH100, PTH120
@@ -26,8 +25,7 @@ _CORE = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))  # noqa: PTH
 
 def tool_digest() -> str:
     """A hash over everything that the tool consists of, including Python and others' features."""
-    parts = _tool(), features_digest(), *package_versions(*feature_packages(), tuple(sys.path))
-    return hashlib.sha256("\0".join(parts).encode("utf-8", "surrogateescape")).hexdigest()
+    return hashlib.sha256(f"{_tool()} {features_digest()}".encode()).hexdigest()
 
 
 @functools.cache
@@ -41,71 +39,20 @@ def typesetter_digest() -> str:
     return _digest(str(assets_dir() / "temml"), os.path.join(_CORE, "run"))  # noqa: PTH118
 
 
-@functools.lru_cache(maxsize=8)
-def package_versions(
-    names: frozenset[str], modules: frozenset[str], path: tuple[str, ...]
-) -> tuple[str, ...]:
-    """The names and versions of packages and of all that they need, from their `.dist-info`.
-
-    Given are the names of some, and modules that others hold. Without a package of a name, as where
-    the tool was never installed, all installed ones count.
-    """
-    folders: dict[str, str] = {}  # by name of the package
-    for folder in path:
+@functools.cache
+def _packages() -> tuple[str, ...]:
+    """The installed packages by name and version, as their `.dist-info` is called."""
+    names: list[str] = []
+    for folder in sys.path:
         with contextlib.suppress(OSError):
-            for entry in sorted(os.listdir(folder or ".")):  # noqa: PTH208
-                if entry.endswith(".dist-info"):
-                    name = _normalize(entry.partition("-")[0])
-                    folders.setdefault(name, os.path.join(folder, entry))  # noqa: PTH118
-    pending = [(_normalize(name), frozenset[str]()) for name in names]
-    if not all(name in folders for name, _ in pending):
-        return tuple(sorted(os.path.basename(folder) for folder in folders.values()))  # noqa: PTH119
-    foreign_modules = modules - sys.stdlib_module_names
-    for name, folder in folders.items() if foreign_modules else ():
-        record = "\n" + "".join(_lines_of(f"{folder}/RECORD"))
-        if any(f"\n{module}{end}" in record for module in foreign_modules for end in "/."):
-            pending.append((name, frozenset()))
-    extras_by_name: dict[str, frozenset[str]] = {}
-    while pending:
-        name, extras = pending.pop()
-        if name in extras_by_name and extras <= extras_by_name[name]:
-            continue
-        extras = extras_by_name[name] = extras | extras_by_name.get(name, frozenset())
-        # Markers of systems do not matter: what they exclude is not installed.
-        for line in _lines_of(f"{folders[name]}/METADATA") if name in folders else ():
-            if line == "\n":  # a description follows
-                break
-            if (match := _REQUIREMENT.match(line)) is not None:
-                for_extras = {_normalize(extra) for extra in _EXTRA.findall(match[3])}
-                if not for_extras or for_extras & extras:
-                    asked_extras = map(_normalize, re.findall(r"[\w.-]+", match[2] or ""))
-                    pending.append((_normalize(match[1]), frozenset(asked_extras)))
-    # One that is missing may be installed next.
-    places = (folders.get(name, name) for name in sorted(extras_by_name))
-    return tuple(map(os.path.basename, places))
-
-
-def _normalize(name: str) -> str:
-    return re.sub(r"[-_.]+", "-", name).lower()
-
-
-_REQUIREMENT = re.compile(r"Requires-Dist: *([\w.-]+) *(?:\[([^\]]*)\])?(.*)")
-_EXTRA = re.compile(r"""\bextra *== *["']([\w.-]+)["']""")
-
-
-def _lines_of(path: str) -> Iterator[str]:
-    with (
-        contextlib.suppress(OSError),
-        open(path, encoding="utf-8", errors="surrogateescape") as file,  # noqa: PTH123
-    ):
-        yield from file
+            entries = sorted(os.listdir(folder or "."))  # noqa: PTH208
+            names += (name for name in entries if name.endswith(".dist-info"))
+    return tuple(names)
 
 
 def _digest(*folders: str) -> str:
-    own_packages = package_versions(frozenset({"coursebuild"}), frozenset(), tuple(sys.path))
-    versions = (sys.version, *own_packages, "")
     lines = (line for folder in folders for line in _lines(folder, ""))
-    text = "\0".join(versions) + "".join(lines)
+    text = "\0".join((sys.version, *_packages(), *lines))
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
@@ -119,7 +66,7 @@ def _lines(folder: str, inner: str) -> Iterator[str]:
                 yield from _lines(entry.path, name)
         elif not entry.name.endswith((".pyc", "~")):
             status = entry.stat()
-            yield f"{name}\0{status.st_size}\0{status.st_mtime_ns}\0"
+            yield f"{name}\0{status.st_size}\0{status.st_mtime_ns}"
 
 
 def step_key(name: str, *values: object) -> str:

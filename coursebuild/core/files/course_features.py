@@ -5,7 +5,6 @@ Whoever loads them has to know that this code may run: see `pipeline.load`.
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import hashlib
 import sys
@@ -25,7 +24,6 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
     """Load the features of a course into this process; return diagnostics about them."""
     features: list[Feature] = []
     diagnostics: list[Diagnostic] = []
-    imports: set[str] = set()
 
     def tell(entry: NamedPath, message: str, mend: str = "correct the file") -> None:
         help = f"{mend}, or take it out of `features` in the map"
@@ -37,12 +35,6 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
         except EffectError as error:
             tell(entry, error.message, "write it, as `coursebuild new feature NAME` does")
             continue
-        with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
-            for node in ast.walk(ast.parse(code, "")):
-                if isinstance(node, ast.Import):
-                    imports.update(alias.name.partition(".")[0] for alias in node.names)
-                elif isinstance(node, ast.ImportFrom) and node.module:
-                    imports.add(node.module.partition(".")[0])
         # An unchanged file is not run again: that would define its classes anew, and blocks read
         # earlier would no longer be instances of them.
         last = _last.get(entry.path)
@@ -55,9 +47,7 @@ def load_course_features(root: Path, course: Course) -> tuple[Diagnostic, ...]:
             tell(entry, f"{entry.path}: {reason}")
         else:
             features.append(feature)
-    use_course_features(
-        features, features_digest(root, course) if course.features else "", frozenset(imports)
-    )
+    use_course_features(features, features_digest(root, course) if course.features else "")
     return tuple(diagnostics)
 
 

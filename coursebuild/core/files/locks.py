@@ -222,8 +222,10 @@ def remove_abandoned_folders() -> None:
                     remove_folder(entry.path)
 
 
-def remove_folder(folder: str) -> None:
-    """Remove a temporary folder, even if a script has removed permissions in it."""
+def remove_folder(folder: str | Path) -> None:
+    """Remove a folder, even if permissions are missing in it; of a link, the link alone."""
+    if Path(folder).is_symlink():
+        Path(folder).unlink()
     shutil.rmtree(folder, ignore_errors=True)
     with contextlib.suppress(OSError):
         for parent, _, _ in os.walk(folder):

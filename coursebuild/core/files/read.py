@@ -4,7 +4,7 @@ Lessons, pages and models are decoded as strict UTF-8. Line ends and byte order 
 edits by offset change no other byte. A file that cannot be read becomes a diagnostic. One that is
 not UTF-8 still becomes a source, with U+FFFD for the wrong bytes, so that its other mistakes are
 found in the same run; since it differs from the file, no edit can be written back over that. A file
-that is no text at all, or is in UTF-16, is nothing else: any mistake found in it would be noise.
+with a NUL byte as well is no text, nor is one in UTF-16: what else is found in it would be noise.
 """
 
 from __future__ import annotations
@@ -27,8 +27,6 @@ from coursebuild.core.text.source import Source
 
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 """Byte order marks."""
-_MAX_NUL_SHARE = 0.1
-"""The share of NUL bytes that a text may have: a stray one is shown as U+FFFD, as in CommonMark."""
 _MOST_LINKED = 10_000
 """Links, and files and folders behind them: a few links among folders can make endless paths."""
 _OUTSIDE_REASON = "is reached through a link that leads out of the project"
@@ -262,29 +260,16 @@ class _Reader:
         return tuple(sources)
 
     def _decode(self, path: str, data: bytes) -> Source | None:
-        is_text = not data.startswith(_UTF16) and data.count(0) <= len(data) * _MAX_NUL_SHARE
-        # Text with many zeros is not text, even if it is UTF-8.
-        position, problem = -1 if is_text else data.find(b"\0"), "is not text"
         try:
-            text = data.decode("utf-8")
+            return Source(path, data.decode("utf-8"))
         except UnicodeDecodeError as error:
-            text, position, problem = data.decode("utf-8", "replace"), error.start, "is not UTF-8"
-            is_text = is_text and b"\0" not in data
-        source = Source(path, text)
-        if position >= 0:
-            at = len(data[:position].decode("utf-8"))
-            # Latin UTF-16 without a byte order mark: every other byte is zero.
-            least, most = sorted((data[:1024:2].count(0), data[1:1024:2].count(0)))
-            guess = "may be Latin-1 or Windows-1252"
-            if data.startswith(_UTF16) or (least == 0 and most > len(data[:1024]) // 4):
-                guess = "looks like UTF-16"
-            elif b"\0" in data:
-                guess = "looks like a binary file"
-            message = f"byte 0x{data[position]:02x} {problem}"
-            help = f"save the file as UTF-8; it {guess}"
-            place = source.span(at, at + 1)
-            self.diagnostics.append(diagnose("file-encoding", place, message, help=help))
-        if is_text:
+            position = error.start
+        source = Source(path, data.decode("utf-8", "replace"))
+        at = len(data[:position].decode("utf-8"))
+        message, help = f"byte 0x{data[position]:02x} is not UTF-8", "save the file as UTF-8"
+        place = source.span(at, at + 1)
+        self.diagnostics.append(diagnose("file-encoding", place, message, help=help))
+        if b"\0" not in data and not data.startswith(_UTF16):
             return source
         self.unreadable.append(path)
         return None

@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from msgspec import Struct
+from msgspec.structs import asdict
 
 from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.store import Store
@@ -94,15 +95,8 @@ class Runner(Struct, frozen=True):
 
     def _run(self, job: AloneJob) -> AloneRun:
         mark = secrets.token_hex()
-        request = {
-            "files": {path: base64.b64encode(data).decode() for path, data in job.files},
-            "path": job.path,
-            "arguments": job.arguments,
-            "figures": job.figures,
-            "modules": job.modules,
-            "memory": job.memory,
-            "mark": mark,
-        }
+        files = {path: base64.b64encode(data).decode() for path, data in job.files}
+        request = asdict(job) | {"files": files, "mark": mark}
         environment = {**clean_environment(os.environ), **dict(job.environment)}
         enclose: gate.Enclose | None = None
         if self.interpreter is not None:

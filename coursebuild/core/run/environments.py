@@ -40,7 +40,6 @@ from coursebuild.core.files.locks import folder_lock
 from coursebuild.core.files.resources import locked_requirements
 from coursebuild.core.files.trust import TEMPORARY, state_folder
 from coursebuild.core.run import gate
-from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.script_environment import (
     Interpreter,
     conditions,
@@ -48,6 +47,7 @@ from coursebuild.core.run.script_environment import (
     installed_distributions,
     package_version,
     python_version,
+    site_folders,
 )
 
 _FOLDER = "environments"

@@ -138,7 +138,7 @@ class _Watch:
                 self._note_once(data, kind, "")
         if not all(finite(values).all() for values in (data.qpos, data.qvel, data.act)):
             self._note_once(data, "state", "")
-        elif data.ncon and hasattr(data, "model"):
+        elif data.ncon:
             self._check_contacts(data)
 
     def _check_contacts(self, data: Any) -> None:
@@ -231,8 +231,6 @@ def _count_references(data_by_id: Mapping[int, object], key: int) -> int:
 
 
 def _name(data: Any) -> str:
-    if not hasattr(data, "model"):  # before MuJoCo 3.1
-        return ""
     name = str(data.model.names.partition(b"\0")[0], "utf-8", "replace")
     return "" if name == _DEFAULT_MODEL_NAME else name
 

@@ -31,9 +31,13 @@ from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run import dependencies as needs
 from coursebuild.core.run import run_record
 from coursebuild.core.run.dependencies import Dependency, Inputs, Kind, Need
-from coursebuild.core.run.packages import InstalledPackages
 from coursebuild.core.run.run_record import STORABLE_OUTCOMES, RunRecord
-from coursebuild.core.run.script_environment import Interpreter, conditions, places
+from coursebuild.core.run.script_environment import (
+    InstalledPackages,
+    Interpreter,
+    conditions,
+    places,
+)
 from coursebuild.core.run.stat_tracing import existence, status
 
 _RESULTS, _LAST = "scripts", "lastruns"

@@ -31,8 +31,7 @@ from msgspec import Struct
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob, Trace
 from coursebuild.core.run import gate
-from coursebuild.core.run.packages import site_folders
-from coursebuild.core.run.script_environment import Interpreter, library_folder
+from coursebuild.core.run.script_environment import Interpreter, library_folder, site_folders
 from coursebuild.core.run.script_worker import (
     PROCESSES,
     START,

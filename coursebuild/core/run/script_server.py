@@ -21,13 +21,12 @@ from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Self, TypeAlias
 
-from msgspec.structs import replace
+from msgspec.structs import asdict, replace
 
 from coursebuild.core.files.errors import EffectError, lacking
 from coursebuild.core.files.locks import temporary_folder
 from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun
 from coursebuild.core.run.gate import Enclose
-from coursebuild.core.run.packages import site_folders
 from coursebuild.core.run.run_record import read_records
 from coursebuild.core.run.sandbox import (
     Sandbox,
@@ -40,9 +39,9 @@ from coursebuild.core.run.script_environment import (
     Interpreter,
     clean_environment,
     library_folder,
+    site_folders,
     wanted_packages,
 )
-from coursebuild.core.run.script_process import Job
 from coursebuild.core.run.script_worker import Worker
 from coursebuild.core.run.watching import STDERR_KEPT
 
@@ -252,26 +251,15 @@ class _Work:
         if index not in self.announced_jobs:
             self.announced_jobs.add(index)
             self.on_start(job.path)
-        request: Job = {
+        request = asdict(job) | {  # a `script_process.Job`
             "root": str(self.root),
-            "path": job.path,
-            "args": list(job.args),
-            "timeout": job.timeout,
-            "requires": list(job.requires),
-            "packages": list(self.packages),
+            "packages": self.packages,
             "environment": self.environment,
             "scratch": self.scratch,
             "library": self.library,
             "folders": [f"{self.root}/{folder}" for folder in job.packages],
             "writes": [f"{self.root}/{folder}" for folder in job.writes],
             "copies": self.copies,
-            "figures": list(job.figures),
-            "part_lines": list(job.part_lines),
-            "part_mark": "",
-            "keeps_going": job.keeps_going,
-            "commands": [list(command) for command in job.commands],
-            "perturbation": job.perturbation,
-            "memory": job.memory,
         }
         worker.give(index, json.dumps(request).encode())
 

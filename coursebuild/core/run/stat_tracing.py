@@ -20,7 +20,7 @@ import sys
 from collections.abc import Callable, Mapping
 from stat import S_IMODE, S_ISDIR, S_ISLNK, S_ISREG
 from types import FrameType
-from typing import Any, Protocol
+from typing import Any
 
 _OF_KIND = frozenset(
     "exists lexists isfile isdir islink ismount isjunction samefile realpath _joinrealpath"
@@ -31,18 +31,6 @@ _OF_KIND = frozenset(
 `shutil`, `glob`, and `linecache`, which reads the file as well."""
 _PASSING = ("stat", "lstat", "readlink")
 """Methods of `pathlib` that give all to their caller."""
-
-
-class Asker(Protocol):
-    """What takes the notes: a `tracing.Tracer`."""
-
-    root: str
-
-    def note_question(self, kind: str, path: object, answer: Callable[[str], str]) -> None:
-        """Note what was asked about a path, and how that is answered."""
-
-    def note_read(self, path: object) -> None:
-        """Note that the answer depends on the content."""
 
 
 def existence(path: str) -> str:
@@ -71,10 +59,15 @@ def status(path: str) -> str:
 
 
 class QuestionNotes:
-    """Wraps the functions, and notes what is asked, each question once."""
+    """Wraps the functions, and notes what is asked, each question once; see `tracing.Tracer`."""
 
-    def __init__(self, tracer: Asker) -> None:
-        self._tracer = tracer
+    def __init__(
+        self,
+        root: str,
+        note_question: Callable[[str, object, Callable[[str], str]], None],
+        note_read: Callable[[object], None],
+    ) -> None:
+        self._root, self._note_question, self._note_read = root, note_question, note_read
         self._noted_keys: set[tuple[object, ...]] = set()
 
     def install(self) -> None:
@@ -129,7 +122,7 @@ class QuestionNotes:
     ) -> None:
         frame: FrameType | None = sys._getframe(2)
         assert frame is not None
-        code, root = frame.f_code, self._tracer.root
+        code, root = frame.f_code, self._root
         key = path, name, args, code.co_name, code.co_filename
         while code.co_name in _PASSING and not code.co_filename.startswith(root):
             frame = frame.f_back
@@ -146,8 +139,8 @@ class QuestionNotes:
         mode = keywords.get("mode", *args[:1]) if name == "access" else None
         is_library = not code.co_filename.startswith(root)
         if is_library and code.co_name == "getsize":
-            self._tracer.note_read(full_path)
+            self._note_read(full_path)
         elif name == "readlink" or mode == posix.F_OK or (is_library and code.co_name in _OF_KIND):
-            self._tracer.note_question("e", full_path, existence)
+            self._note_question("e", full_path, existence)
         else:
-            self._tracer.note_question("t", full_path, status)
+            self._note_question("t", full_path, status)

@@ -124,7 +124,7 @@ class Tracer:
         self._is_spilling = False
         self._opened: set[object] = set()
         self._written_paths: set[str] = set()
-        self._questions = QuestionNotes(self)
+        self._questions = QuestionNotes(self.root, self.note_question, self.note_read)
         self._asked_paths: set[str] = set()
         self._figures = frozenset(f"{self.root}{name}" for name in figures)
         self._noted_records: set[str] = set()

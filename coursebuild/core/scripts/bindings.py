@@ -36,11 +36,10 @@ from coursebuild.core.scripts.bound_places import (
 )
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.lines import plain_text
-from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body, recording_key
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_key
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, describe_line
 from coursebuild.core.scripts.table_cells import row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose, did_you_mean
-from coursebuild.core.text.near import nearest
 from coursebuild.core.text.numbers import Number, difference, join_thousands
 from coursebuild.core.text.quantities import with_unit
 
@@ -75,7 +74,7 @@ def check_bindings(
     for binding, value in bound_values(document, outputs):
         diagnostic, places = _check(BoundNumber(binding, outputs, addresses.get(value, ())))
         if diagnostic is not None:
-            diagnostics.append(_with_likely_scripts(document, binding, outputs, diagnostic))
+            diagnostics.append(_with_likely_script(document, binding, outputs, diagnostic))
         at = tuple(address for place in places if (address := place.address) is not None)
         if at and len(at) == len(places):
             addresses[value] = tuple(dict.fromkeys(at))
@@ -86,43 +85,29 @@ def check_bindings(
     return tuple(diagnostics)
 
 
-def _with_likely_scripts(
+def _with_likely_script(
     document: model.Document,
     binding: model.NumberBinding,
     outputs: PrintedOutputs,
     finding: Diagnostic,
 ) -> Diagnostic:
-    """A diagnostic that also says which other output or script may be meant."""
+    """A diagnostic that also says which other output has the number, if one alone does."""
     is_open = finding.rule == "binding-mismatch" and not finding.help
-    if is_open and binding.script is None and not binding.words:
-        text = BoundText.of(binding.text, binding.comma)
-        paths = {
-            verdict.recording.script or ""
-            for verdict in outputs.of_document(document)
-            if verdict.recording.span.start < binding.span.start
-            and verdict.comparison.mode is not model.Mode.VOLATILE
-            and text.is_in([outputs.text(verdict)])
-        }
-        if len(paths) == 1:
-            path = paths.pop()
-            help = f"an output further up has it: write `{{out={path}}}`"
-            return replace(finding, help=help, edits=mark_edits(binding, path))
-    verdicts = [] if binding.script is not None else outputs.of_binding(binding)
-    start = end_of_body(verdicts[0]) if verdicts else binding.span.start
-    scripts = [  # between it and the output further up that it depends on
-        script
-        for script in model.document_scripts(document)
-        if start < script.span.start < binding.span.start
-    ]
-    if is_open and scripts:
-        help = f"if `{scripts[-1].path}` prints it, record its output above the number"
-        return replace(finding, help=help)
-    if binding.script is not None and binding.script not in outputs.scripts:
-        likely = nearest(binding.script, outputs.scripts)
-        places = (s.span for s in model.document_scripts(document) if s.path == likely)
-        notes = (Note(f"`{likely}` is here", place.first_line()) for place in places)
-        return replace(finding, notes=(*finding.notes, *notes))
-    return finding
+    if not is_open or binding.script is not None or binding.words:
+        return finding
+    text = BoundText.of(binding.text, binding.comma)
+    paths = {
+        verdict.recording.script or ""
+        for verdict in outputs.of_document(document)
+        if verdict.recording.span.start < binding.span.start
+        and verdict.comparison.mode is not model.Mode.VOLATILE
+        and text.is_in([outputs.text(verdict)])
+    }
+    if len(paths) != 1:
+        return finding
+    path = paths.pop()
+    help = f"an output further up has it: write `{{out={path}}}`"
+    return replace(finding, help=help, edits=mark_edits(binding, path))
 
 
 def _check(bound: BoundNumber) -> tuple[Diagnostic | None, Sequence[PrintedPlace]]:

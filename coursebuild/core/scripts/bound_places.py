@@ -9,6 +9,9 @@
    not of one quantity.
 3. Recorded text decides, whatever this run printed. The run counts where recorded text leaves
    things out (`...`, tables), and for a number that is not in a text that has drifted.
+4. A number that nothing binds is proposed to be bound (`find_printed`) where a printed one, rounded
+   to its digits, is the same, and is near in words: their sentences share one, or their units are
+   the same. This is likely only: nothing is written but what a human accepts.
 """
 
 from __future__ import annotations
@@ -24,13 +27,13 @@ from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Address, Addresses, ShownValue, shown_values
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import BoundText
-from coursebuild.core.scripts.column_titles import ColumnTitle
 from coursebuild.core.scripts.lines import plain_text
-from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, masked
-from coursebuild.core.scripts.table_cells import row_values
-from coursebuild.core.text.diagnostics import Edit, Note
-from coursebuild.core.text.quantities import unit_behind, unit_of_label
+from coursebuild.core.scripts.table_cells import ColumnTitle, row_values
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
+from coursebuild.core.text.quantities import is_same_unit, unit_behind, unit_of_label
+from coursebuild.core.text.source import Span
 
 
 def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ...]:
@@ -301,3 +304,73 @@ _LINE_END = re.compile(r"(?<!\n)\n[ \t>]*(?!\n)")
 def _find(address: Address, outputs: Iterable[PrintedText], count: int) -> PrintedPlace | None:
     places = (output.find(address, count) for output in outputs)
     return next((place for place in places if place is not None), None)
+
+
+_WORD = re.compile(r"[^\W\d_]{4,}")
+_SENTENCE_END = re.compile(r"(?<=[.!?:])\s+(?=[^\W\d_a-z])|\n\s*\n|\n(?=[-*|>#])")
+
+
+def find_printed(
+    diagnostic: Diagnostic, document: model.Document, outputs: PrintedOutputs
+) -> Diagnostic:
+    """Return the diagnostic of an unbound number with the edit that binds it."""
+    span = diagnostic.span
+    texts = model.find_inlines(document, model.Text)
+    if not any(text.span.contains(span) for text in texts):  # in a formula, in code
+        return diagnostic
+    bound = BoundText.of(span.text, document.comma)
+    if len(bound.numbers) != 1:
+        return diagnostic
+    before, after = _sentence(span)
+    verdicts = outputs.of_document(document)
+    above = [verdict for verdict in verdicts if end_of_body(verdict) <= span.start]
+    groups: list[tuple[str, Sequence[Verdict]]] = [("", above[-1:])]
+    paths = dict.fromkeys(v.recording.script or "" for v in (*reversed(above), *verdicts))
+    groups += ((path, [v for v in verdicts if v.recording.script == path]) for path in paths)
+    for path, group in groups:
+        printed = list(map(outputs.text, group))
+        places = bound.candidates(printed, after)
+        near_places = [p for p in places if _is_near(p, before, after)]
+        if not near_places:
+            continue
+        place = max(near_places, key=lambda p: len(_words(_context(p)) & _words(before + after)))
+        if target := _target(path, place, places):
+            script = path or group[0].recording.script
+            help = f"`{script}` printed it: `{plain_text(place.line.text)}`"
+            edits = (Edit(span, f"`{span.text}`{target}"),)
+            return replace(diagnostic, help=f"{help}; write `` {edits[0].text} ``", edits=edits)
+    return diagnostic
+
+
+def _target(path: str, place: PrintedPlace, places: Sequence[PrintedPlace]) -> str:
+    """The attribute that binds a number to a printed one; empty where none tells it from others."""
+    quantities = {rival.quantity() for rival in places}
+    words = ""
+    if len(places) > 1 and len(quantities) > 1:
+        words = place.output.words_before(place, places)
+        if not words or "`" in words:  # which would begin code
+            return ""
+    value = " ".join((*([path] if path else []), *([f'"{words}"'] if words else [])))
+    return f"{{out={value}}}" if value else "{out}"
+
+
+def _sentence(span: Span) -> tuple[str, str]:
+    """What stands before and behind a number in its sentence."""
+    text = span.source.text
+    before = _SENTENCE_END.split(text[max(0, span.start - 400) : span.start])[-1]
+    return before, _SENTENCE_END.split(text[span.end : span.end + 400])[0]
+
+
+def _words(text: str) -> set[str]:
+    return {word.casefold() for word in _WORD.findall(text)}
+
+
+def _context(place: PrintedPlace) -> str:
+    return f"{place.output.headings(place.at)} {place.output.heading(place.at)} {place.line.text}"
+
+
+def _is_near(place: PrintedPlace, before: str, after: str) -> bool:
+    unit = unit_behind(after)
+    if unit and is_same_unit(unit, place.units[-1]):
+        return True
+    return bool(_words(_context(place)) & _words(before + after))

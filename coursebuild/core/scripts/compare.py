@@ -8,7 +8,6 @@ in the lesson. An output that its lesson calls volatile may differ.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
@@ -18,18 +17,12 @@ from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Addresses
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
-from coursebuild.core.scripts.diff import (
-    find_differences,
-    number_change,
-    quote,
-    text_diff,
-    varying_times,
-)
+from coursebuild.core.scripts.diff import find_differences, number_change, quote, text_diff
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.table_cells import row_values
 from coursebuild.core.scripts.tables import RowAddresses, compare_table
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -216,16 +209,6 @@ def instability_diagnostic(
     if (rest := len(different_steps) - _MAX_NOTES) > 0:
         notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
     help = _TABLE_HELP if isinstance(recording.body, model.Table) else _HELP
-    if isinstance(recording.body, Excerpt) and (
-        pattern := varying_times(first, second, comparison)
-    ):
-        source, end = recording.body_span.source, recording.body_span.start - 1
-        start = source.line_starts[source.position(end)[0] - 1]
-        line = source.text[start:end].rstrip()
-        key = re.search(r'\svolatile="[^"]*"', line)
-        place = key.span() if key else (len(line), len(line))
-        edit = Edit(source.span(start + place[0], start + place[1]), f' volatile="{pattern}"')
-        help = Fix(f'a time varies: say `volatile="{pattern}"` on the fence', edits=(edit,))
     return diagnose(
         "output-unstable",
         recording.caption_span,

@@ -27,7 +27,6 @@ from typing import TypeVar
 
 from coursebuild.core import model
 from coursebuild.core.scripts.align import StepKind, align, same_lines
-from coursebuild.core.scripts.column_titles import HEADER_HELP
 from coursebuild.core.scripts.failures import without_indentation
 from coursebuild.core.scripts.fill_table import fill_table
 from coursebuild.core.scripts.lines import (
@@ -38,7 +37,7 @@ from coursebuild.core.scripts.lines import (
     same_number,
 )
 from coursebuild.core.scripts.module_code import DEFINITIONS, first_line
-from coursebuild.core.scripts.table_cells import number_text, table_rows
+from coursebuild.core.scripts.table_cells import HEADER_HELP, number_text, table_rows
 from coursebuild.core.scripts.tables import RowAddresses, TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import point_decimals, write_comma

@@ -27,13 +27,12 @@ from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun
 from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
 from coursebuild.core.scripts.bound_places import BoundNumber, document_bindings
-from coursebuild.core.scripts.column_titles import HEADER_HELP
 from coursebuild.core.scripts.compare import compare, instability_diagnostic
 from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, Side
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.table_cells import cell_text, table_rows
+from coursebuild.core.scripts.table_cells import HEADER_HELP, cell_text, table_rows
 from coursebuild.core.scripts.tables import TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance

@@ -24,9 +24,8 @@ from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.model.lesson_record import Address
-from coursebuild.core.scripts.column_titles import ColumnTitle
 from coursebuild.core.scripts.lines import MARK, MappedText, Side, canonicalize, plain_text
-from coursebuild.core.scripts.table_cells import RowCell, table_rows
+from coursebuild.core.scripts.table_cells import ColumnTitle, RowCell, table_rows
 from coursebuild.core.text.numbers import Number, has_groups, point_decimals, scan
 from coursebuild.core.text.quantities import (
     UnitText,

@@ -26,12 +26,6 @@ from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Address
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, pair
-from coursebuild.core.scripts.column_titles import (
-    ColumnTitle,
-    PrintedName,
-    misplaced_titles,
-    words_of,
-)
 from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
     MARK,
@@ -42,15 +36,19 @@ from coursebuild.core.scripts.lines import (
 )
 from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import (
+    ColumnTitle,
     Fit,
     LineLayout,
+    PrintedName,
     RowCell,
     cell_matches,
     elides_rows,
     find_rows,
+    misplaced_titles,
     number_text,
     row_text,
     table_rows,
+    words_of,
 )
 from coursebuild.core.text.numbers import Number, relative_error
 from coursebuild.core.text.quantities import UnitText, are_different

@@ -21,8 +21,15 @@ from coursebuild.core.syntax.attributes import (
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.syntax.html import LITERAL, Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_parser import inline_tokens
-from coursebuild.core.syntax.link_targets import check_link_text, check_scheme, classify
-from coursebuild.core.syntax.mentions import TextPiece, link_mentions, may_mention, text_inlines
+from coursebuild.core.syntax.link_targets import (
+    TextPiece,
+    check_link_text,
+    check_scheme,
+    classify,
+    link_mentions,
+    may_mention,
+    text_inlines,
+)
 from coursebuild.core.syntax.other_tools import check_marks
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken

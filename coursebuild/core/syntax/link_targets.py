@@ -1,25 +1,38 @@
-"""Targets of links, as an address names them; only some schemes are safe on a page."""
+"""Targets of links, as an address or a mention names them.
+
+1. Of addresses only some schemes are safe on a page.
+2. Mentions of lessons and levels, as in "Lesson 2.2", become links. Text and soft line ends that
+   follow each other make one run, as a mention may be broken over two lines.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
+from itertools import groupby
+from typing import NamedTuple
 from urllib.parse import unquote
 
 from coursebuild.core.model import (
     ExampleTarget,
     Inline,
     LessonTarget,
+    LevelTarget,
+    Link,
     ModelTarget,
     PageTarget,
+    SoftBreak,
     Target,
     TermTarget,
+    Text,
     UrlTarget,
 )
+from coursebuild.core.model.course import Words
 from coursebuild.core.model.inlines import LABEL_KINDS
 from coursebuild.core.syntax.attributes import term_id
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.source import Excerpt, Span
 
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
 _FORBIDDEN_SCHEMES = frozenset({"data", "file", "javascript", "vbscript"})
@@ -89,3 +102,82 @@ def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> D
         message, help = "this link has no text, so no reader sees it", "write one in the brackets"
         return diagnose("link-text", span, message, help=help)
     return None
+
+
+_LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"
+_LEVEL = r"[0-9]+(?:\.[0-9]+)*(?!\w)"
+
+_NUMBER = re.compile(r"[0-9.]*[0-9]")
+
+
+class TextPiece(NamedTuple):
+    """A stretch of text in a block's content, or a soft line end (`text` is a line feed)."""
+
+    text: str
+    start: int
+    end: int
+    literal: bool = True
+    """Whether each character stands for itself; not so for entities and escapes."""
+
+
+def may_mention(text: str, words: Words) -> bool:
+    """Whether a text is worth searching for mentions."""
+    return any(word in text for names in _mention_names(words) for word in names)
+
+
+def _mention_names(words: Words) -> tuple[tuple[str, ...], ...]:
+    return words.lesson, words.lessons, words.level, words.levels
+
+
+@lru_cache(maxsize=8)
+def _mentions(words: Words) -> re.Pattern[str]:
+    """The pattern of mentions; its group is there if they are of lessons."""
+    lesson, lessons, level, levels, conjunctions = (
+        "|".join(map(re.escape, names)) for names in (*_mention_names(words), words.conjunctions)
+    )
+    # Arabic writes "and" and the number without a space.
+    joint = rf"(?:[,،]?\s+(?:{conjunctions})\s*|[,،]\s+|\s?[–-]\s?)"
+    return re.compile(
+        r"(?<![\w\\])(?:"
+        rf"((?:{lesson})\s+{_LESSON}|(?:{lessons})\s+{_LESSON}(?:{joint}{_LESSON})*)"
+        rf"|(?:{level})\s+{_LEVEL}|(?:{levels})\s+{_LEVEL}(?:{joint}{_LEVEL})*)"
+    )
+
+
+def text_inlines(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
+    """The run as texts and soft line ends."""
+    inlines: list[Inline] = []
+    for is_line_end, group in groupby(run, key=lambda piece: piece.text == "\n"):
+        pieces = [*group]
+        if is_line_end:
+            inlines += [SoftBreak(content.span(piece.start, piece.end)) for piece in pieces]
+        else:
+            span = content.span(pieces[0].start, pieces[-1].end)
+            inlines.append(Text(span, "".join([piece.text for piece in pieces])))
+    return inlines
+
+
+def link_mentions(run: Sequence[TextPiece], content: Excerpt, words: Words) -> list[Inline]:
+    """The run as texts, soft line ends, and links where it mentions lessons and levels."""
+    chars = [
+        TextPiece(char, piece.start + i, piece.start + i + 1)
+        if piece.literal
+        else piece._replace(text=char)
+        for piece in run
+        for i, char in enumerate(piece.text)
+    ]
+    text = "".join([char.text for char in chars])
+    inlines: list[Inline] = []
+    position = 0
+    for mentions in _mentions(words).finditer(text):
+        for number in _NUMBER.finditer(text, *mentions.span()):
+            is_first = position <= mentions.start()  # its link includes the word
+            start, end = mentions.start() if is_first else number.start(), number.end()
+            inlines += text_inlines(chars[position:start], content)
+            target = LessonTarget(number[0], None) if mentions[1] else LevelTarget(number[0])
+            children = text_inlines(chars[start:end], content)
+            span = content.span(chars[start].start, chars[end - 1].end)
+            place = content.span(chars[number.start()].start, chars[end - 1].end)
+            inlines.append(Link(span, target, place, "", tuple(children), mention=True))
+            position = end
+    return inlines + text_inlines(chars[position:], content)

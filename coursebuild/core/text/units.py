@@ -366,17 +366,16 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
         return
     for match in re.finditer(_WORD, unit.text):
         word = match[0]
-        if find_symbol(word) or {word, NAMES.get(word)} & {*UNITS, *PER}:
+        if find_symbol(word) or word in (*UNITS, *NAMES, *PER):
             continue
         units = (unit for unit in COMMON if unit.casefold() == word.casefold())
         pairs = ((first, word.removeprefix(first)) for first in _PRODUCT_UNITS)
         products = (f"{a} {b}" for a, b in pairs if b != word and b in _PRODUCT_UNITS)
-        likely = next(units, "") or next(products, "")
-        likely = likely or nearest(word, (*COMMON, *NAMES)) or ""
-        likely = NAMES.get(likely, likely)
+        likely = next(units, None) or next(products, None) or nearest(word, (*COMMON, *NAMES))
         help = "leave it out, and name in words what is counted"
-        if likely:
-            help = Fix(f"did you mean `{likely}`?", likely, safe=NAMES.get(word) == likely)
+        if likely is not None:
+            likely = NAMES.get(likely, likely)
+            help = Fix(f"did you mean `{likely}`?", likely)
         message = f"there is no unit `{word}`"
         yield diagnose("unit-unknown", unit.span(*match.span()), message, help=help)
 

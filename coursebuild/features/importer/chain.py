@@ -10,8 +10,8 @@ from itertools import chain
 from textwrap import shorten
 
 from coursebuild.api import Edit, Options, Recording, ScriptRun, Span, marks, model
-from coursebuild.core.run.packages import distributions
 from coursebuild.core.run.part_marks import FAILURE
+from coursebuild.core.run.script_environment import distributions
 from coursebuild.features.importer.commands.findings import Rank
 from coursebuild.features.importer.context import script_path_of
 from coursebuild.report.values import plural

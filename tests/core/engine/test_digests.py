@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-import shutil
+import sys
 import time
 from pathlib import Path
 
@@ -23,7 +23,7 @@ from coursebuild.core.engine.digests import (
     modules_in,
 )
 from coursebuild.core.engine.store import Store
-from coursebuild.core.engine.tool import code_digest, package_versions
+from coursebuild.core.engine.tool import code_digest
 
 
 def sha(data: bytes) -> str:
@@ -128,51 +128,11 @@ def test_it_depends_on_every_file_and_not_on_their_place(tmp_path: Path) -> None
     assert len(names) == 5
 
 
-def install(site: Path, name: str, version: str, *needs: str, files: str = "") -> None:
-    """Install a package as far as its metadata are concerned, in the place of another version."""
-    for old in site.glob(f"{name}-*.dist-info"):
-        shutil.rmtree(old)
-    folder = site / f"{name}-{version}.dist-info"
-    folder.mkdir(parents=True)
-    lines = [f"Name: {name}\n", *(f"Requires-Dist: {need}\n" for need in needs)]
-    text = "".join(lines) + "\nRequires-Dist: not-a-requirement\n"
-    (folder / "METADATA").write_text(text)
-    (folder / "RECORD").write_text(files)
-
-
-def test_packages_count_that_the_tool_or_a_feature_needs(tmp_path: Path) -> None:
-    site = tmp_path / "site-packages"
-    path = (str(tmp_path / "nowhere"), str(site))
-    tool_needs = ("Jinja2<4,>=3.1", "brotli ; extra == 'cache'", "Old_Name[fast] >= 2")
-    install(site, "coursebuild", "0.1.0", *tool_needs)
-    install(site, "jinja2", "3.1.6", "MarkupSafe>=2.0")
-    install(site, "markupsafe", "3.0.4", "jinja2")
-    install(site, "brotli", "1.2")
-    install(site, "old_name", "2.0", 'quick; extra == "fast"', "slow; extra == 'test'")
-    install(site, "quick", "1")
-    install(site, "slow", "1")
-    install(site, "mmdr", "0.4.0", "novasvg", files="mmdr/__init__.py,,\nre.py,,\n")
-    install(site, "black", "26.1", files="black/__init__.py,,\nblackd.py,,\n")
-    install(site, "mermaid_fences", "1.0", "mmdr==0.4.0")
-
-    def versions(*names: str, modules: tuple[str, ...] = ()) -> list[str]:
-        # A name of its own each time, so that nothing is remembered.
-        marks.append(str(tmp_path / str(len(marks))))
-        names_found = package_versions(frozenset(names), frozenset(modules), (*marks, *path))
-        return [name.removesuffix(".dist-info") for name in names_found]
-
-    marks: list[str] = []
-    own_packages = "coursebuild-0.1.0 jinja2-3.1.6 markupsafe-3.0.4 old_name-2.0 quick-1".split()
-    assert versions("coursebuild") == own_packages
-    install(site, "black", "26.2")
-    assert versions("coursebuild") == own_packages
-    install(site, "markupsafe", "3.0.5")
-    assert versions("coursebuild") == [part.replace("3.0.4", "3.0.5") for part in own_packages]
-    # Features of packages, and modules that those of a course import.
-    mermaid = ["mermaid_fences-1.0", "mmdr-0.4.0", "novasvg"]
-    assert versions("Mermaid.fences") == mermaid
-    assert versions(modules=("mmdr", "re", "coursebuild")) == mermaid[1:]
-    assert len(versions("not-installed")) == 10, "in doubt all count"
+def test_every_installed_package_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "path", [str(tmp_path / "nowhere"), str(tmp_path)])
+    for name in ("numpy-2.3.dist-info", "black-26.1.dist-info", "black"):
+        (tmp_path / name).mkdir()
+    assert tool._packages.__wrapped__() == ("black-26.1.dist-info", "numpy-2.3.dist-info")
 
 
 def test_content_counts_and_times_do_not(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The folder of the site before last saves work; what somebody changes in it is not published."""
+"""A site is made anew beside the old one, of which it keeps what did not change."""
 
 from __future__ import annotations
 
@@ -16,35 +16,25 @@ from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.engine.publish import publish
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
-from support.published_sites import SITE_FILES, SPARE, TEXTS, Pages, entries, texts
+from support.published_sites import SITE_FILES, TEXTS, Pages, entries, texts
+from support.published_sites import course as course
 from support.published_sites import pages as pages
 from support.published_sites import root as root
-from support.published_sites import spared as spared
 
 
-def test_what_did_not_change_is_neither_made_nor_linked(
-    spared: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    links: list[str] = []
-    really = os.link
-
-    def link(source: str, target: str, *, follow_symlinks: bool = True) -> None:
-        links.append(source.rpartition("public/")[2])
-        really(source, target, follow_symlinks=follow_symlinks)
-
-    monkeypatch.setattr(os, "link", link)
-    assert publish(spared, spared / "public", pages(**SITE_FILES | {"b__d": "2"})) == ("b/d.html",)
-    assert links == ["a.html"]  # which changed the time before
-    assert texts(spared / "public") == TEXTS | {"b/d.html": "b/d.html 2"}
-    assert texts(spared / SPARE) == TEXTS
-    assert publish(spared, spared / "public", pages(**SITE_FILES | {"b__d": "3"})) == ("b/d.html",)
-    assert links == ["a.html"]
+def test_what_did_not_change_is_not_made(course: Path, pages: Pages) -> None:
+    inode = (course / "public/a.html").stat().st_ino
+    for key in "23":
+        changed = pages(**SITE_FILES | {"b__d": key})
+        assert publish(course, course / "public", changed) == ("b/d.html",)
+        assert texts(course / "public") == TEXTS | {"b/d.html": f"b/d.html {key}"}
+    assert (course / "public/a.html").stat().st_ino == inode
     assert pages.made_paths == ["b/d.html", "b/d.html"]
-    assert entries(spared) == ["content", "public"]
+    assert entries(course) == ["content", "public"]
 
 
 @pytest.mark.site
-@pytest.mark.parametrize("way", ["slot", "fresh", "two renames"])
+@pytest.mark.parametrize("way", ["exchange", "two renames"])
 def test_a_long_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: str) -> None:
     """Edit after edit the site is what it should be, and only what changed is made."""
     chance = random.Random(7)
@@ -60,10 +50,6 @@ def test_a_long_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: st
         assert texts(tmp_path / "public") == {path: f"{path} {key}" for path, key in site.items()}
         assert (tmp_path / "public" / MARKER).read_text().split("\n")[1:-1] == sorted(site)
         assert all(any(p.iterdir()) for p in (tmp_path / "public").rglob("*") if p.is_dir())
-        if way == "fresh":
-            spare = tmp_path / SPARE
-            if spare.exists():
-                spare.rename(tmp_path / f"away{chance.random()}")
         before = dict(site)
         for name in chance.sample(sorted(site), chance.choice([0, 1, 1, 2])):
             if chance.random() < 0.3 and len(site) > 4:
@@ -72,48 +58,25 @@ def test_a_long_history(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, way: st
                 site[name] = str(chance.randrange(4))
 
 
-def test_two_places_have_one_spare(spared: Path, pages: Pages) -> None:
-    for key in "234":
-        for out in ("public", "other"):
-            publish(spared, spared / out, pages(**SITE_FILES | {"a": key}))
-            assert texts(spared / out) == TEXTS | {"a.html": f"a.html {key}"}
-    assert entries(spared) == ["content", "other", "public"]
-
-
-def test_a_place_on_another_file_system_than_the_course(
-    spared: Path, pages: Pages, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    really = Path.rename
-
-    def rename(path: Path, target: Path) -> Path:
-        if (".coursebuild" in path.parts) != (".coursebuild" in target.parts):
-            raise OSError(errno.EXDEV, os.strerror(errno.EXDEV))
-        return really(path, target)
-
-    monkeypatch.setattr(Path, "rename", rename)
-    for key in "23":
-        assert publish(spared, spared / "public", pages(**SITE_FILES | {"a": key})) == ("a.html",)
-        assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
-        assert entries(spared) == ["content", "public"]
-
-
-def test_a_failure_while_a_page_is_made_leaves_the_old_site(spared: Path, pages: Pages) -> None:
+def test_a_failure_while_a_page_is_made_leaves_the_old_site(course: Path, pages: Pages) -> None:
     def broken() -> bytes:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         publish(
-            spared, spared / "public", [*pages(**SITE_FILES), CachedFile("x.html", "2", broken)]
+            course,
+            course / "public",
+            [*pages(**SITE_FILES), CachedFile("x.html", "2", broken)],
         )
-    assert texts(spared / "public") == TEXTS
-    assert entries(spared) == ["content", "public"]
-    assert publish(spared, spared / "public", pages(**SITE_FILES | {"a": "2"})) == ("a.html",)
+    assert texts(course / "public") == TEXTS
+    assert entries(course) == ["content", "public"]
+    assert publish(course, course / "public", pages(**SITE_FILES | {"a": "2"})) == ("a.html",)
 
 
 @pytest.mark.parametrize("removes", [True, False])
-def test_somebody_changes_the_folder_that_is_written(spared: Path, removes: bool) -> None:
+def test_somebody_changes_the_folder_that_is_written(course: Path, removes: bool) -> None:
     def make() -> bytes:
-        slot = spared / ".public.coursebuild-new"
+        slot = course / ".public.coursebuild-new"
         if removes:
             (slot / "b/c.html").unlink()
         else:
@@ -122,13 +85,15 @@ def test_somebody_changes_the_folder_that_is_written(spared: Path, removes: bool
 
     pages = Pages()
     with pytest.raises(EffectError, match="another process is changing what is being written"):
-        publish(spared, spared / "public", [*pages(**SITE_FILES), CachedFile("x.html", "1", make)])
-    assert texts(spared / "public") == TEXTS
-    assert entries(spared) == ["content", "public"]
+        publish(course, course / "public", [*pages(**SITE_FILES), CachedFile("x.html", "1", make)])
+    assert texts(course / "public") == TEXTS
+    assert entries(course) == ["content", "public"]
     publish(
-        spared, spared / "public", [*pages(**SITE_FILES), CachedFile("x.html", "2", lambda: b"new")]
+        course,
+        course / "public",
+        [*pages(**SITE_FILES), CachedFile("x.html", "2", lambda: b"new")],
     )
-    assert texts(spared / "public") == TEXTS | {"x.html": "new"}
+    assert texts(course / "public") == TEXTS | {"x.html": "new"}
 
 
 def test_a_site_that_may_only_be_read_leaves_nothing_beside_it(held_back: Path) -> None:
@@ -139,7 +104,6 @@ def test_a_site_that_may_only_be_read_leaves_nothing_beside_it(held_back: Path) 
         publish(held_back, out, pages(**SITE_FILES | {"a": str(number)}))
         assert entries(held_back) == ["public"]
         assert texts(out) == TEXTS | {"a.html": f"a.html {number}"}
-        assert (held_back / SPARE).is_dir()
         assert out.stat().st_mode & 0o777 == 0o555
     assert pages.made_paths[len(SITE_FILES) :] == ["a.html"] * 3
     out.chmod(0o755)
@@ -221,66 +185,38 @@ def change_by_hand(file: Path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", BY_HAND)
-@pytest.mark.parametrize("place", [SPARE, "public"])
-def test_changes_by_hand(spared: Path, pages: Pages, kind: str, place: str) -> None:
-    out = spared / "public"
-    change_by_hand(spared / place / "b/c.html", kind)
+def test_changes_by_hand(course: Path, pages: Pages, kind: str) -> None:
+    out = course / "public"
+    change_by_hand(out / "b/c.html", kind)
     for path in out.rglob("*"):  # foreign files, which publishing would refuse
         if path.name in ("more", "x", "other", "elsewhere") or (
             path.is_file() and path.name == "b"
         ):
             path.unlink()
-    publish(spared, out, pages(**SITE_FILES | {"a": "2"}))
+    publish(course, out, pages(**SITE_FILES | {"a": "2"}))
     assert texts(out) == TEXTS | {"a.html": "a.html 2"}
     assert not any(p.is_symlink() or p.is_fifo() for p in out.rglob("*"))
     assert {p.stat().st_mode & 0o777 for p in out.rglob("*") if p.is_dir()} == {0o755}
     assert not (out / "b/empty").exists()
     assert (out / "b/c.html").read_text() == "b/c.html 1"
-    publish(spared, out, pages(**SITE_FILES | {"a": "3"}))
+    publish(course, out, pages(**SITE_FILES | {"a": "3"}))
     assert texts(out) == TEXTS | {"a.html": "a.html 3"}
-    assert entries(spared) == ["content", "public"]
+    assert entries(course) == ["content", "public"]
 
 
-def test_what_is_unlinked_in_the_spare_stays_in_the_site(spared: Path, pages: Pages) -> None:
-    with (spared / "public/b/c.html").open() as stream:
-        publish(spared, spared / "public", pages(**SITE_FILES | {"b__c": "2"}))
-        publish(spared, spared / "public", pages(**SITE_FILES | {"b__c": "3"}))
-        assert stream.read() == "b/c.html 1"
-
-
-@pytest.mark.parametrize("place", ["b", "e/f", "new"])
-def test_a_link_to_a_folder_leads_nowhere(
-    spared: Path, tmp_path: Path, pages: Pages, place: str
+@pytest.mark.parametrize("kind", ["a link", "a folder of a killed build"])
+def test_something_in_the_place_of_the_new_folder(
+    course: Path, tmp_path: Path, pages: Pages, kind: str
 ) -> None:
-    """Its folder is neither removed nor published, even if it is what a site needs."""
-    elsewhere = tmp_path / "elsewhere"
-    shutil.move(spared / SPARE / place, elsewhere) if place != "new" else elsewhere.mkdir()
-    (elsewhere / "mine").write_text("mine")
-    before = texts(elsewhere)
-    (spared / SPARE / place).symlink_to(elsewhere)
-    publish(spared, spared / "public", pages(**SITE_FILES | {"a": "2"}))
-    assert texts(spared / "public") == TEXTS | {"a.html": "a.html 2"}
-    assert not any(p.is_symlink() for p in (spared / "public").rglob("*"))
-    assert texts(elsewhere) == before
-
-
-@pytest.mark.parametrize("kind", ["a link", "a file", "empty", "of another site"])
-def test_something_else_for_a_spare(spared: Path, tmp_path: Path, pages: Pages, kind: str) -> None:
-    spare, elsewhere = spared / SPARE, tmp_path / "elsewhere"
-    spare.rename(elsewhere)
+    """Nothing of it is published; what a link leads to stays as it is."""
+    slot, elsewhere = course / ".public.coursebuild-new", tmp_path / "elsewhere"
+    place = elsewhere if kind == "a link" else slot
+    (place / "b").mkdir(parents=True)
+    (place / "b/x").write_text("x")
+    (place / "b").chmod(0o500)
     if kind == "a link":
-        spare.symlink_to(elsewhere)
-    elif kind == "a file":
-        spare.write_text("x")
-    else:
-        spare.mkdir()
-        if kind == "of another site":
-            (spare / "b").write_text("x")
-            (spare / "a.html").mkdir()
-            (spare / MARKER).write_text("x")
-    before = texts(elsewhere)
-    for key in "23":
-        assert publish(spared, spared / "public", pages(**SITE_FILES | {"a": key})) == ("a.html",)
-        assert texts(spared / "public") == TEXTS | {"a.html": f"a.html {key}"}
-    assert texts(elsewhere) == before
-    assert entries(spared) == ["content", "public"]
+        slot.symlink_to(elsewhere)
+    assert publish(course, course / "public", pages(**SITE_FILES | {"a": "2"})) == ("a.html",)
+    assert texts(course / "public") == TEXTS | {"a.html": "a.html 2"}
+    assert entries(course) == ["content", "public"]
+    assert kind != "a link" or texts(elsewhere) == {"b/x": "x"}

@@ -9,8 +9,7 @@ import pytest
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import UsageError
 from coursebuild.core.run.environments import check_other_version
-from coursebuild.core.run.packages import ABSENT, InstalledPackages
-from coursebuild.core.run.script_environment import engine_version
+from coursebuild.core.run.script_environment import ABSENT, InstalledPackages, engine_version
 
 
 @pytest.fixture

@@ -1,28 +1,19 @@
-"""Outputs that differ between two runs, and the pattern that is proposed where they are times."""
+"""Outputs that differ between two runs."""
 
 from __future__ import annotations
-
-import pytest
-from msgspec.structs import replace
 
 from coursebuild.core.model import Comparison, Filter
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.compare import compare
-from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.text.diagnostics import Diagnostic
-from support.fixture_cases import fixture_tables
 from support.sample_lessons import (
     DIGITS,
     ELLIPSIS,
     EXACT,
     describe,
-    document,
     recording,
-    recordings,
 )
-
-CASES = fixture_tables("times")
 
 SECONDS = Comparison(volatile="[0-9.]+ s")
 
@@ -59,36 +50,3 @@ def test_runs_that_differ_where_nothing_is_compared_are_stable() -> None:
     assert instability("took 1 s", "took 2 s", SECONDS) is None
     assert instability("a", "b", recorded="c") is not None
     assert instability("a", "a", recorded="c") is None, "a drift that repeats"
-
-
-TIMES = CASES["patterns"]
-
-
-@pytest.mark.parametrize(("first", "second", "pattern"), TIMES)
-def test_a_time_that_differs_gets_a_pattern_that_makes_the_runs_the_same(
-    first: str, second: str, pattern: str
-) -> None:
-    diagnostic = instability(first, second)
-    assert diagnostic is not None
-    assert diagnostic.help == f'a time varies: say `volatile="{pattern}"` on the fence'
-    source = diagnostic.span.source
-    lesson = document(apply_edits(source.text, diagnostic.edits), source.path)
-    (mended,) = recordings(lesson)
-    assert mended.comparison is not None and mended.comparison.volatile == pattern
-    for printed in (first, second):
-        assert compare(mended, mended.comparison, printed).status == "verified"
-
-
-def test_a_second_time_is_added_to_what_varies_already() -> None:
-    comparison = replace(SECONDS, volatile="load [0-9.]+ s")
-    diagnostic = instability("load 1 s\nran 2.5 h", "load 2 s\nran 2.7 h", comparison)
-    assert diagnostic is not None
-    assert "load [0-9.]+ s|[0-9.]+ h" in diagnostic.help
-
-
-@pytest.mark.parametrize(("first", "second"), CASES["unlike"])
-def test_nothing_is_proposed_where_more_than_times_would_vary(first: str, second: str) -> None:
-    diagnostic = instability(first, second)
-    assert diagnostic is not None
-    assert diagnostic.edits == ()
-    assert "a fixed seed" in diagnostic.help

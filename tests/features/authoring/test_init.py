@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild import __version__
-from coursebuild.core.run.packages import site_folders
+from coursebuild.core.run.script_environment import site_folders
 from support.sandboxes import require_sandbox
 from support.scratch_course import ROOT, Folder, command
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.run.packages import site_folders
+from coursebuild.core.run.script_environment import site_folders
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from support.lab_lessons import RIGHT, course, fence
 from support.lab_values import Bench, make_lab
