@@ -198,11 +198,13 @@ def make_archives(
 
 def _make_download(course_files: _Course, extraction: Extraction) -> ScriptDownload:
     path, name = extraction.path, extraction.path.rpartition("/")[2]
-    one = None if extraction.script.archive else _one_file(course_files, extraction)
-    if one is not None and one.text:
-        packages, unknown = course_files.packages(one.modules)
-        text = _metadata(packages, unknown, course_files.options) + one.text
-        return ScriptDownload(path, ((name, text.encode()),), name, packages, one.modules, unknown)
+    whole = None if extraction.script.archive else _one_file(course_files, extraction)
+    if whole is not None and whole.text:
+        packages, unknown = course_files.packages(whole.modules)
+        text = _metadata(packages, unknown, course_files.options) + whole.text
+        return ScriptDownload(
+            path, ((name, text.encode()),), name, packages, whole.modules, unknown
+        )
     members, modules = _find_members(course_files, [extraction])
     packages, unknown = course_files.packages(modules)
     files = tuple(sorted(members.items()))
@@ -224,11 +226,11 @@ def _one_file(course_files: _Course, extraction: Extraction) -> _OneFile:
     path, name = extraction.path, extraction.path.rpartition("/")[2]
     files, style = course_files.files_of(extraction), course_files.style
     key = step_key("one file", path, extraction.text, files, style)
-    kept = course_files.options.store.get_value(_KIND, key, _OneFile)
-    if kept is not None and all(
-        course_files.answer(path, module) == answer for module, answer in kept.answers.items()
+    known = course_files.options.store.get_value(_KIND, key, _OneFile)
+    if known is not None and all(
+        course_files.answer(path, module) == answer for module, answer in known.answers.items()
     ):
-        return kept
+        return known
     answers: dict[str, str] = {}
 
     def find_module(module: str) -> CourseModule | None:
@@ -238,15 +240,15 @@ def _one_file(course_files: _Course, extraction: Extraction) -> _OneFile:
     text, modules = "", tuple[str, ...]()
     with contextlib.suppress(NotOneFileError, RecursionError, SyntaxError):
         belongings = _belongings(files)
-        whole = single_file(_dotted(name), extraction.text, find_module, belongings)
-        if "matplotlib" in find_imports(whole) and style:
+        code = single_file(_dotted(name), extraction.text, find_module, belongings)
+        if "matplotlib" in find_imports(code) and style:
             belongings = replace(belongings, style=style)
-            whole = single_file(_dotted(name), extraction.text, find_module, belongings)
-        modules = tuple(sorted(find_imports(whole) - sys.stdlib_module_names))
-        text = _rename(whole, path, name)
-    one = _OneFile(text, modules, answers)
-    course_files.options.store.put_value(_KIND, key, one)
-    return one
+            code = single_file(_dotted(name), extraction.text, find_module, belongings)
+        modules = tuple(sorted(find_imports(code) - sys.stdlib_module_names))
+        text = _rename(code, path, name)
+    whole = _OneFile(text, modules, answers)
+    course_files.options.store.put_value(_KIND, key, whole)
+    return whole
 
 
 def _find_members(
