@@ -211,9 +211,14 @@ def _unit_of_macros(tex: str) -> str:
 
 _ARGUMENT = r"\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
 _QUANTITY = re.compile(
-    rf"\\(?:(?P<one>num|ang|unit|si)|qty|SI)(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}"
-    rf"(?(one)|{_ARGUMENT})"
+    r"\\((?P<one>num(?:list|product)?|ang|unit|si)|(?P<two>numrange|(?:qty|SI)(?:list|product)?)"
+    rf"|(?:qty|SI)range)(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}(?(one)|{_ARGUMENT}"
+    rf"(?(two)|{_ARGUMENT}))"
 )
+_NEXT = re.compile(r"\s*(?:;|(?<=[\d\s])x(?=[\d\s]))\s*")
+"""Between the numbers of one argument."""
+_BETWEEN = {"list": r",\;", "range": r"\text{ – }"}
+"""What is shown between numbers, which are factors otherwise; in no language."""
 _DEFINITION = re.compile(r"\\(?:def|[a-z]*command\*?\s*\{?)\s*(\\[A-Za-z]+)")
 
 
@@ -223,16 +228,19 @@ def write_quantities(tex: str) -> str:
         return tex
 
     def write(match: re.Match[str]) -> str:
-        kind, number, unit = match["one"], match[2], match[3] or ""
-        if kind in ("unit", "si"):
-            number, unit = "", number
-        elif kind == "ang":
-            number = "".join(map("".join, zip(number.split(";"), "°′″", strict=False)))
-        number = number.replace(",", ".").replace("+-", r"\pm ")
-        number = re.sub(r"(?<=[\d.])[eE]([-+]?\d+)", r"\\times10^{\1}", number)
-        symbols = _unit_of_macros(unit).replace(" ", r"\,").replace("%", r"\%")
-        space = r"\," if number and symbols not in "°′″" else ""
-        return f"{number}{space}" + (rf"\mathrm{{{symbols}}}" if symbols else "")
+        kind, _, _, *arguments = match.groups()
+        numbers = [number for number in arguments if number is not None]
+        symbols = "" if kind.startswith(("num", "ang")) else _unit_of_macros(numbers.pop())
+        unit = symbols.replace(" ", r"\,").replace("%", r"\%")
+        unit = rf"\mathrm{{{unit}}}" if unit else ""
+        if kind == "ang":
+            return "".join(map("".join, zip(numbers[0].split(";"), "°′″", strict=False)))
+        space = r"\," if unit and symbols not in "°′″" else ""
+        between = _BETWEEN.get(kind[-5:], _BETWEEN.get(kind[-4:], r"\times "))
+        parts = [part for number in numbers if number for part in _NEXT.split(number.replace(",", "."))]
+        text = between.join(f"{part}{space}{unit}" for part in parts) or unit
+        text = text.replace("+-", r"\pm ")
+        return re.sub(r"(?<=[\d.])[eE]([-+]?\d+)", r"\\times10^{\1}", text)
 
     return _QUANTITY.sub(write, tex)
 

@@ -37,6 +37,11 @@ _NUMBER = re.compile(
     r"(?:[0-9]{1,3}(?:(?:\{,\}|\\[,;: ]|~)[0-9]{3})+(?![0-9])|[0-9]+)(?:\.[0-9]+)?|\.[0-9]+"
 )
 _E_NOTATION = re.compile(r"(?:[eE]|\\mathrm\s*(?:[eE]|\{[eE]\}))(?:\{[-+−]?[0-9]+\}|[-+−][0-9])")
+_AMOUNT = re.compile(
+    r"(?:\[[^\]]*\])?\s*\{\s*([-−]?)\+?((?!0[0-9])(?:[0-9 ]+(?:[.,][0-9 ]+)?|[.,][0-9 ]+))"
+    r"(?:[eE]([-+]?[0-9]+)\s*)?\}"
+)
+"""A number of `siunitx`, as in `\\num{1 234,5e-3}`."""
 _LETTER = re.compile(r"[A-Za-z]|\\[A-Za-z]+")
 _DIFFERENTIAL = re.compile(r"\\mathrm\s*(?:\{\s*d\s*\}|d)|\\partial(?![A-Za-z])")
 _UPRIGHT = re.compile(r"\\(?:mathrm|text|textrm|operatorname|mathit)(?![A-Za-z])\s*")
@@ -132,6 +137,20 @@ class _Reader:
             self.at += 1
             return Expression("number", self.at - 1, self.at, text=digit)
         return self.base()
+
+    def amount(self) -> Expression:
+        """Parse a number as `siunitx` reads it, or any other argument."""
+        number = self.match(_AMOUNT)
+        if number is None:
+            return self.group()
+        start, self.at = self.at, number.end()
+        digits = number[2].replace(" ", "").replace(",", ".")
+        amount = Expression("number", start, self.at, text=digits)
+        if number[3]:
+            ten, power = (Expression("number", 0, 0, text=text) for text in ("10", number[3]))
+            power = Expression("^", start, self.at, (ten, power))
+            amount = Expression("*", start, self.at, (amount, power))
+        return Expression("-", start, self.at, (amount,)) if number[1] else amount
 
     def raw(self) -> str:
         """Return the text of an argument."""
@@ -287,9 +306,11 @@ class _Reader:
             root = Expression("/", start, start, (_NUMBER_ONE, index))
             return Expression("^", start, self.at, (self.group(), root))
         if sign == r"\num":
-            return self.group()
+            return self.amount()
+        if sign == r"\ang":
+            return self.degrees(self.amount())
         if sign in (r"\qty", r"\SI"):
-            amount, at, text = self.group(), self.at, plain_unit(rf"\unit{{{self.raw()}}}")
+            amount, at, text = self.amount(), self.at, plain_unit(rf"\unit{{{self.raw()}}}")
             parts = amount, Expression("unit", at, self.at, text=text)
             return Expression("*", start, self.at, parts)
         if sign in (r"\underbrace", r"\overbrace"):
