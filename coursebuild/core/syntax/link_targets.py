@@ -15,9 +15,12 @@ from coursebuild.core.model import (
     Target,
     TermTarget,
     UrlTarget,
+    plain_text,
 )
+from coursebuild.core.model.course import Words
 from coursebuild.core.model.inlines import LABEL_KINDS
 from coursebuild.core.syntax.attributes import term_id
+from coursebuild.core.syntax.mentions import mentioned_lesson
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.source import Span
 
@@ -77,8 +80,10 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
     return check_scheme(url, span, image=True)
 
 
-def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
-    """The diagnostic of a text or an address that is missing."""
+def check_link_text(
+    target: Target, children: Sequence[Inline], span: Span, words: Words
+) -> Diagnostic | None:
+    """The diagnostic of a text or an address that is missing, or names another lesson."""
     if target == UrlTarget(""):
         message, help = "this link has no address", "write one in the brackets behind its text"
         return diagnose("link-text", span, message, help=help)
@@ -88,4 +93,8 @@ def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> D
             return None  # it may show a number
         message, help = "this link has no text, so no reader sees it", "write one in the brackets"
         return diagnose("link-text", span, message, help=help)
+    name = mentioned_lesson(plain_text(children), words)
+    if isinstance(target, LessonTarget) and name not in ("", target.id):
+        message = f"the text names lesson {name}, and the address lesson {target.id}"
+        return diagnose("link-text", span, message, help="name the same lesson in both")
     return None

@@ -56,6 +56,12 @@ def _mentions(words: Words) -> re.Pattern[str]:
     )
 
 
+def mentioned_lesson(text: str, words: Words) -> str:
+    """The lesson that a whole text mentions; empty for other texts and for several lessons."""
+    match, numbers = _mentions(words).fullmatch(text), _NUMBER.findall(text)
+    return numbers[0] if match and match[1] and len(numbers) == 1 else ""
+
+
 def text_inlines(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:
     """The run as texts and soft line ends."""
     inlines: list[Inline] = []
