@@ -5,25 +5,45 @@ from __future__ import annotations
 import ast
 import re
 import warnings
-from collections.abc import Iterator, Sequence
-from functools import lru_cache
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache, partial
 
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 _LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
+_KEY = re.compile(r"""([\d.]+|"[^"\n]*"|'[^'\n]*')\s*:""")
 _SHOWS = re.compile(r"(?:matplotlib\.pyplot|plotly\.io)\.show")
 
 
-def find_windows(code: Excerpt) -> Iterator[Diagnostic]:
-    """Report the first picture that a script without figures shows and does not save."""
-    if not re.search("matplotlib|plotly", code.text):
-        return
-    try:
-        tree = ast.parse(code.text)
-    except (SyntaxError, ValueError, MemoryError, RecursionError):
-        return
-    nodes = list(ast.walk(tree))
+def find_slips(code: Excerpt, *, has_figures: bool) -> Iterator[Diagnostic]:
+    """Report values that a dict never holds, and the first picture that nothing saves."""
+    keys = _KEY.findall(code.text)
+    may_show = not has_figures and re.search("matplotlib|plotly", code.text) is not None
+    if (may_show or len({*keys}) < len(keys)) and _compile_error(code.text) is None:
+        nodes = [*ast.walk(ast.parse(code.text))]
+        yield from _find_lost_values(code, nodes)
+        yield from _find_windows(code, nodes) if may_show else ()
+
+
+def _find_lost_values(code: Excerpt, nodes: Iterable[ast.AST]) -> Iterator[Diagnostic]:
+    written = partial(ast.get_source_segment, code.text)
+    for display in nodes:
+        if not isinstance(display, ast.Dict):
+            continue
+        values: dict[object, ast.expr] = {}
+        for key, value in zip(display.keys, display.values, strict=True):
+            if not isinstance(key, ast.Constant):
+                continue
+            first = values.setdefault(key.value, value)
+            if first is not value and written(first) != written(value):
+                row = code.lines()[key.lineno - 1]
+                at = len(row.text.encode()[: key.col_offset].decode())
+                message = f"this dict has `{written(key)}` twice, and holds the value given last"
+                yield diagnose("python-key", row.span(at, at + 1), message)
+
+
+def _find_windows(code: Excerpt, nodes: Iterable[ast.AST]) -> Iterator[Diagnostic]:
     names: dict[str, str] = {}
     for node in nodes:
         if isinstance(node, ast.Import):

@@ -137,7 +137,7 @@ GROUPS: dict[str, dict[str, str]] = {
     "Links and bound numbers": {
         "link-lesson": "A link or mention names a lesson that is not in the map.",
         "link-page": "A link names a page that is not in the map.",
-        "link-text": "A link has no text or no address.",
+        "link-text": "A link has no text or no address, or its text names another lesson.",
         "link-term": "A link names a term that no lesson defines.",
         "link-model": "A link names a model that is not in `models/`.",
         "link-example": "A link names a script that is in no lesson.",
@@ -159,6 +159,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "script-repeated": "Two blocks have the same path.",
         "script-part": "A part of a script has no beginning above it.",
         "python-syntax": "A script cannot be parsed.",
+        "python-key": "A dict in a script has a key twice, with two values.",
         "example-edited": "An extracted file was changed by hand.",
         "script-failed": "A script exited with an error.",
         "script-timeout": "A script ran past its time limit.",
@@ -248,7 +249,7 @@ _MILD |= dict.fromkeys(
     """
     draft-empty unit-unproven file-unlisted no-scripts theme-contrast template-outdated heading-skip
     markup-foreign math-brackets math-command symbol-repeated footnote-unused image-alt
-    recording-loose script-unrepeatable script-penetration script-writes script-connects
+    recording-loose python-key script-unrepeatable script-penetration script-writes script-connects
     output-ambiguous output-noise report-stale bench-unrecorded lab-penetration lab-reset
     package-reduced
     """.split(),
