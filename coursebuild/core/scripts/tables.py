@@ -30,6 +30,8 @@ from coursebuild.core.scripts.column_titles import (
     ColumnTitle,
     PrintedName,
     misplaced_titles,
+    squeeze,
+    swapped_titles,
     words_of,
 )
 from coursebuild.core.scripts.diff import number_change
@@ -52,8 +54,8 @@ from coursebuild.core.scripts.table_cells import (
     row_text,
     table_rows,
 )
-from coursebuild.core.text.numbers import Number, relative_error
-from coursebuild.core.text.quantities import UnitText, are_different
+from coursebuild.core.text.numbers import Number, relative_error, scan
+from coursebuild.core.text.quantities import UnitText, are_different, title_of_column
 from coursebuild.core.text.source import Span
 
 _ALIKE_WEIGHT = 6
@@ -229,11 +231,17 @@ class TableMatcher:
         text = self._text_with_gaps
         if len(text.lines[at].numbers) != len(self.text.lines[at].numbers):
             text = self.text
+        titles = [squeeze(title.text) for title in self.titles if scan(title.text)]
+        above = [line.text for line in text.lines[:at] if titles]
+        headers = (line for line in reversed(above) if all(t in squeeze(line) for t in titles))
+        header = next(headers, "")  # such as `25%  75%`, which has the look of a row
         cells = (re.escape(c.mapped.text) for c in self.rows[0] if not c.canonical.numbers)
         cell_pattern = re.compile(rf"(?<!\w)(?:{'|'.join(cells) or '(?!)'})(?!\w)")
+        row, numbers = text.lines[at].text, text.lines[at].numbers
+        above = [text.title(at, n) or title_of_column(row, n.start, header) for n in numbers]
         return [
-            PrintedName(cell_pattern.sub(",", lead), text.title(at, n), n.text, text.unit(at, n))
-            for lead, n in zip(text.leads(at), text.lines[at].numbers, strict=True)
+            PrintedName(cell_pattern.sub(",", lead), title, n.text, text.unit(at, n))
+            for lead, title, n in zip(text.leads(at), above, numbers, strict=True)
         ]
 
     def _count_lines(self, layout: LineLayout | None) -> int:
@@ -378,8 +386,15 @@ class TableMatcher:
             places = {column: numbers.index(number) for column, number in pairs}
             names = self._names(row.line)
             # Where the first number has no name, and words stand behind the last, they all do.
-            are_behind = bool(places) and not names[0].text and words_of(line[numbers[-1].end :])
-            for column, at, is_certain in misplaced_titles(self.titles, names, places):
+            tail = line[numbers[-1].end :] if places else ""
+            are_behind = bool(words_of(tail)) and not names[0].text
+            words_behind = [*(name.before for name in names[1:]), tail] if are_behind else []
+            swapped = swapped_titles(self.titles, words_behind, places)
+            for column, at in swapped:
+                reading = f"{numbers[at].text}{words_behind[at]}".rstrip(" ,;")
+                yield self.titles[column], reading, True
+            verdicts = () if swapped else misplaced_titles(self.titles, names, places)
+            for column, at, is_certain in verdicts:
                 if is_certain or not are_behind:
                     yield self.titles[column], names[at].reading, is_certain
 
