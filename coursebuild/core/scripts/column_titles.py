@@ -158,18 +158,17 @@ def misplaced_titles(
 
 
 def swapped_titles(
-    titles: Sequence[ColumnTitle], words_behind: Sequence[str], places: Mapping[int, int]
+    titles: Sequence[ColumnTitle], names: Sequence[str], places: Mapping[int, int]
 ) -> list[tuple[int, int]]:
-    """The columns of a line whose words all stand behind numbers, and those that they name.
+    """The columns whose titles are likely names of other numbers of the line, and of which.
 
-    None where it is one alone: the last word may be a remark.
+    None where it is one column alone: two mistakes of reading would have to fit each other.
     """
     swapped = [
         (column, at)
         for column, place in places.items()
-        for at, words in enumerate(words_behind)
-        if titles[column].is_printed_as(words)
-        and not titles[column].is_printed_as(words_behind[place])
+        for at, name in enumerate(names)
+        if titles[column].is_printed_as(name) and not titles[column].is_printed_as(names[place])
     ]
     return swapped if len({column for column, _ in swapped}) > 1 else []
 

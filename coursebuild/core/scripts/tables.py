@@ -388,11 +388,15 @@ class TableMatcher:
             # Where the first number has no name, and words stand behind the last, they all do.
             tail = line[numbers[-1].end :] if places else ""
             are_behind = bool(words_of(tail)) and not names[0].text
-            words_behind = [*(name.before for name in names[1:]), tail] if are_behind else []
-            swapped = swapped_titles(self.titles, words_behind, places)
+            words = [name.above.rpartition("_")[0] for name in names]  # `mass_kg`
+            readings = [name.reading for name in names]
+            if are_behind:
+                words = [*(name.before for name in names[1:]), tail]
+                pairs = zip(numbers, words, strict=True)
+                readings = [f"{number.text}{behind}".rstrip(" ,;") for number, behind in pairs]
+            swapped = swapped_titles(self.titles, words, places)
             for column, at in swapped:
-                reading = f"{numbers[at].text}{words_behind[at]}".rstrip(" ,;")
-                yield self.titles[column], reading, True
+                yield self.titles[column], readings[at], True
             verdicts = () if swapped else misplaced_titles(self.titles, names, places)
             for column, at, is_certain in verdicts:
                 if is_certain or not are_behind:
