@@ -84,17 +84,16 @@ def check_link_text(
     target: Target, children: Sequence[Inline], span: Span, words: Words
 ) -> Diagnostic | None:
     """The diagnostic of a text or an address that is missing, or names another lesson."""
+    named = isinstance(target, LessonTarget) and mentioned_lesson(plain_text(children), words)
+    address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
+    help = "write one in the brackets"
     if target == UrlTarget(""):
-        message, help = "this link has no address", "write one in the brackets behind its text"
-        return diagnose("link-text", span, message, help=help)
-    if not children:
-        address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
-        if ":" in address.partition("#")[2]:
-            return None  # it may show a number
-        message, help = "this link has no text, so no reader sees it", "write one in the brackets"
-        return diagnose("link-text", span, message, help=help)
-    name = mentioned_lesson(plain_text(children), words)
-    if isinstance(target, LessonTarget) and name not in ("", target.id):
-        message = f"the text names lesson {name}, and the address lesson {target.id}"
-        return diagnose("link-text", span, message, help="name the same lesson in both")
-    return None
+        message, help = "this link has no address", f"{help} behind its text"
+    elif not children and ":" not in address.partition("#")[2]:  # else it may show a number
+        message = "this link has no text, so no reader sees it"
+    elif named and isinstance(target, LessonTarget) and named != target.id:
+        message = f"the text names lesson {named}, and the address lesson {target.id}"
+        help = "name the same lesson in both"
+    else:
+        return None
+    return diagnose("link-text", span, message, help=help)

@@ -6,7 +6,7 @@ import ast
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose
 from coursebuild.core.text.source import Excerpt, Span
@@ -17,30 +17,21 @@ _SHOWS = re.compile(r"(?:matplotlib\.pyplot|plotly\.io)\.show")
 
 
 def find_slips(code: Excerpt, *, has_figures: bool) -> Iterator[Diagnostic]:
-    """Report values that a dict never holds, and the first picture that nothing saves."""
+    """Report keys that a dict has twice, and the first picture that nothing saves."""
     keys = _KEY.findall(code.text)
     may_show = not has_figures and re.search("matplotlib|plotly", code.text) is not None
-    if (may_show or len({*keys}) < len(keys)) and _compile_error(code.text) is None:
-        nodes = [*ast.walk(ast.parse(code.text))]
-        yield from _find_lost_values(code, nodes)
-        yield from _find_windows(code, nodes) if may_show else ()
-
-
-def _find_lost_values(code: Excerpt, nodes: Iterable[ast.AST]) -> Iterator[Diagnostic]:
-    written = partial(ast.get_source_segment, code.text)
+    if not (may_show or len({*keys}) < len(keys)) or _compile_error(code.text):
+        return
+    nodes = [*ast.walk(ast.parse(code.text))]
     for display in nodes:
-        if not isinstance(display, ast.Dict):
-            continue
-        values: dict[object, ast.expr] = {}
-        for key, value in zip(display.keys, display.values, strict=True):
-            if not isinstance(key, ast.Constant):
-                continue
-            first = values.setdefault(key.value, value)
-            if first is not value and written(first) != written(value):
-                row = code.lines()[key.lineno - 1]
-                at = len(row.text.encode()[: key.col_offset].decode())
-                message = f"this dict has `{written(key)}` twice, and holds the value given last"
-                yield diagnose("python-key", row.span(at, at + 1), message)
+        known = set[object]()
+        for key in display.keys if isinstance(display, ast.Dict) else ():
+            if isinstance(key, ast.Constant):
+                if key.value in known:
+                    message = f"a dict has `{key.value}` twice, and holds the value given last"
+                    yield diagnose("python-key", code.lines()[key.lineno - 1].span(), message)
+                known.add(key.value)
+    yield from _find_windows(code, nodes) if may_show else ()
 
 
 def _find_windows(code: Excerpt, nodes: Iterable[ast.AST]) -> Iterator[Diagnostic]:

@@ -159,7 +159,7 @@ GROUPS: dict[str, dict[str, str]] = {
         "script-repeated": "Two blocks have the same path.",
         "script-part": "A part of a script has no beginning above it.",
         "python-syntax": "A script cannot be parsed.",
-        "python-key": "A dict in a script has a key twice, with two values.",
+        "python-key": "A dict in a script has a key twice.",
         "example-edited": "An extracted file was changed by hand.",
         "script-failed": "A script exited with an error.",
         "script-timeout": "A script ran past its time limit.",

@@ -210,7 +210,7 @@ def _unit_of_macros(tex: str) -> str:
 
 
 _ARGUMENT = r"\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
-_QUANTITY = re.compile(
+QUANTITY = re.compile(
     r"\\((?P<one>num(?:list|product)?|ang|unit|si)|(?P<two>numrange|(?:qty|SI)(?:list|product)?)"
     rf"|(?:qty|SI)range)(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}(?(one)|{_ARGUMENT}"
     rf"(?(two)|{_ARGUMENT}))"
@@ -224,7 +224,7 @@ _DEFINITION = re.compile(r"\\(?:def|[a-z]*command\*?\s*\{?)\s*(\\[A-Za-z]+)")
 
 def write_quantities(tex: str) -> str:
     r"""TeX without the commands of `siunitx`: `\qty{3}{\kilo\metre}` is `3\,\mathrm{km}`."""
-    if any(_QUANTITY.match(f"{name}{{}}{{}}") for name in _DEFINITION.findall(tex)):
+    if any(QUANTITY.match(f"{name}{{}}{{}}") for name in _DEFINITION.findall(tex)):
         return tex
 
     def write(match: re.Match[str]) -> str:
@@ -239,10 +239,10 @@ def write_quantities(tex: str) -> str:
         between = _BETWEEN.get(kind[-5:], _BETWEEN.get(kind[-4:], r"\times "))
         parts = [part for number in numbers if number for part in _NEXT.split(number.replace(",", "."))]
         text = between.join(f"{part}{space}{unit}" for part in parts) or unit
-        text = text.replace("+-", r"\pm ")
+        text = re.sub(r"(?<=\d) (?=\d)", "", text).replace("+-", r"\pm ")
         return re.sub(r"(?<=[\d.])[eE]([-+]?\d+)", r"\\times10^{\1}", text)
 
-    return _QUANTITY.sub(write, tex)
+    return QUANTITY.sub(write, tex)
 
 
 def find_unit(text: str) -> Unit | None:

@@ -15,8 +15,11 @@ from __future__ import annotations
 
 import re
 
+from msgspec.structs import replace
+
 from coursebuild.core.checks import formulas
 from coursebuild.core.text.quantities import plain_unit
+from coursebuild.core.text.units import QUANTITY, write_quantities
 from coursebuild.features.arithmetic.expressions import (
     OF_QUOTIENT,
     SIDE_BY_SIDE,
@@ -37,11 +40,6 @@ _NUMBER = re.compile(
     r"(?:[0-9]{1,3}(?:(?:\{,\}|\\[,;: ]|~)[0-9]{3})+(?![0-9])|[0-9]+)(?:\.[0-9]+)?|\.[0-9]+"
 )
 _E_NOTATION = re.compile(r"(?:[eE]|\\mathrm\s*(?:[eE]|\{[eE]\}))(?:\{[-+−]?[0-9]+\}|[-+−][0-9])")
-_AMOUNT = re.compile(
-    r"(?:\[[^\]]*\])?\s*\{\s*([-−]?)\+?((?!0[0-9])(?:[0-9 ]+(?:[.,][0-9 ]+)?|[.,][0-9 ]+))"
-    r"(?:[eE]([-+]?[0-9]+)\s*)?\}"
-)
-"""A number of `siunitx`, as in `\\num{1 234,5e-3}`."""
 _LETTER = re.compile(r"[A-Za-z]|\\[A-Za-z]+")
 _DIFFERENTIAL = re.compile(r"\\mathrm\s*(?:\{\s*d\s*\}|d)|\\partial(?![A-Za-z])")
 _UPRIGHT = re.compile(r"\\(?:mathrm|text|textrm|operatorname|mathit)(?![A-Za-z])\s*")
@@ -84,6 +82,19 @@ def read_expression(tex: str, start: int, end: int) -> Expression:
     if reader.peek():
         raise reader.not_understood()
     return expression
+
+
+def _read_quantity(tex: str, start: int, end: int) -> Expression:
+    """What a command of `siunitx`, written otherwise, says: all of it at the command's place."""
+
+    def place(expression: Expression) -> Expression:
+        parts = tuple(map(place, expression.parts))
+        return replace(expression, start=start, end=end, parts=parts)
+
+    try:
+        return place(read_expression(tex, 0, len(tex)))
+    except NotUnderstood as error:
+        raise NotUnderstood(error.reason, start, end) from None
 
 
 class _Reader:
@@ -137,20 +148,6 @@ class _Reader:
             self.at += 1
             return Expression("number", self.at - 1, self.at, text=digit)
         return self.base()
-
-    def amount(self) -> Expression:
-        """Parse a number as `siunitx` reads it, or any other argument."""
-        number = self.match(_AMOUNT)
-        if number is None:
-            return self.group()
-        start, self.at = self.at, number.end()
-        digits = number[2].replace(" ", "").replace(",", ".")
-        amount = Expression("number", start, self.at, text=digits)
-        if number[3]:
-            ten, power = (Expression("number", 0, 0, text=text) for text in ("10", number[3]))
-            power = Expression("^", start, self.at, (ten, power))
-            amount = Expression("*", start, self.at, (amount, power))
-        return Expression("-", start, self.at, (amount,)) if number[1] else amount
 
     def raw(self) -> str:
         """Return the text of an argument."""
@@ -293,6 +290,9 @@ class _Reader:
             if _E_NOTATION.match(self.tex, self.at, self.end):
                 raise NotUnderstood("it may be a power of ten", start, self.at)
             return Expression("number", start, self.at, text=digits)
+        if quantity := QUANTITY.match(self.tex, start, self.end):
+            self.at = quantity.end()
+            return _read_quantity(write_quantities(quantity[0]), start, self.at)
         self.at += len(sign)
         if sign in _BRACKETS:
             inner = self.bracket(_BRACKETS[sign])
@@ -305,14 +305,6 @@ class _Reader:
             index = self.bracket("]") if self.take("[") else _NUMBER_TWO
             root = Expression("/", start, start, (_NUMBER_ONE, index))
             return Expression("^", start, self.at, (self.group(), root))
-        if sign == r"\num":
-            return self.amount()
-        if sign == r"\ang":
-            return self.degrees(self.amount())
-        if sign in (r"\qty", r"\SI"):
-            amount, at, text = self.amount(), self.at, plain_unit(rf"\unit{{{self.raw()}}}")
-            parts = amount, Expression("unit", at, self.at, text=text)
-            return Expression("*", start, self.at, parts)
         if sign in (r"\underbrace", r"\overbrace"):
             inner = self.group()
             _ = self.take("_", "^") and self.raw()
