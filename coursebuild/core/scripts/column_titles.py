@@ -157,22 +157,6 @@ def misplaced_titles(
     return ((column, at, any_certain) for column, at, _ in verdicts)
 
 
-def swapped_titles(
-    titles: Sequence[ColumnTitle], names: Sequence[str], places: Mapping[int, int]
-) -> list[tuple[int, int]]:
-    """The columns whose titles are likely names of other numbers of the line, and of which.
-
-    None where it is one column alone: two mistakes of reading would have to fit each other.
-    """
-    swapped = [
-        (column, at)
-        for column, place in places.items()
-        for at, name in enumerate(names)
-        if titles[column].is_printed_as(name) and not titles[column].is_printed_as(names[place])
-    ]
-    return swapped if len({column for column, _ in swapped}) > 1 else []
-
-
 def squeeze(title: str) -> str:
     """A title without spaces: `t = 10 s` is `t=10 s`."""
     return "".join(title.split())

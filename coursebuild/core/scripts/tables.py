@@ -31,7 +31,6 @@ from coursebuild.core.scripts.column_titles import (
     PrintedName,
     misplaced_titles,
     squeeze,
-    swapped_titles,
     words_of,
 )
 from coursebuild.core.scripts.diff import number_change
@@ -389,18 +388,14 @@ class TableMatcher:
             tail = line[numbers[-1].end :] if places else ""
             are_behind = bool(words_of(tail)) and not names[0].text
             words = [name.above.rpartition("_")[0] for name in names]  # `mass_kg`
-            readings = [name.reading for name in names]
-            if are_behind:
-                words = [*(name.before for name in names[1:]), tail]
-                pairs = zip(numbers, words, strict=True)
-                readings = [f"{number.text}{behind}".rstrip(" ,;") for number, behind in pairs]
-            swapped = swapped_titles(self.titles, words, places)
-            for column, at in swapped:
-                yield self.titles[column], readings[at], True
-            verdicts = () if swapped else misplaced_titles(self.titles, names, places)
+            words = [*(name.before for name in names[1:]), tail] if are_behind else words
+            likely = [n._replace(above=w.strip(" ,;")) for n, w in zip(names, words, strict=True)]
+            verdicts = [*misplaced_titles(self.titles, likely, places)]
+            if len(verdicts) < 2:  # in one column alone it is a remark
+                likely, verdicts = names, [*misplaced_titles(self.titles, names, places)]
             for column, at, is_certain in verdicts:
                 if is_certain or not are_behind:
-                    yield self.titles[column], names[at].reading, is_certain
+                    yield self.titles[column], likely[at].reading, is_certain
 
     def unprinted_units(self) -> Iterator[tuple[Span, str]]:
         """The titles whose units nothing prints, and these."""

@@ -211,9 +211,9 @@ def _unit_of_macros(tex: str) -> str:
 
 _ARGUMENT = r"\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
 QUANTITY = re.compile(
-    r"\\((?P<one>num(?:list|product)?|ang|unit|si)|(?P<two>numrange|(?:qty|SI)(?:list|product)?)"
-    rf"|(?:qty|SI)range)(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}(?(one)|{_ARGUMENT}"
-    rf"(?(two)|{_ARGUMENT}))"
+    r"\\(?:(?:num|(?P<of_unit>qty|SI))(?P<many>list|product|(?P<range>range))?|(?P<angle>ang)"
+    rf"|(?P<bare>unit|si))(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}(?(range){_ARGUMENT})"
+    rf"(?(of_unit){_ARGUMENT})"
 )
 _NEXT = re.compile(r"\s*(?:;|(?<=[\d\s])x(?=[\d\s]))\s*")
 """Between the numbers of one argument."""
@@ -228,17 +228,17 @@ def write_quantities(tex: str) -> str:
         return tex
 
     def write(match: re.Match[str]) -> str:
-        kind, _, _, *arguments = match.groups()
-        numbers = [number for number in arguments if number is not None]
-        symbols = "" if kind.startswith(("num", "ang")) else _unit_of_macros(numbers.pop())
-        unit = symbols.replace(" ", r"\,").replace("%", r"\%")
-        unit = rf"\mathrm{{{unit}}}" if unit else ""
-        if kind == "ang":
-            return "".join(map("".join, zip(numbers[0].split(";"), "°′″", strict=False)))
-        space = r"\," if unit and symbols not in "°′″" else ""
-        between = _BETWEEN.get(kind[-5:], _BETWEEN.get(kind[-4:], r"\times "))
-        parts = [part for number in numbers if number for part in _NEXT.split(number.replace(",", "."))]
-        text = between.join(f"{part}{space}{unit}" for part in parts) or unit
+        *_, number, last, unit = match.groups("")
+        if match["angle"]:
+            return "".join(map("".join, zip(number.split(";"), "°′″", strict=False)))
+        if match["bare"]:
+            number, unit = "", number
+        symbols = _unit_of_macros(unit).replace(" ", r"\,").replace("%", r"\%")
+        unit = rf"\mathrm{{{symbols}}}" if symbols else ""
+        space = "" if symbols in "°′″" else r"\,"
+        parts = _NEXT.split(f"{number};{last}".replace(",", "."))
+        between = _BETWEEN.get(match["many"], r"\times ")
+        text = between.join(f"{part}{space}{unit}" for part in parts if part) or unit
         text = re.sub(r"(?<=\d) (?=\d)", "", text).replace("+-", r"\pm ")
         return re.sub(r"(?<=[\d.])[eE]([-+]?\d+)", r"\\times10^{\1}", text)
 

@@ -315,7 +315,7 @@ class _Reader:
             return self.series(sign[1:], start)
         if sign == r"\int":
             return self.integral(start)
-        if sign.lstrip("\\") in _FUNCTIONS and sign != sign.lstrip("\\"):
+        if sign[1:] in _FUNCTIONS:
             return self.function(sign[1:], start)
         self.at = start
         if (upright := self.match(_UPRIGHT)) and self.tex[upright.end() :].startswith(("e", "{e}")):
@@ -336,7 +336,7 @@ class _Reader:
         sign, start = self.peek(), self.at
         name = sign.lstrip("\\")
         self.at += len(sign)
-        if name in _ACCENTS and sign != name:
+        if name in _ACCENTS:
             inner = self.raw()
             if not _LETTER.fullmatch(inner):
                 raise NotUnderstood("an accent stands over more than a letter", start, self.at)
