@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from urllib.parse import unquote
 
 from coursebuild.core.model import (
@@ -81,18 +80,18 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
 
 
 def check_link_text(
-    target: Target, children: Sequence[Inline], span: Span, words: Words
+    target: Target, children: tuple[Inline, ...], span: Span, words: Words
 ) -> Diagnostic | None:
     """The diagnostic of a text or an address that is missing, or names another lesson."""
-    named = isinstance(target, LessonTarget) and mentioned_lesson(plain_text(children), words)
+    lesson = isinstance(target, LessonTarget) and mentioned_lesson(plain_text(children), words)
     address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
     help = "write one in the brackets"
     if target == UrlTarget(""):
         message, help = "this link has no address", f"{help} behind its text"
     elif not children and ":" not in address.partition("#")[2]:  # else it may show a number
         message = "this link has no text, so no reader sees it"
-    elif named and isinstance(target, LessonTarget) and named != target.id:
-        message = f"the text names lesson {named}, and the address lesson {target.id}"
+    elif lesson and isinstance(target, LessonTarget) and lesson != target.id:
+        message = f"the text names lesson {lesson}, and the address lesson {target.id}"
         help = "name the same lesson in both"
     else:
         return None

@@ -24,13 +24,13 @@ def find_slips(code: Excerpt, *, has_figures: bool) -> Iterator[Diagnostic]:
         return
     nodes = [*ast.walk(ast.parse(code.text))]
     for display in nodes:
-        known = set[object]()
+        values = set[object]()
         for key in display.keys if isinstance(display, ast.Dict) else ():
             if isinstance(key, ast.Constant):
-                if key.value in known:
-                    message = f"a dict has `{key.value}` twice, and holds the value given last"
+                if key.value in values:
+                    message = f"a dict has `{ast.unparse(key)}` twice, and keeps the last value"
                     yield diagnose("python-key", code.lines()[key.lineno - 1].span(), message)
-                known.add(key.value)
+                values.add(key.value)
     yield from _find_windows(code, nodes) if may_show else ()
 
 

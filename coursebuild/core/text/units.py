@@ -237,8 +237,8 @@ def write_quantities(tex: str) -> str:
         unit = rf"\mathrm{{{symbols}}}" if symbols else ""
         space = "" if symbols in "°′″" else r"\,"
         parts = _NEXT.split(f"{number};{last}".replace(",", "."))
-        between = _BETWEEN.get(match["many"], r"\times ")
-        text = between.join(f"{part}{space}{unit}" for part in parts if part) or unit
+        sign = _BETWEEN.get(match["many"], r"\times ")
+        text = sign.join(f"{part}{space}{unit}" for part in parts if part) or unit
         text = re.sub(r"(?<=\d) (?=\d)", "", text).replace("+-", r"\pm ")
         return re.sub(r"(?<=[\d.])[eE]([-+]?\d+)", r"\\times10^{\1}", text)
 

@@ -15,8 +15,6 @@ from __future__ import annotations
 
 import re
 
-from msgspec.structs import replace
-
 from coursebuild.core.checks import formulas
 from coursebuild.core.text.quantities import plain_unit
 from coursebuild.core.text.units import QUANTITY, write_quantities
@@ -82,19 +80,6 @@ def read_expression(tex: str, start: int, end: int) -> Expression:
     if reader.peek():
         raise reader.not_understood()
     return expression
-
-
-def _read_quantity(tex: str, start: int, end: int) -> Expression:
-    """What a command of `siunitx`, written otherwise, says: all of it at the command's place."""
-
-    def place(expression: Expression) -> Expression:
-        parts = tuple(map(place, expression.parts))
-        return replace(expression, start=start, end=end, parts=parts)
-
-    try:
-        return place(read_expression(tex, 0, len(tex)))
-    except NotUnderstood as error:
-        raise NotUnderstood(error.reason, start, end) from None
 
 
 class _Reader:
@@ -277,8 +262,7 @@ class _Reader:
 
     def base(self) -> Expression:
         """Parse a number, a symbol, a group, a fraction, a root or a function."""
-        sign = self.peek()
-        start = self.at
+        sign, start = self.peek(), self.at
         self.count += 1
         if self.count > _MAX_FACTORS:
             raise self.not_understood("it is too long")
@@ -292,7 +276,11 @@ class _Reader:
             return Expression("number", start, self.at, text=digits)
         if quantity := QUANTITY.match(self.tex, start, self.end):
             self.at = quantity.end()
-            return _read_quantity(write_quantities(quantity[0]), start, self.at)
+            text = write_quantities(quantity[0])
+            try:
+                return read_expression(text, 0, len(text)).move(start, self.at)
+            except NotUnderstood as error:
+                raise NotUnderstood(error.reason, start, self.at) from None
         self.at += len(sign)
         if sign in _BRACKETS:
             inner = self.bracket(_BRACKETS[sign])
@@ -368,8 +356,7 @@ class _Reader:
             text = "/".join(f"({plain_unit(unit)})" for unit in units.groups())
             return Expression("unit", start, self.at, text=text)
         numerator_start = self.at
-        has_brace = self.take("{")
-        if has_brace and self.match(_DIFFERENTIAL):
+        if self.take("{") and self.match(_DIFFERENTIAL):
             return self.derivative(start)
         self.at = numerator_start
         return Expression("/", start, self.at, (self.group(), self.group()))
