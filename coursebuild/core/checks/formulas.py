@@ -32,11 +32,11 @@ from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt
 
-GREEK = frozenset(
+SYMBOLS = frozenset(
     """
     alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa lambda mu nu xi pi
     rho varrho sigma tau upsilon phi varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma
-    Upsilon Phi Psi Omega
+    Upsilon Phi Psi Omega ell hbar infty
     """.split()
 )
 _FUNCTIONS = frozenset(
@@ -111,7 +111,7 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
         span = tex.span(at, at + 1)
     help = ""
     if command := re.search(r"unknown command \\([A-Za-z]+)", error.message):
-        likely = nearest(command[1], GREEK | _FUNCTIONS | _WITH_BRACES)
+        likely = nearest(command[1], SYMBOLS | _FUNCTIONS | _WITH_BRACES)
         at = tex.text.find(command[1])
         if likely is not None and at >= 0:
             place = tex.span(at, at + len(command[1]))
@@ -156,9 +156,12 @@ def _letter_runs(elements: Iterable[Element], parent: str = "") -> Iterator[str]
     """The letters that stand beside each other as names of their own; indices are words."""
     run = ""
     for at, child in enumerate(elements):
-        text = child.text or ""
-        if child.tag == "mi" and len(text) == 1 and text.isascii():
-            run += text
+        has_script = child.tag in ("msup", *_INDEXED)  # as in `omega^2`
+        base = child[0] if has_script else child
+        letter = base.text if base.tag == "mi" and base.text else ""
+        is_letter = len(letter) == 1 and letter.isascii()
+        run += letter if is_letter else ""
+        if is_letter and not has_script:
             continue
         yield run
         run = ""
@@ -177,7 +180,7 @@ def _check_letters(
     words = [*_LETTERS.finditer(tex.text)]
     for word in words:
         name, bracket, brace = word.groups()
-        is_name = name in GREEK and not letters >= {*name}
+        is_name = name in SYMBOLS and not letters >= {*name}
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.core.checks import formulas
+from coursebuild.core.checks.formulas import SYMBOLS
 from coursebuild.core.text.quantities import plain_unit
 from coursebuild.core.text.units import QUANTITY, write_quantities
 from coursebuild.features.arithmetic.expressions import (
@@ -46,7 +46,6 @@ _UPRIGHT_UNIT = r"\{\s*(\\(?:mathrm|text)\s*(?:\{[^{}]+\}|[A-Za-z])(?:\^(?:\d|\{
 _UNIT_FRACTION = re.compile(rf"(?!\{{\s*\\mathrm\s*\{{?d\b)\s*{_UPRIGHT_UNIT}\s*{_UPRIGHT_UNIT}")
 _DEGREES = re.compile(r"\\circ|\{\s*\\circ\s*\}")
 _FUNCTIONS = frozenset("sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln".split())
-SYMBOLS = formulas.GREEK | {"ell", "hbar", "infty"}
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
 _BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
 """What holds all that a function is of: brackets, perhaps in braces, as other programs write."""
