@@ -54,7 +54,8 @@ _WITH_BRACES = frozenset(
 )
 """Commands whose argument stands in braces."""
 _LETTERS = re.compile(
-    r"(?<![\\A-Za-z])([A-Za-z]{2,})(?![A-Za-z0-9])(?=(\s*(?:\\(?:left|[bB]igg?l?)\s*)?\()|(\{)|)"
+    r"(?<![\\A-Za-z])((?:\\\\)?([A-Za-z]{2,}))(?![A-Za-z0-9])"
+    r"(?=(\s*(?:\\(?:left|[bB]igg?l?)\s*)?\()|(\{)|)"
 )
 _LETTER = re.compile(r"(?<![A-Za-z\\])[A-Za-z](?![A-Za-z])")
 _BRACKET = re.compile(r"\\[{}]|\\.|[()\[\]]", re.DOTALL)
@@ -179,12 +180,12 @@ def _check_letters(
     """
     words = [*_LETTERS.finditer(tex.text)]
     for word in words:
-        name, bracket, brace = word.groups()
+        _, name, bracket, brace = word.groups()  # the first may begin with two backslashes
         is_name = name in SYMBOLS and not letters >= {*name}
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue
-        if sum(run.count(name) for run in signs.runs) < sum(name == match[1] for match in words):
+        if sum(run.count(name) for run in signs.runs) < sum(name == match[2] for match in words):
             continue
         message = f"`{name}` would be shown as a product of letters"
         help = f"write `\\{name}`, or `\\mathrm{{{name}}}` for a name"
