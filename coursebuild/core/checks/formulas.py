@@ -157,13 +157,12 @@ def _letter_runs(elements: Iterable[Element], parent: str = "") -> Iterator[str]
     """The letters that stand beside each other as names of their own; indices are words."""
     run = ""
     for at, child in enumerate(elements):
-        has_script = child.tag in ("msup", *_INDEXED)  # as in `omega^2`
-        base = child[0] if has_script else child
-        letter = base.text if base.tag == "mi" and base.text else ""
-        is_letter = len(letter) == 1 and letter.isascii()
-        run += letter if is_letter else ""
-        if is_letter and not has_script:
-            continue
+        base = child[0] if child.tag in ("msup", *_INDEXED) else child  # as in `omega^2`
+        text = base.text or ""
+        if base.tag == "mi" and len(text) == 1 and text.isascii():
+            run += text
+            if base is child:
+                continue
         yield run
         run = ""
         if at != 1 or parent not in _INDEXED:

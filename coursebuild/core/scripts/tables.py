@@ -232,15 +232,15 @@ class TableMatcher:
             text = self.text
         titles = [squeeze(title.text) for title in self.titles if scan(title.text)]
         above = [line.text for line in text.lines[:at] if titles]
-        headers = (line for line in reversed(above) if all(t in squeeze(line) for t in titles))
-        header = next(headers, "")  # such as `25%  75%`, which has the look of a row
+        above = [line for line in above if all(title in squeeze(line) for title in titles)]
+        header = "".join(above[-1:])  # such as `25%  75%`, which has the look of a row
         cells = (re.escape(c.mapped.text) for c in self.rows[0] if not c.canonical.numbers)
         cell_pattern = re.compile(rf"(?<!\w)(?:{'|'.join(cells) or '(?!)'})(?!\w)")
         row, numbers = text.lines[at].text, text.lines[at].numbers
-        above = [text.title(at, n) or title_of_column(row, n.start, header) for n in numbers]
+        names = [text.title(at, n) or title_of_column(row, n.start, header) for n in numbers]
         return [
             PrintedName(cell_pattern.sub(",", lead), title, n.text, text.unit(at, n))
-            for lead, title, n in zip(text.leads(at), above, numbers, strict=True)
+            for lead, title, n in zip(text.leads(at), names, numbers, strict=True)
         ]
 
     def _count_lines(self, layout: LineLayout | None) -> int:

@@ -100,13 +100,13 @@ class _Reader:
         if space is not None:
             self.at = space.end()
         token = TOKEN.match(self.tex, self.at, self.end)
-        self.peeked = self.at, token[0] if token is not None else ""
+        self.peeked = self.at, token[0] if token else ""
         return self.peeked[1]
 
     def take(self, *signs: str) -> str:
         """Consume and return the next token if it is one of these."""
         sign = self.peek()
-        if not sign or sign not in signs:
+        if sign not in signs:
             return ""
         self.at += len(sign)
         return sign
@@ -128,7 +128,7 @@ class _Reader:
         if self.take("{"):
             return self.bracket("}")
         digit = self.peek()
-        if digit.isascii() and digit.isdigit():
+        if digit.isdecimal():
             self.at += 1
             return Expression("number", self.at - 1, self.at, text=digit)
         return self.base()
