@@ -13,7 +13,7 @@ from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.model.walk import DisplayFormula, feature_block_ids
 from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.python_syntax import check_syntax, find_slips
+from coursebuild.core.syntax.python_syntax import check_syntax, find_windows
 from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
@@ -108,8 +108,8 @@ def _check_scripts(
         mistakes = [d for d in diagnostics if d.rule == "python-syntax"]
         if parts and not any(p.span.contains(d.span) for p in parts for d in mistakes):
             yield from check_syntax(script.code)
-        if script.is_python and not script.norun:
-            yield from find_slips(script.code, has_figures=bool(script.figures))
+        if script.is_python and not (script.figures or script.norun):
+            yield from find_windows(script.code)
 
 
 def find_reordering(place: Span, *, is_code: bool) -> Iterator[Diagnostic]:

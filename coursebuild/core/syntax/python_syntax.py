@@ -5,36 +5,25 @@ from __future__ import annotations
 import ast
 import re
 import warnings
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
 _LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
-_KEY = re.compile(r"""([\d.]+|"[^"\n]*"|'[^'\n]*')\s*:""")
 _SHOWS = re.compile(r"(?:matplotlib\.pyplot|plotly\.io)\.show")
 
 
-def find_slips(code: Excerpt, *, has_figures: bool) -> Iterator[Diagnostic]:
-    """Report keys that a dict has twice, and the first picture that nothing saves."""
-    keys = _KEY.findall(code.text)
-    may_show = not has_figures and re.search("matplotlib|plotly", code.text) is not None
-    if not (may_show or len({*keys}) < len(keys)) or _compile_error(code.text):
+def find_windows(code: Excerpt) -> Iterator[Diagnostic]:
+    """Report the first picture that a script without figures shows and does not save."""
+    if not re.search("matplotlib|plotly", code.text):
         return
-    nodes = [*ast.walk(ast.parse(code.text))]
-    for display in nodes:
-        values = set[object]()
-        for key in display.keys if isinstance(display, ast.Dict) else ():
-            if isinstance(key, ast.Constant):
-                if key.value in values:
-                    message = f"a dict has `{ast.unparse(key)}` twice, and keeps the last value"
-                    yield diagnose("python-key", code.lines()[key.lineno - 1].span(), message)
-                values.add(key.value)
-    yield from _find_windows(code, nodes) if may_show else ()
-
-
-def _find_windows(code: Excerpt, nodes: Iterable[ast.AST]) -> Iterator[Diagnostic]:
+    try:
+        tree = ast.parse(code.text)
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        return
+    nodes = list(ast.walk(tree))
     names: dict[str, str] = {}
     for node in nodes:
         if isinstance(node, ast.Import):
