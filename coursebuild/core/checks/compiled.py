@@ -255,6 +255,9 @@ def _find_fault(text: MjcfText) -> Iterator[Diagnostic]:
         yield text.diagnose(f"holds {fault}", place, help)
 
 
+_TEMPLATE = re.compile(r"\{\{|\{%|\$\{|\$\((?:arg|find)\b|\bxacro:")
+
+
 def _check_text(
     text: MjcfText,
     result: CompileResult,
@@ -277,6 +280,9 @@ def _check_text(
     elif result.error:
         if isinstance(block, Mjcf) and block.fragment is None and "<mujoco" not in text.text:
             help = 'if it is a part of a model say so: `fragment="worldbody"`'
+        if _TEMPLATE.search(text.text):
+            help = "what Jinja or xacro fills in first is no model yet: show it as a block of "
+            help += "kind `xml`, and name a file otherwise, as `arm.xml.j2`"
         yield _diagnose_failure(text, result, readable, models, help)
     else:
         yield from _find_fault(text)

@@ -32,11 +32,11 @@ from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt
 
-GREEK = frozenset(
+SYMBOLS = frozenset(
     """
     alpha beta gamma delta epsilon varepsilon zeta eta theta vartheta iota kappa lambda mu nu xi pi
     rho varrho sigma tau upsilon phi varphi chi psi omega Gamma Delta Theta Lambda Xi Pi Sigma
-    Upsilon Phi Psi Omega
+    Upsilon Phi Psi Omega ell hbar infty
     """.split()
 )
 _FUNCTIONS = frozenset(
@@ -54,7 +54,8 @@ _WITH_BRACES = frozenset(
 )
 """Commands whose argument stands in braces."""
 _LETTERS = re.compile(
-    r"(?<![\\A-Za-z])([A-Za-z]{2,})(?![A-Za-z0-9])(?=(\s*(?:\\(?:left|[bB]igg?l?)\s*)?\()|(\{)|)"
+    r"(?<![\\A-Za-z])((?:\\\\)?([A-Za-z]{2,}))(?![A-Za-z0-9])"
+    r"(?=(\s*(?:\\(?:left|[bB]igg?l?)\s*)?\()|(\{)|)"
 )
 _LETTER = re.compile(r"(?<![A-Za-z\\])[A-Za-z](?![A-Za-z])")
 _BRACKET = re.compile(r"\\[{}]|\\.|[()\[\]]", re.DOTALL)
@@ -111,7 +112,7 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
         span = tex.span(at, at + 1)
     help = ""
     if command := re.search(r"unknown command \\([A-Za-z]+)", error.message):
-        likely = nearest(command[1], GREEK | _FUNCTIONS | _WITH_BRACES)
+        likely = nearest(command[1], SYMBOLS | _FUNCTIONS | _WITH_BRACES)
         at = tex.text.find(command[1])
         if likely is not None and at >= 0:
             place = tex.span(at, at + len(command[1]))
@@ -156,10 +157,12 @@ def _letter_runs(elements: Iterable[Element], parent: str = "") -> Iterator[str]
     """The letters that stand beside each other as names of their own; indices are words."""
     run = ""
     for at, child in enumerate(elements):
-        text = child.text or ""
-        if child.tag == "mi" and len(text) == 1 and text.isascii():
+        base = child[0] if child.tag in ("msup", *_INDEXED) else child  # as in `omega^2`
+        text = base.text or ""
+        if base.tag == "mi" and len(text) == 1 and text.isascii():
             run += text
-            continue
+            if base is child:
+                continue
         yield run
         run = ""
         if at != 1 or parent not in _INDEXED:
@@ -176,12 +179,12 @@ def _check_letters(
     """
     words = [*_LETTERS.finditer(tex.text)]
     for word in words:
-        name, bracket, brace = word.groups()
-        is_name = name in GREEK and not letters >= {*name}
+        _, name, bracket, brace = word.groups()  # the first may begin with two backslashes
+        is_name = name in SYMBOLS and not letters >= {*name}
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue
-        if sum(run.count(name) for run in signs.runs) < sum(name == match[1] for match in words):
+        if sum(run.count(name) for run in signs.runs) < sum(name == match[2] for match in words):
             continue
         message = f"`{name}` would be shown as a product of letters"
         help = f"write `\\{name}`, or `\\mathrm{{{name}}}` for a name"

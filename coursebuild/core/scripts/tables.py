@@ -47,11 +47,12 @@ from coursebuild.core.scripts.table_cells import (
     misplaced_titles,
     number_text,
     row_text,
+    squeeze,
     table_rows,
     words_of,
 )
-from coursebuild.core.text.numbers import Number, relative_error
-from coursebuild.core.text.quantities import UnitText, are_different
+from coursebuild.core.text.numbers import Number, relative_error, scan
+from coursebuild.core.text.quantities import UnitText, are_different, title_of_column
 from coursebuild.core.text.source import Span
 
 _ALIKE_WEIGHT = 6
@@ -227,11 +228,17 @@ class TableMatcher:
         text = self._text_with_gaps
         if len(text.lines[at].numbers) != len(self.text.lines[at].numbers):
             text = self.text
+        titles = [squeeze(title.text) for title in self.titles if scan(title.text)]
+        above = [line.text for line in text.lines[:at] if titles]
+        above = [line for line in above if all(title in squeeze(line) for title in titles)]
+        header = "".join(above[-1:])  # such as `25%  75%`, which has the look of a row
         cells = (re.escape(c.mapped.text) for c in self.rows[0] if not c.canonical.numbers)
         cell_pattern = re.compile(rf"(?<!\w)(?:{'|'.join(cells) or '(?!)'})(?!\w)")
+        row, numbers = text.lines[at].text, text.lines[at].numbers
+        names = [text.title(at, n) or title_of_column(row, n.start, header) for n in numbers]
         return [
-            PrintedName(cell_pattern.sub(",", lead), text.title(at, n), n.text, text.unit(at, n))
-            for lead, n in zip(text.leads(at), text.lines[at].numbers, strict=True)
+            PrintedName(cell_pattern.sub(",", lead), title, n.text, text.unit(at, n))
+            for lead, title, n in zip(text.leads(at), names, numbers, strict=True)
         ]
 
     def _count_lines(self, layout: LineLayout | None) -> int:
@@ -376,10 +383,17 @@ class TableMatcher:
             places = {column: numbers.index(number) for column, number in pairs}
             names = self._names(row.line)
             # Where the first number has no name, and words stand behind the last, they all do.
-            are_behind = bool(places) and not names[0].text and words_of(line[numbers[-1].end :])
-            for column, at, is_certain in misplaced_titles(self.titles, names, places):
+            tail = line[numbers[-1].end :] if places else ""
+            are_behind = bool(words_of(tail)) and not names[0].text
+            words = [name.above.rpartition("_")[0] for name in names]  # `mass_kg`
+            words = [*(name.before for name in names[1:]), tail] if are_behind else words
+            likely = [n._replace(above=w.strip(" ,;")) for n, w in zip(names, words, strict=True)]
+            verdicts = [*misplaced_titles(self.titles, likely, places)]
+            if len(verdicts) < 2:  # in one column alone it is a remark
+                likely, verdicts = names, [*misplaced_titles(self.titles, names, places)]
+            for column, at, is_certain in verdicts:
                 if is_certain or not are_behind:
-                    yield self.titles[column], names[at].reading, is_certain
+                    yield self.titles[column], likely[at].reading, is_certain
 
     def unprinted_units(self) -> Iterator[tuple[Span, str]]:
         """The titles whose units nothing prints, and these."""

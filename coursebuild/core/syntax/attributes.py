@@ -168,6 +168,7 @@ _UNREAD = re.compile(
     r"|(?<=`)(?<!\\`)\{\s*(?P<binding>out|code)\b[^{}`\n]*\}?"
     r"|(?<=\$)(?<!\\\$)\{\s*(?P<symbol>symbol|unit|value|out)\b[^{}\n]*\}?"
     r"|(?<=\])(?<!\\\])\{\s*(?P<term>term)\b[^{}\n]*\}?"
+    r"|(?<=\$\$|\$ )\{(?P<label>eq):[\w-]+\}"
 )
 """Braces that begin as an attribute does: after code, a formula, a bracket, or for a source
 anywhere."""
@@ -188,6 +189,7 @@ _HELPS = {
     "given": _GIVEN_HELP,
     "symbol": _SYMBOL_HELP,
     "term": _TERM_HELP,
+    "label": "a label begins with `#`: write `{#eq:name}`",
 }
 
 

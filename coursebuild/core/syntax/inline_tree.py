@@ -225,7 +225,7 @@ class _TokenReader:
             self.report(diagnostic)
             return None
         title, target = str(opening.attrs.get("title", "")), classify(url)
-        if (diagnostic := check_link_text(target, children, span)) is not None:
+        if (diagnostic := check_link_text(target, children, span, self.state.words)) is not None:
             self.report(diagnostic)
         return model.Link(span, target, destination, title, children, bare=not children)
 

@@ -27,6 +27,7 @@ from coursebuild.core.model import (
     TermTarget,
     Text,
     UrlTarget,
+    plain_text,
 )
 from coursebuild.core.model.course import Words
 from coursebuild.core.model.inlines import LABEL_KINDS
@@ -90,18 +91,23 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
     return check_scheme(url, span, image=True)
 
 
-def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
-    """The diagnostic of a text or an address that is missing."""
+def check_link_text(
+    target: Target, children: tuple[Inline, ...], span: Span, words: Words
+) -> Diagnostic | None:
+    """The diagnostic of a text or an address that is missing, or names another lesson."""
+    lesson = isinstance(target, LessonTarget) and mentioned_lesson(plain_text(children), words)
+    address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
+    help = "write one in the brackets"
     if target == UrlTarget(""):
-        message, help = "this link has no address", "write one in the brackets behind its text"
-        return diagnose("link-text", span, message, help=help)
-    if not children:
-        address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
-        if ":" in address.partition("#")[2]:
-            return None  # it may show a number
-        message, help = "this link has no text, so no reader sees it", "write one in the brackets"
-        return diagnose("link-text", span, message, help=help)
-    return None
+        message, help = "this link has no address", f"{help} behind its text"
+    elif not children and ":" not in address.partition("#")[2]:  # else it may show a number
+        message = "this link has no text, so no reader sees it"
+    elif lesson and isinstance(target, LessonTarget) and lesson != target.id:
+        message = f"the text names lesson {lesson}, and the address lesson {target.id}"
+        help = "name the same lesson in both"
+    else:
+        return None
+    return diagnose("link-text", span, message, help=help)
 
 
 _LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"
@@ -142,6 +148,12 @@ def _mentions(words: Words) -> re.Pattern[str]:
         rf"((?:{lesson})\s+{_LESSON}|(?:{lessons})\s+{_LESSON}(?:{joint}{_LESSON})*)"
         rf"|(?:{level})\s+{_LEVEL}|(?:{levels})\s+{_LEVEL}(?:{joint}{_LEVEL})*)"
     )
+
+
+def mentioned_lesson(text: str, words: Words) -> str:
+    """The lesson that a whole text mentions; empty for other texts and for several lessons."""
+    match, numbers = _mentions(words).fullmatch(text), _NUMBER.findall(text)
+    return numbers[0] if match and match[1] and len(numbers) == 1 else ""
 
 
 def text_inlines(run: Sequence[TextPiece], content: Excerpt) -> list[Inline]:

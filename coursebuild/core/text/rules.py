@@ -137,7 +137,7 @@ GROUPS: dict[str, dict[str, str]] = {
     "Links and bound numbers": {
         "link-lesson": "A link or mention names a lesson that is not in the map.",
         "link-page": "A link names a page that is not in the map.",
-        "link-text": "A link has no text or no address.",
+        "link-text": "A link has no text or no address, or its text names another lesson.",
         "link-term": "A link names a term that no lesson defines.",
         "link-model": "A link names a model that is not in `models/`.",
         "link-example": "A link names a script that is in no lesson.",

@@ -210,31 +210,39 @@ def _unit_of_macros(tex: str) -> str:
 
 
 _ARGUMENT = r"\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
-_QUANTITY = re.compile(
-    rf"\\(?:(?P<one>num|ang|unit|si)|qty|SI)(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}"
-    rf"(?(one)|{_ARGUMENT})"
+QUANTITY = re.compile(
+    r"\\(?:(?:num|(?P<of_unit>qty|SI))(?P<many>list|product|(?P<range>range))?|(?P<angle>ang)"
+    rf"|(?P<bare>unit|si))(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}(?(range){_ARGUMENT})"
+    rf"(?(of_unit){_ARGUMENT})"
 )
+_NEXT = re.compile(r"\s*(?:;|(?<=[\d\s])x(?=[\d\s]))\s*")
+"""Between the numbers of one argument."""
+_BETWEEN = {"list": r",\;", "range": r"\text{ – }"}
+"""What is shown between numbers, which are factors otherwise; in no language."""
 _DEFINITION = re.compile(r"\\(?:def|[a-z]*command\*?\s*\{?)\s*(\\[A-Za-z]+)")
 
 
 def write_quantities(tex: str) -> str:
     r"""TeX without the commands of `siunitx`: `\qty{3}{\kilo\metre}` is `3\,\mathrm{km}`."""
-    if any(_QUANTITY.match(f"{name}{{}}{{}}") for name in _DEFINITION.findall(tex)):
+    if any(QUANTITY.match(f"{name}{{}}{{}}") for name in _DEFINITION.findall(tex)):
         return tex
 
     def write(match: re.Match[str]) -> str:
-        kind, number, unit = match["one"], match[2], match[3] or ""
-        if kind in ("unit", "si"):
+        *_, number, last, unit = match.groups("")
+        if match["angle"]:
+            return "".join(map("".join, zip(number.split(";"), "°′″", strict=False)))
+        if match["bare"]:
             number, unit = "", number
-        elif kind == "ang":
-            number = "".join(map("".join, zip(number.split(";"), "°′″", strict=False)))
-        number = number.replace(",", ".").replace("+-", r"\pm ")
-        number = re.sub(r"(?<=[\d.])[eE]([-+]?\d+)", r"\\times10^{\1}", number)
         symbols = _unit_of_macros(unit).replace(" ", r"\,").replace("%", r"\%")
-        space = r"\," if number and symbols not in "°′″" else ""
-        return f"{number}{space}" + (rf"\mathrm{{{symbols}}}" if symbols else "")
+        unit = rf"\mathrm{{{symbols}}}" if symbols else ""
+        space = "" if symbols in "°′″" else r"\,"
+        parts = _NEXT.split(f"{number};{last}".replace(",", "."))
+        sign = _BETWEEN.get(match["many"], r"\times ")
+        text = sign.join(f"{part}{space}{unit}" for part in parts if part) or unit
+        text = re.sub(r"(?<=\d) (?=\d)", "", text).replace("+-", r"\pm ")
+        return re.sub(r"(?<=[\d.])[eE]([-+]?\d+)", r"\\times10^{\1}", text)
 
-    return _QUANTITY.sub(write, tex)
+    return QUANTITY.sub(write, tex)
 
 
 def find_unit(text: str) -> Unit | None:

@@ -43,6 +43,11 @@ class Expression(Struct, frozen=True):
     text: str = ""
     """The digits of a number; the name of a symbol or a unit."""
 
+    def move(self, start: int, end: int) -> Expression:
+        """Return it as if all of it were written between these offsets."""
+        parts = tuple(part.move(start, end) for part in self.parts)
+        return replace(self, start=start, end=end, parts=parts)
+
     def walk(self) -> Iterator[Expression]:
         """Yield this expression and all expressions in it."""
         yield self

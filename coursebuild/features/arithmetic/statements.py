@@ -13,8 +13,9 @@ from functools import cached_property, lru_cache
 
 from msgspec import Struct
 
+from coursebuild.core.checks.formulas import SYMBOLS
 from coursebuild.features.arithmetic.expressions import CONSTANTS, Expression, NotUnderstood
-from coursebuild.features.arithmetic.tex import SPACE, SYMBOLS, TOKEN, read_expression
+from coursebuild.features.arithmetic.tex import SPACE, TOKEN, read_expression
 
 _MAX_LENGTH = 5_000
 _DIGITS = re.compile("[0-9],[0-9]")

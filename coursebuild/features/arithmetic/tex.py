@@ -15,8 +15,9 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.core.checks import formulas
+from coursebuild.core.checks.formulas import SYMBOLS
 from coursebuild.core.text.quantities import plain_unit
+from coursebuild.core.text.units import QUANTITY, write_quantities
 from coursebuild.features.arithmetic.expressions import (
     OF_QUOTIENT,
     SIDE_BY_SIDE,
@@ -45,7 +46,6 @@ _UPRIGHT_UNIT = r"\{\s*(\\(?:mathrm|text)\s*(?:\{[^{}]+\}|[A-Za-z])(?:\^(?:\d|\{
 _UNIT_FRACTION = re.compile(rf"(?!\{{\s*\\mathrm\s*\{{?d\b)\s*{_UPRIGHT_UNIT}\s*{_UPRIGHT_UNIT}")
 _DEGREES = re.compile(r"\\circ|\{\s*\\circ\s*\}")
 _FUNCTIONS = frozenset("sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln".split())
-SYMBOLS = formulas.GREEK | {"ell", "hbar", "infty"}
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
 _BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
 """What holds all that a function is of: brackets, perhaps in braces, as other programs write."""
@@ -100,13 +100,13 @@ class _Reader:
         if space is not None:
             self.at = space.end()
         token = TOKEN.match(self.tex, self.at, self.end)
-        self.peeked = self.at, token[0] if token is not None else ""
+        self.peeked = self.at, token[0] if token else ""
         return self.peeked[1]
 
     def take(self, *signs: str) -> str:
         """Consume and return the next token if it is one of these."""
         sign = self.peek()
-        if not sign or sign not in signs:
+        if sign not in signs:
             return ""
         self.at += len(sign)
         return sign
@@ -128,7 +128,7 @@ class _Reader:
         if self.take("{"):
             return self.bracket("}")
         digit = self.peek()
-        if digit.isascii() and digit.isdigit():
+        if digit.isdecimal():
             self.at += 1
             return Expression("number", self.at - 1, self.at, text=digit)
         return self.base()
@@ -261,8 +261,7 @@ class _Reader:
 
     def base(self) -> Expression:
         """Parse a number, a symbol, a group, a fraction, a root or a function."""
-        sign = self.peek()
-        start = self.at
+        sign, start = self.peek(), self.at
         self.count += 1
         if self.count > _MAX_FACTORS:
             raise self.not_understood("it is too long")
@@ -274,6 +273,13 @@ class _Reader:
             if _E_NOTATION.match(self.tex, self.at, self.end):
                 raise NotUnderstood("it may be a power of ten", start, self.at)
             return Expression("number", start, self.at, text=digits)
+        if quantity := QUANTITY.match(self.tex, start, self.end):
+            self.at = quantity.end()
+            text = write_quantities(quantity[0])
+            try:
+                return read_expression(text, 0, len(text)).move(start, self.at)
+            except NotUnderstood as error:
+                raise NotUnderstood(error.reason, start, self.at) from None
         self.at += len(sign)
         if sign in _BRACKETS:
             inner = self.bracket(_BRACKETS[sign])
@@ -286,12 +292,6 @@ class _Reader:
             index = self.bracket("]") if self.take("[") else _NUMBER_TWO
             root = Expression("/", start, start, (_NUMBER_ONE, index))
             return Expression("^", start, self.at, (self.group(), root))
-        if sign == r"\num":
-            return self.group()
-        if sign in (r"\qty", r"\SI"):
-            amount, at, text = self.group(), self.at, plain_unit(rf"\unit{{{self.raw()}}}")
-            parts = amount, Expression("unit", at, self.at, text=text)
-            return Expression("*", start, self.at, parts)
         if sign in (r"\underbrace", r"\overbrace"):
             inner = self.group()
             _ = self.take("_", "^") and self.raw()
@@ -302,7 +302,7 @@ class _Reader:
             return self.series(sign[1:], start)
         if sign == r"\int":
             return self.integral(start)
-        if sign.lstrip("\\") in _FUNCTIONS and sign != sign.lstrip("\\"):
+        if sign[1:] in _FUNCTIONS:
             return self.function(sign[1:], start)
         self.at = start
         if (upright := self.match(_UPRIGHT)) and self.tex[upright.end() :].startswith(("e", "{e}")):
@@ -323,7 +323,7 @@ class _Reader:
         sign, start = self.peek(), self.at
         name = sign.lstrip("\\")
         self.at += len(sign)
-        if name in _ACCENTS and sign != name:
+        if name in _ACCENTS:
             inner = self.raw()
             if not _LETTER.fullmatch(inner):
                 raise NotUnderstood("an accent stands over more than a letter", start, self.at)
@@ -355,8 +355,7 @@ class _Reader:
             text = "/".join(f"({plain_unit(unit)})" for unit in units.groups())
             return Expression("unit", start, self.at, text=text)
         numerator_start = self.at
-        has_brace = self.take("{")
-        if has_brace and self.match(_DIFFERENTIAL):
+        if self.take("{") and self.match(_DIFFERENTIAL):
             return self.derivative(start)
         self.at = numerator_start
         return Expression("/", start, self.at, (self.group(), self.group()))
