@@ -157,8 +157,8 @@ class JsonChild:
                 self.stop()
                 errors.seek(0)
                 cause = self._excess or gate.last_line(errors.read()) or "the import crashed"
-                number = re.match(r"\w*Error: \[Errno (\d+)\]", cause)
-                lack = number and lacking(OSError(int(number[1]), ""))
+                match = re.match(r"\w*Error: \[Errno (\d+)\]", cause)
+                lack = match and lacking(OSError(int(match[1]), ""))
                 raise lack or EffectError(f"MuJoCo cannot be loaded: {cause}")
         with contextlib.suppress(AttributeError, OSError):  # only Linux can
             limits = [(resource.RLIMIT_DATA, self.memory << 20), (resource.RLIMIT_CORE, 0)]
