@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from msgspec.structs import replace
 
@@ -51,10 +51,8 @@ from coursebuild.core.syntax.document import find_conflict, find_reordering, par
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Source, Span
+from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.theme_files import load_theme
-
-if TYPE_CHECKING:
-    from coursebuild.pipeline.reader import Reader
 
 Code: TypeAlias = Literal["run", "known", "run before", "none", "refuse"]
 """What becomes of a course's own features: they run; they do if they have run before, and if not

@@ -24,6 +24,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import check_formulas, document_formulas
 from coursebuild.core.checks.lessons import check_course
+from coursebuild.core.engine.page_pool import Workers, can_fork
 from coursebuild.core.engine.store import Store, value_reader
 from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts
@@ -33,6 +34,7 @@ from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.draft_writer import DraftWriter
 from coursebuild.core.pages.listings import find_imports, highlight_lines
 from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.numbering import items_of
@@ -59,7 +61,6 @@ from coursebuild.pipeline.requests import (
 )
 
 if TYPE_CHECKING:
-    from coursebuild.core.engine.page_pool import Workers
     from coursebuild.core.run.v8 import MathEngine
 
 Value = TypeVar("Value")
@@ -318,13 +319,10 @@ class Reader:
             document = None if whole is None else whole.document
             renderer = self._renderer_for(request, whole)
             inputs = request.inputs
+            writer: Callable[..., PageWriter] = PageWriter
             if request.mistakes:
-                from coursebuild.core.pages.draft_writer import DraftWriter
-
-                make_writer = functools.partial(DraftWriter, mistakes=request.mistakes)
-                head, html, context = draw(inputs, document, renderer, make_writer)
-            else:
-                head, html, context = draw(inputs, document, renderer)
+                writer = functools.partial(DraftWriter, mistakes=request.mistakes)
+            head, html, context = draw(inputs, document, renderer, writer)
             body = isolate_formulas(html) if direction(request.language) == "rtl" else html
             page_record, body = record(head, body, request.base_url, context)
             all_notes = {
@@ -374,13 +372,11 @@ class Reader:
         """Answer requests, by workers where there are many; name the worker of each answer."""
         first = tuple(islice(requests, max(_MIN_PARALLEL, self._jobs * _MIN_PARALLEL // 2)))
         requests = chain(first, requests)
-        if self._workers is None and len(first) >= _MIN_PARALLEL and self._jobs > 1:
-            from coursebuild.core.engine.page_pool import Workers, can_fork
-
-            # Before the stage begins, which may start a thread: a fork does not copy threads.
-            if can_fork():
-                count = min(self._jobs, -(-2 * len(first) // _MIN_PARALLEL))
-                self._workers = Workers(self._answer, count)
+        is_worth_it = len(first) >= _MIN_PARALLEL and self._jobs > 1
+        # Before the stage begins, which may start a thread: a fork does not copy threads.
+        if self._workers is None and is_worth_it and can_fork():
+            count = min(self._jobs, -(-2 * len(first) // _MIN_PARALLEL))
+            self._workers = Workers(self._answer, count)
         if not first:
             return
         with self._stage(name):

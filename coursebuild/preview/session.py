@@ -195,8 +195,8 @@ class Session:
             self._show(replace(course, levels=levels, pages=all_pages))
             for owner, diagnostics in changed_owners:
                 assert owner.document is not None and self.course and self._targets
-                found = check_document(self.course, owner.document, self._targets)
-                self._diagnostics_by_file[owner.path] = (*diagnostics, *found)
+                mistakes = check_document(self.course, owner.document, self._targets)
+                self._diagnostics_by_file[owner.path] = (*diagnostics, *mistakes)
             self.notify(is_saved=is_saved)
             for owner, _ in changed_owners if self._site else ():
                 self.find(urls.owner_path(owner))

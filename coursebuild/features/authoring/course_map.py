@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
-from itertools import count
 
 from msgspec.structs import replace
 
@@ -84,21 +83,6 @@ def _insert_table(text: str, lines: Sequence[str], later: Sequence[Span]) -> str
     assert comments is not None
     start = comments.start()
     return text[:start] + line_end.join([*lines, "", ""]) + text[start:]
-
-
-def next_lesson_ids(course: Course) -> list[str]:
-    """The first free id in each level of a course."""
-    ids = {lesson.id for lesson in course.lessons}
-    return [
-        next(id for number in count(1) if (id := f"{level.id}.{number}") not in ids)
-        for level in course.levels
-    ]
-
-
-def next_level_id(course: Course) -> str:
-    """The number behind those of the levels of a course."""
-    numbers = [int(level.id) for level in course.levels if level.id.isdecimal()]
-    return str(max(numbers, default=0) + 1)
 
 
 def with_lesson_renamed(course: Course, old: Lesson, new: str, edits: Sequence[Edit]) -> str:

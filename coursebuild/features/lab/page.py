@@ -141,8 +141,8 @@ def page_view(page: PageContext, block: Lab) -> LabView:
         runs, words = page.inputs.runs.values(), page.renderer.words
         versions = {version for run in runs for version in run.versions}
         engines = {v.removeprefix("MuJoCo ") for v in versions if v.startswith("MuJoCo ")}
-        others = words.join(sorted(engines - {LAB_ENGINE}))
-        remark = words("lab.two_engines", scripts=others) if others else ""
+        other_engines = words.join(sorted(engines - {LAB_ENGINE}))
+        remark = words("lab.two_engines", scripts=other_engines) if other_engines else ""
         recorded = replace(recorded, verification=f"{recorded.verification} {remark}".rstrip())
     view = replace(view, model_href=href, start=start, recorded=recorded)
     if block.label is None:
