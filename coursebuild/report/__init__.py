@@ -66,7 +66,8 @@ def to_junit(report: Report) -> str:
     """One test case for each script, lab, and file with diagnostics; errors are failures."""
     suites = Element("testsuites")
     suite = SubElement(suites, "testsuite", name="coursebuild")
-    for line in (*report.scripts, *report.labs):
+    lines: tuple[ScriptLine | TrialLine, ...] = (*report.scripts, *report.labs)
+    for line in lines:
         name = line.path if isinstance(line, ScriptLine) else line.name
         reason = unrun_reason(line) if isinstance(line, ScriptLine) else line.untried
         case = _add_case(suite, f"lesson {line.lesson}", name, line.seconds)

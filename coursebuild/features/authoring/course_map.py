@@ -138,13 +138,7 @@ def with_feature(course: Course, path: str) -> str:
         line = f"{_line_end(source.text)}features = [{toml_string(path)}]"
         end = _end_of_line(source.text, title.end)
         edit = Edit(source.span(end, end), line)
-    text = apply_edits(source.text, [edit])
-    new_course = parse_course_map(Source(source.path, text)).value
-    if new_course is None or path not in [feature.path for feature in new_course.features]:
-        raise UsageError(
-            f"{source.path} cannot have a feature: add `{path}` to `features` yourself"
-        )
-    return text
+    return _require_valid(course, apply_edits(source.text, [edit]), path, "feature")
 
 
 def _check_free(course: Course, id: str) -> None:
@@ -188,6 +182,7 @@ def _require_valid(course: Course, text: str, id: str, kind: str = "lesson") -> 
         "lesson": [lesson.id for lesson in new_course.lessons if lesson.level == _level_id(id)],
         "level": [level.id for level in new_course.levels],
         "page": [page.id for page in new_course.pages],
+        "feature": [feature.path for feature in new_course.features],
     }
     if mistakes or id not in ids[kind]:
         reason = f": {mistakes[0].message}" if mistakes else ""
