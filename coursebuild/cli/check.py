@@ -18,7 +18,7 @@ from coursebuild.output import CLEAN, write
 from coursebuild.pipeline import arguments as shared
 from coursebuild.pipeline.arguments import options_of, print_report, report_text
 from coursebuild.pipeline.check import check
-from coursebuild.pipeline.fix import Answer, fix, proposals, propose
+from coursebuild.pipeline.fix import fix, proposals, propose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.shards import read_shard
 from coursebuild.report import Report, unchanged_report
@@ -125,17 +125,17 @@ def _mend(arguments: argparse.Namespace) -> int:
     return print_report(report, arguments.format, options)
 
 
-def _ask(diagnostic: Diagnostic, change: str) -> Answer:
-    """Show a proposal, and wait for an answer."""
+def _ask(diagnostic: Diagnostic, change: str) -> str:
+    """Show a proposal, and wait for an answer: `y`, `n` or `q`."""
     style = shared.style_of(sys.stdout)
     sys.stdout.write(f"{diagnostic_text(diagnostic, style)}\n\n{printable_lines(change)}\n")
     while True:
         try:
             word = input("make this change? [y/n/q] ").strip().lower()[:1]
         except EOFError:
-            return Answer.QUIT
-        with contextlib.suppress(ValueError):
-            return Answer(word)
+            return "q"
+        if word in ("y", "n", "q"):
+            return word
 
 
 def _special_options(arguments: argparse.Namespace) -> list[str]:

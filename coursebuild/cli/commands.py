@@ -35,29 +35,6 @@ from coursebuild.output import CLEAN, FAILURE, USAGE, fail, say, write
 if TYPE_CHECKING:  # asking for the version loads nothing heavy
     from coursebuild.core.features import Command
 
-_OF_OTHER_TOOLS = {
-    "clean": "nothing needs it: `build` removes old pages, and `.coursebuild/` may be deleted",
-    "list": "`check` names every script and lab",
-}
-"""What to do instead of commands that other tools have, and this one does not need."""
-_OUR_NAMES = {
-    "accept": "update",
-    "create": "new",
-    "deploy": "build",
-    "dev": "serve",
-    "execute": "check",
-    "format": "fmt",
-    "lint": "check",
-    "preview": "serve",
-    "publish": "build",
-    "record": "update",
-    "render": "build",
-    "run": "check",
-    "test": "check",
-    "verify": "check",
-    "watch": "serve",
-}
-"""The names here of commands that other tools have."""
 _OPTIONS_OF_PACKAGES = {"--cluster": "run `pip install 'coursebuild[cluster]'`"}
 """Where options come from that are not of the core."""
 _FILES_NEEDED = 64
@@ -140,11 +117,6 @@ def _choose_command(directory: str | None, words: list[str]) -> int:
             from coursebuild import __version__
 
             return write(f"coursebuild {__version__}\n", CLEAN)
-        case ["help", name, *_] if name in _OF_OTHER_TOOLS:
-            return write(f"There is no command `{name}`: {_OF_OTHER_TOOLS[name]}.\n", CLEAN)
-        case ["help", name, *_] if name in _OUR_NAMES and name not in known_commands():
-            write(f"`{name}` is `{_OUR_NAMES[name]}` here.\n\n", CLEAN)
-            words = [_OUR_NAMES[name], "--help"]
         case ["help", name, *_]:
             words = [name, "--help"]
         case _:
@@ -157,12 +129,7 @@ def _choose_command(directory: str | None, words: list[str]) -> int:
     if command is None:
         from coursebuild.core.text.diagnostics import did_you_mean
 
-        help = (
-            _OF_OTHER_TOOLS.get(name)
-            or (f"did you mean `{_OUR_NAMES[name]}`?" if name in _OUR_NAMES else "")
-            or did_you_mean(name, known_commands())
-            or "`coursebuild help` lists them"
-        )
+        help = did_you_mean(name, known_commands()) or "`coursebuild help` lists them"
         raise UsageError(f"there is no command `{name}`", help=help)
     with contextlib.ExitStack() as resources:  # what has been started by the arguments ends here
         namespace = argparse.Namespace(root=directory, words=tuple(words), resources=resources)

@@ -19,11 +19,9 @@ import hashlib
 import json
 import os
 import re
-import socket
 import sys
 import threading
 from collections.abc import Iterator
-from errno import EADDRINUSE
 from html import escape
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -104,7 +102,7 @@ def run(arguments: argparse.Namespace) -> int:
             server = PreviewServer(host, port, live_course.session, tuple(arguments.embed))
         except OSError as error:
             message = f"port {port} of {host} cannot be used: {error.strerror or error}"
-            raise UsageError(message, help=_propose_port(host, port, error)) from None
+            raise UsageError(message, help="with `--port 0`, any free one is taken") from None
         resources.callback(live_course.close)
         resources.callback(server.stop)
         live_course.start()
@@ -122,14 +120,6 @@ def run(arguments: argparse.Namespace) -> int:
             words = (options.root, first)
             threading.Thread(target=_open_in_browser, args=words, name="open", daemon=True).start()
         live_course.rebuild()
-
-
-def _propose_port(host: str, port: int, error: OSError) -> str:
-    for number in range(port + 1, min(port + 100, 65536)) if error.errno == EADDRINUSE else ():
-        with contextlib.suppress(OSError), socket.create_server((host, number)):
-            option = "" if host == "127.0.0.1" else f" --host {host}"
-            return f"`coursebuild serve{option} --port {number}`"
-    return ""
 
 
 # --- files of this user's own

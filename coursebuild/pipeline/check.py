@@ -10,7 +10,6 @@ import time
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -23,12 +22,15 @@ from coursebuild.core.model.results import Reports, Results, ScriptRun, TrialLin
 from coursebuild.core.pages.library import named_models
 from coursebuild.core.registry import feature_trials, unproven
 from coursebuild.core.run.dependencies import sought_files
+from coursebuild.core.run.mjcf import model_files
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.scripts.bound_places import find_printed
 from coursebuild.core.scripts.edit import shown_files
 from coursebuild.core.scripts.extract import extract, is_run
 from coursebuild.core.scripts.findings import unproven_units
+from coursebuild.core.scripts.noise_warnings import noise_warnings
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.scripts.sensitivity import Sensitivity
 from coursebuild.core.syntax.document import read_again
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose, sort_diagnostics
 from coursebuild.pipeline.load import Code, load
@@ -43,9 +45,6 @@ from coursebuild.pipeline.shards import Shard, write_timings
 from coursebuild.pipeline.verify import Verification, verify
 from coursebuild.report import Report, ScriptLine
 from coursebuild.report.values import unproven_things
-
-if TYPE_CHECKING:
-    from coursebuild.core.scripts.sensitivity import Sensitivity
 
 
 def check(
@@ -81,8 +80,6 @@ def check(
         remarks: tuple[str, ...] = ()
         sensitivities: tuple[Sensitivity, ...] | None = None
         if sensitivity:
-            from coursebuild.core.scripts.noise_warnings import noise_warnings
-
             runs, selected = verification.results.runs, checked_course.documents
             sensitivities = measure_sensitivity(
                 course, checked_course.options, runs, selected, halve=True
@@ -256,8 +253,6 @@ def _used_files(
     root: Path, course: Course, documents: Collection[str], runs: Iterable[ScriptRun]
 ) -> set[str]:
     """The files that some lessons and pages use: models, what scripts read, the list of sources."""
-    from coursebuild.core.run.mjcf import model_files
-
     paths = {file for run in runs if run.trace is not None for file in run.trace.files}
     for document in course.documents:
         if document.source.path in documents:

@@ -13,10 +13,10 @@
 from __future__ import annotations
 
 import difflib
-import enum
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TypeAlias
 
 from msgspec.structs import replace
 
@@ -47,16 +47,8 @@ _HIDING = frozenset(
 be found."""
 
 
-class Answer(enum.Enum):
-    """What a human says to a proposal."""
-
-    YES = "y"
-    NO = "n"
-    QUIT = "q"
-
-
-Ask = Callable[[Diagnostic, str], Answer]
-"""Shows a diagnostic and the change that is proposed, as a diff, and returns the answer."""
+Ask: TypeAlias = Callable[[Diagnostic, str], str]
+"""Shows a diagnostic and a proposed change, as a diff; returns `y`, `n`, or `q` to end."""
 
 
 def choose_fixes(
@@ -170,20 +162,20 @@ class _Fixer:
             self._read(self.texts)  # which lessons the names mean
             report = self._verify()
             accepted: list[Diagnostic] = []
-            answer = Answer.NO
+            answer = "n"
             for diagnostic in self._candidates(proposals(report.diagnostics)):
-                if answer is Answer.QUIT:
+                if answer == "q":
                     continue
                 if len(choose_fixes([*accepted, diagnostic], proposals=True)) <= len(accepted):
                     continue  # it touches an accepted one, and is proposed again if need be
                 self.tried.add(_key(diagnostic))
                 questions.append((diagnostic, "\n".join(self._diff(diagnostic))))
-                answer = Answer.NO if ask is None else ask(*questions[-1])
-                accepted += [diagnostic] if answer is Answer.YES else []
+                answer = "n" if ask is None else ask(*questions[-1])
+                accepted += [diagnostic] if answer == "y" else []
             self._make(accepted)
             if not accepted:
                 return report, questions
-            if answer is Answer.QUIT:
+            if answer == "q":
                 return self._verify(), questions
 
     def write(self, verb: str, report: Report) -> tuple[str, ...]:

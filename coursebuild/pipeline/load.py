@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from msgspec.structs import replace
 
 from coursebuild.core.checks.compiled import diagnose_orphan_scenarios
+from coursebuild.core.checks.lessons import check_course
 from coursebuild.core.checks.links import is_whole
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.course_features import features_digest, load_course_features
@@ -44,12 +45,14 @@ from coursebuild.core.pages.materials import words_for
 from coursebuild.core.registry import read_references
 from coursebuild.core.run.script_environment import course_environment, engine_version
 from coursebuild.core.scripts.edit import check_source_parts, shown_files
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.syntax.declarations import parse_declarations
+from coursebuild.core.syntax.document import find_conflict, find_reordering, parse_document
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Source, Span
-
-if TYPE_CHECKING:
-    from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.reader import Reader
+from coursebuild.pipeline.theme_files import load_theme
 
 Code: TypeAlias = Literal["run", "known", "run before", "none", "refuse"]
 """What becomes of a course's own features: they run; they do if they have run before, and if not
@@ -127,11 +130,6 @@ class _Loader:
             self._read_map, self._read_declarations = reader.read_map, reader.read_declarations
             self._read_documents, self._check = reader.read_documents, reader.check
             return
-        from coursebuild.core.checks.lessons import check_course
-        from coursebuild.core.syntax.coursemap import parse_course_map
-        from coursebuild.core.syntax.declarations import parse_declarations
-        from coursebuild.core.syntax.document import parse_document
-
         self._read_map, self._read_declarations = parse_course_map, parse_declarations
         self._check = check_course
         self._read_documents = lambda sources, callouts: [
@@ -223,8 +221,6 @@ class _Loader:
 
         Merge conflicts, and characters by which a browser shows others in another order.
         """
-        from coursebuild.core.syntax.document import find_conflict, find_reordering
-
         sources = [*self.files.declarations, *(model.source for model in self.files.models)]
         sources += [] if self.files.map is None else [self.files.map]
         paths = {*self.files.files}
@@ -251,8 +247,6 @@ class _Loader:
     def _load_theme(self, theme: Theme) -> Theme:
         if theme == Theme() and not (self.root / TEMPLATES).is_dir():
             return theme
-        from coursebuild.pipeline.theme_files import load_theme
-
         parsed_theme = load_theme(self.root, theme)
         self.diagnostics += parsed_theme.diagnostics
         return parsed_theme.value
@@ -350,8 +344,6 @@ class _Loader:
                 if closest is not None:
                     help = f"is it `{closest}`, which the map does not name?"
                     del unlisted[closest]
-                elif misnamed := self._find_misnamed(lesson.path):
-                    help = f"is it `{misnamed.name}`? the file of a lesson ends with `.md`"
                 message = f"there is no file {lesson.path}"
                 self._report("lesson-missing", lesson.span, message, help)
         for source in unlisted.values():
@@ -360,11 +352,6 @@ class _Loader:
                 help = "lessons lie in content/lessons itself: move it there, or out of content/"
             message = f"the course map does not name {source.path}"
             self._report("lesson-unlisted", source.span(0, 0), message, help)
-
-    def _find_misnamed(self, path: str) -> Path | None:
-        """A file that has the name of a lesson, but for its ending."""
-        files = self.root.glob(f"{path.removesuffix('.md')}.*")
-        return next((file for file in files if file != self.root / record_path(path)), None)
 
     def _find_pages(self, course: Course) -> list[Source]:
         """Find the texts of the pages of the map, which may lie anywhere in the course's folder."""

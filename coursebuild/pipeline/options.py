@@ -15,32 +15,30 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TextIO
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
+from coursebuild.core.engine.shared_place import shared_place
 from coursebuild.core.engine.store import SIZE, Store
+from coursebuild.core.features import Executor
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.errors import UsageError as UsageError
 from coursebuild.core.files.read import find_root
 from coursebuild.core.files.trust import FOLDER, FOREIGN
 from coursebuild.core.files.write import undo_changes
 from coursebuild.core.model import Course, Lesson, Owner
+from coursebuild.core.model.results import ScriptRun
 from coursebuild.core.run.run_store import RunStore
-from coursebuild.core.run.script_environment import course_environment
+from coursebuild.core.run.sandbox import Sandbox
+from coursebuild.core.run.script_environment import Interpreter, course_environment
+from coursebuild.core.run.script_server import RunAll
 from coursebuild.core.text.characters import printable, printable_lines
 from coursebuild.core.text.diagnostics import did_you_mean
 from coursebuild.core.text.near import nearest
 from coursebuild.output import discard
 from coursebuild.report.text import clip
-
-if TYPE_CHECKING:
-    from coursebuild.core.features import Executor
-    from coursebuild.core.model.results import ScriptRun
-    from coursebuild.core.run.sandbox import Sandbox
-    from coursebuild.core.run.script_environment import Interpreter
-    from coursebuild.core.run.script_server import RunAll
 
 _INTERVAL = 0.1
 """Seconds between updates of the live line."""
@@ -268,8 +266,6 @@ def open_store(root: Path, location: str | None, size: str | None, *, fresh: boo
         raise UsageError("--cache needs a place")
     shared = None
     if location is not None:
-        from coursebuild.core.engine.shared_place import shared_place
-
         try:
             key = os.environ.get("COURSEBUILD_CACHE_KEY", "").encode("utf-8", "surrogateescape")
             shared = shared_place(location, key)

@@ -24,12 +24,14 @@ from coursebuild.core.files.locks import project_lock
 from coursebuild.core.model import Course
 from coursebuild.core.model.results import Change, Outcome, ScriptRun, Verdict
 from coursebuild.core.registry import losses_against
+from coursebuild.core.run import mjcf
 from coursebuild.core.run.environments import (
     check_other_version,
     latest_version,
     prepare_environment,
 )
 from coursebuild.core.run.script_environment import Interpreter, engine_version, python_version
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.scripts.align import same_lines
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.diff import text_diff
@@ -162,8 +164,6 @@ class _Comparison(Struct):
         *,
         fresh: bool = False,
     ) -> dict[str, RunStanding]:
-        from coursebuild.core.run.script_server import ScriptServer
-
         options_there = replace(self.options, interpreter=interpreter)
         run_store = options_there.run_store(fresh=fresh)
         with ScriptServer() as server:
@@ -172,8 +172,6 @@ class _Comparison(Struct):
         return run_standings(self.course, self.runs_here, runs)
 
     def _compare_models(self, interpreter: Interpreter) -> tuple[ModelLine, ...]:
-        from coursebuild.core.run import mjcf
-
         texts = mjcf_texts(self.course)
         if not self.course.models and not texts:
             return ()

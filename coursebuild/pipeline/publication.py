@@ -36,12 +36,14 @@ from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.renderer import TemplateFailure
 from coursebuild.core.registry import find_exporter
+from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.pipeline.check import read_and_verify
 from coursebuild.pipeline.load import MAP
 from coursebuild.pipeline.options import Options, find_owner
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.site import Site, page_request
+from coursebuild.pipeline.theme_files import template_diagnostic
 from coursebuild.pipeline.verify import with_downloads
 from coursebuild.report import Report
 
@@ -130,8 +132,6 @@ def make_files(
         report = checked_course.report(outputs.diagnostics)
         whole_report = checked_course.report(chain(outputs.diagnostics, failures))
     except TemplateFailure as failure:
-        from coursebuild.pipeline.theme_files import template_diagnostic
-
         return checked_course.report((template_diagnostic(course, failure),)), None
     return whole_report, outputs if report.ok else None  # of what failed the buttons are hidden
 
@@ -141,8 +141,6 @@ def _find_exporter(options: Options, name: str) -> Exporter:
     exporter = find_exporter(name)
     feature_diagnostics: tuple[Diagnostic, ...] = ()
     if isinstance(exporter, str) and options.sandbox is None:
-        from coursebuild.core.syntax.coursemap import parse_course_map
-
         for source in read_sources(options.root, [MAP]).value:
             course = parse_course_map(source).value
             if course is not None:

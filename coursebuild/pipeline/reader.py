@@ -6,8 +6,6 @@
    its formulas, and draws its page. A worker is a copy of this process with the same reader.
 3. A document that an earlier build has read is parsed again when its page is drawn; its MathML
    comes from the store.
-
-The modules that parse and draw are imported when there is something to do.
 """
 
 from __future__ import annotations
@@ -15,7 +13,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
-import importlib
 import pickle
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -26,6 +23,8 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.checks.formulas import check_formulas, document_formulas
+from coursebuild.core.checks.lessons import check_course
+from coursebuild.core.engine.page_pool import Workers, can_fork
 from coursebuild.core.engine.store import Store, value_reader
 from coursebuild.core.engine.tool import step_key, typesetter_digest
 from coursebuild.core.files.resources import prepared_folder, template_texts
@@ -34,13 +33,19 @@ from coursebuild.core.model.course import Words
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages.assets import Assets
+from coursebuild.core.pages.context import PageContext
+from coursebuild.core.pages.draft_writer import DraftWriter
+from coursebuild.core.pages.listings import highlight_lines
 from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.numbering import items_of
+from coursebuild.core.pages.page_writer import PageWriter, draw
 from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, Texts, direction, known_mathml
 from coursebuild.core.pages.typography import isolate_formulas
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.registry import features, summarize
+from coursebuild.core.syntax.coursemap import parse_course_map
+from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.python_code import find_imports
 from coursebuild.core.text.source import Source, key_of
@@ -57,8 +62,6 @@ from coursebuild.pipeline.requests import (
 )
 
 if TYPE_CHECKING:
-    from coursebuild.core.engine.page_pool import Workers
-    from coursebuild.core.pages.context import PageContext
     from coursebuild.core.run.v8 import MathEngine
 
 Value = TypeVar("Value")
@@ -154,8 +157,6 @@ class Reader:
 
     def check(self, course: Course) -> tuple[Diagnostic, ...]:
         """What `check_course` finds; a course that was found clean is not checked again."""
-        from coursebuild.core.checks.lessons import check_course
-
         key = step_key("checked course")
         state = (self.fingerprints(course)[1] or "").encode()
         if state and self._store.get(_CLEAN_COURSES, key, bytes) == state:
@@ -167,14 +168,10 @@ class Reader:
 
     def read_map(self, source: Source) -> Parsed[Course | None]:
         """Return the course that a map describes, and what is wrong in it."""
-        from coursebuild.core.syntax.coursemap import parse_course_map
-
         return self._get_or_parse(_MAPS, Course, source, parse_course_map)
 
     def read_declarations(self, source: Source) -> Parsed[Declarations | None]:
         """Return what a file beside a model declares, and what is wrong in it."""
-        from coursebuild.core.syntax.declarations import parse_declarations
-
         return self._get_or_parse(_DECLARATIONS, Declarations, source, parse_declarations)
 
     def _get_or_parse(
@@ -214,15 +211,11 @@ class Reader:
         missing = [text for text in texts if summaries[text.key] is None]
         if len(missing) >= _MIN_PARALLEL:
             # What is imported here, worker processes share, and what is prepared at its first use.
-            for name in _HEAVY:
-                importlib.import_module(name)
-            from coursebuild.core.pages.listings import highlight_lines
+            from coursebuild.core.run.v8 import start
 
             document = missing[0].parse().value
             highlight_lines("python", "x")
             if document_formulas(document):
-                from coursebuild.core.run.v8 import start
-
                 start()
         answers = self._answer_all("reading lessons and pages", iter(missing))
         for text, (summary, worker) in zip(missing, answers, strict=True):
@@ -322,20 +315,15 @@ class Reader:
 
     def draw_page(self, request: PageRequest) -> DrawnPage:
         """Draw a page here, and store it."""
-        from coursebuild.core.pages.page_writer import draw
-
         with self._lock:
             whole = None if request.text is None else self._whole_document(request.text)
             document = None if whole is None else whole.document
             renderer = self._renderer_for(request, whole)
             inputs = request.inputs
+            writer: Callable[..., PageWriter] = PageWriter
             if request.mistakes:
-                from coursebuild.core.pages.draft_writer import DraftWriter
-
-                make_writer = functools.partial(DraftWriter, mistakes=request.mistakes)
-                head, html, context = draw(inputs, document, renderer, make_writer)
-            else:
-                head, html, context = draw(inputs, document, renderer)
+                writer = functools.partial(DraftWriter, mistakes=request.mistakes)
+            head, html, context = draw(inputs, document, renderer, writer)
             body = isolate_formulas(html) if direction(request.language) == "rtl" else html
             page_record, body = record(head, body, request.base_url, context)
             all_notes = {
@@ -350,8 +338,6 @@ class Reader:
 
     def page_context(self, request: PageRequest) -> PageContext:
         """Return what is needed to draw parts of a page's document, with all its text."""
-        from coursebuild.core.pages.page_writer import PageWriter
-
         inputs = request.inputs
         assert request.text is not None and inputs.document_inputs is not None
         with self._lock:
@@ -387,13 +373,11 @@ class Reader:
         """Answer requests, by workers where there are many; name the worker of each answer."""
         first = tuple(islice(requests, max(_MIN_PARALLEL, self._jobs * _MIN_PARALLEL // 2)))
         requests = chain(first, requests)
-        if self._workers is None and len(first) >= _MIN_PARALLEL and self._jobs > 1:
-            from coursebuild.core.engine.page_pool import Workers, can_fork
-
-            # Before the stage begins, which may start a thread: a fork does not copy threads.
-            if can_fork():
-                count = min(self._jobs, -(-2 * len(first) // _MIN_PARALLEL))
-                self._workers = Workers(self._answer, count)
+        is_worth_it = len(first) >= _MIN_PARALLEL and self._jobs > 1
+        # Before the stage begins, which may start a thread: a fork does not copy threads.
+        if self._workers is None and is_worth_it and can_fork():
+            count = min(self._jobs, -(-2 * len(first) // _MIN_PARALLEL))
+            self._workers = Workers(self._answer, count)
         if not first:
             return
         with self._stage(name):
@@ -411,15 +395,6 @@ class Reader:
 
 _UNPACKABLE = (pickle.PicklingError, AttributeError, TypeError, ValueError, RecursionError)
 """What packing a block of a feature may raise, if something in it is no plain value."""
-
-_HEAVY = (
-    "coursebuild.core.run.v8",
-    "coursebuild.core.pages.page_writer",
-    "coursebuild.core.pages.listings",
-    "coursebuild.core.pages.document_inputs",
-    "coursebuild.core.pages.page_list",
-    "coursebuild.core.syntax.document",
-)
 
 
 def kept_formulas(store: Store, path: str) -> dict[Formula, str]:

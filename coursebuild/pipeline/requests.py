@@ -28,6 +28,7 @@ from coursebuild.core.model.results import Reports, Results
 from coursebuild.core.pages.context import Mistakes, PageHead, PageInputs
 from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.pages.renderer import Texts
+from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.core.values import decode, encode, fingerprint
@@ -53,8 +54,6 @@ class SourceText(Struct, frozen=True):
 
     def parse(self) -> Parsed[Document]:
         """Return the document that the text holds, and what is wrong in it."""
-        from coursebuild.core.syntax.document import parse_document
-
         return parse_document(self.source, self.callouts, lesson=self.lesson, words=self.words)
 
 

@@ -27,6 +27,17 @@ from coursebuild.core.checks.compiled import (
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import CourseFiles, read_bytes, read_course
 from coursebuild.core.model import Course, Declarations, Limits, MjcfModel
+from coursebuild.core.model.diet_findings import DietReport
+from coursebuild.core.model.measurements import CaseReport, EngineReport, SceneReport
+from coursebuild.core.model.report_files import (
+    BENCH,
+    DIET,
+    ENGINES,
+    STABILITY,
+    RecordError,
+    ReportFailure,
+    ReportKind,
+)
 from coursebuild.core.model.results import ModelFacts, Reports
 from coursebuild.core.model.scenarios import ScenarioTable, exact_file
 from coursebuild.core.run.mjcf import compile_all, model_files, readable_error
@@ -45,10 +56,6 @@ from coursebuild.core.text.source import Source
 from coursebuild.pipeline.options import UsageError
 
 if TYPE_CHECKING:  # a course without reports needs none of it
-    from coursebuild.core.model.diet_findings import DietReport
-    from coursebuild.core.model.measurements import CaseReport, EngineReport, SceneReport
-    from coursebuild.core.model.report_files import ReportFailure, ReportKind
-
     _Scene = TypeVar("_Scene", SceneReport, DietReport, EngineReport)
 
 
@@ -226,8 +233,6 @@ class _Collector:
         self._diagnostics: list[Diagnostic] = []
 
     def read(self, paths: Iterable[str]) -> Parsed[Reports]:
-        from coursebuild.core.model.report_files import BENCH, DIET, ENGINES, STABILITY
-
         scenes: dict[str, SceneReport] = {}
         diets: dict[str, DietReport] = {}
         engines: dict[str, EngineReport] = {}
@@ -274,8 +279,6 @@ class _Collector:
         return self._digests[model.name]
 
     def _read_record(self, kind: ReportKind[_T], model: str = "") -> _T | None:
-        from coursebuild.core.model.report_files import ReportFailure
-
         report = read_record(self._root, kind, model)
         if isinstance(report, ReportFailure):
             self._warn(kind.path(model), report.message, report.help)
@@ -300,8 +303,6 @@ class _Collector:
 
 def read_record(root: Path, kind: ReportKind[_T], model: str = "") -> _T | ReportFailure:
     """Read the recorded report on a model (or on the hard cases), or why there is none."""
-    from coursebuild.core.model.report_files import RecordError, ReportFailure
-
     path, make = kind.path(model), kind.command(model)
     if not (root / path).exists() and not (root / path).is_symlink():
         return ReportFailure(f"{path} is not there", f"make it with `{make}`, and commit it")

@@ -23,6 +23,7 @@ from coursebuild.core.model.results import Outcome, ScriptJob, ScriptRun, Verdic
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.run_store import RunStore, longest_first
 from coursebuild.core.run.script_environment import Interpreter, find_runner
+from coursebuild.core.run.script_server import ScriptServer
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.extract import Extraction, extract, jobs
 from coursebuild.core.scripts.failures import is_lost
@@ -231,8 +232,6 @@ def _run(
 ) -> dict[str, ScriptRun]:
     if not jobs_to_run:
         return {}
-    from coursebuild.core.run.script_server import ScriptServer
-
     progress = options.progress
     last_runs = (run_store.last_record(job.path) for job in jobs_to_run)
     seconds = {last.inputs.path: last.stored_run.seconds for last in last_runs if last is not None}
@@ -427,8 +426,6 @@ def _run_perturbed(
     runs: dict[str, list[ScriptRun]] = {script.path: [] for script in scripts}
     if not scripts:
         return runs
-    from coursebuild.core.run.script_server import ScriptServer
-
     run_store = options.run_store()
     with ScriptServer(sandbox=options.sandbox) as server:
         server_options = replace(options, run_all=options.run_all or server.run)

@@ -15,12 +15,10 @@ import functools
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from html import unescape
-from typing import TYPE_CHECKING
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.resources import prepared_file
 from coursebuild.core.model import (
@@ -50,7 +48,8 @@ from coursebuild.core.pages.record import (
     common_characters,
     common_files,
 )
-from coursebuild.core.pages.references import Reference, has_anchor
+from coursebuild.core.pages.references import Reference, check_links, has_anchor
+from coursebuild.core.pages.theme import FontJob, subset_font
 from coursebuild.core.registry import features, parts_by_mark
 from coursebuild.core.syntax.document import read_again
 from coursebuild.core.syntax.html import find_address
@@ -66,9 +65,6 @@ from coursebuild.pipeline.requests import (
     SourceText,
     results_fingerprint,
 )
-
-if TYPE_CHECKING:
-    from coursebuild.core.pages.theme import FontJob
 
 _INDEX = "index"
 """The kind of the entry in the store that has the records of the last build's pages."""
@@ -239,7 +235,7 @@ class Site:
         records = [entry.record for entry in self._pages.values()]
         facts, cut_font = _FACTS_OF_ANY_PAGE, None
         if not self._whole_fonts:
-            cut_font = functools.partial(_cut_font, self._store)
+            cut_font = self._cut_font
             facts = PageFacts(
                 frozenset[str]().union(*(record.text for record in records)),
                 frozenset[str]().union(*(record.mathematics for record in records)),
@@ -250,6 +246,10 @@ class Site:
         if not self._has_all_pages:  # a page drawn later may have any part
             facts = replace(facts, parts=frozenset(parts_by_mark()))
         return common_files(library.assets, cut_font, facts, library.course.theme)
+
+    def _cut_font(self, job: FontJob) -> bytes:
+        make = functools.partial(subset_font, job)
+        return prepared_file("fonts", job.key) or self._store.get_or_make("fonts", job.key, make)
 
     @functools.cached_property
     def _downloads(self) -> Downloads:
@@ -352,27 +352,12 @@ def page_request(entry: PageEntry, library: Library, mistakes: Mistakes = ()) ->
     )
 
 
-def _cut_font(store: Store, job: FontJob) -> bytes:
-    def make() -> bytes:
-        from coursebuild.core.pages.theme import subset_font
-
-        return subset_font(job)
-
-    return prepared_file("fonts", job.key) or store.get_or_make("fonts", job.key, make)
-
-
 def broken_links(course: Course, files: Sequence[SiteFile]) -> Iterator[Diagnostic]:
     """Find links of built pages that lead nowhere; most are found in the sources already.
 
     The place is that of the raw HTML that wrote the link; of other links, the place in the page.
     """
-    from coursebuild.core.pages.references import check_links
-
-    pages = {
-        file.path: file.data if isinstance(file, OutputFile) else file.make()
-        for file in files
-        if file.path.endswith(".html")
-    }
+    pages = {file.path: file.make() for file in files if file.path.endswith(".html")}
     listed_files = (OutputFile(file.path, pages.get(file.path, b"")) for file in files)
     for broken in check_links(listed_files, course.base_url):
         span = _find_in_texts(course, broken.page, broken.url)

@@ -31,6 +31,7 @@ from coursebuild.core.model.results import (
     Verdict,
 )
 from coursebuild.core.registry import check_runs, feature_trials
+from coursebuild.core.run import mjcf
 from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.scripts.bound_places import document_bindings
@@ -361,8 +362,6 @@ def compile_models(
     texts = mjcf_texts(course)
     if not course.models and not texts:
         return (), ()
-    from coursebuild.core.run import mjcf
-
     stage = functools.partial(options.progress.stage, "compiling models")
     texts_to_compile = [(model.source.path, model.source.text) for model in course.models]
     texts_to_compile += [(mjcf.TEXT_PATH, text.text) for text in texts]

@@ -88,15 +88,15 @@ class Offer(Struct, frozen=True):
         return digest.hexdigest()[:24]
 
 
+def printed_outputs(library: Library) -> PrintedOutputs:
+    """What the scripts of a course have printed, as far as they have run."""
+    return PrintedOutputs(library.results.verdicts, library.results.runs, library.scripts)
+
+
 def report_now(session: Session) -> Report:
     """Return everything that is wrong, as a report."""
-    history = session.runs
-    return judge(
-        session.course,
-        session.diagnostics(),
-        scripts=history.script_lines,
-        labs=history.trial_lines,
-    )
+    scripts, labs = session.runs.script_lines, session.runs.trial_lines
+    return judge(session.course, session.diagnostics(), scripts=scripts, labs=labs)
 
 
 def page_news(session: Session, path: str) -> str:
@@ -151,16 +151,14 @@ def _reword_addresses(session: Session, edits: Iterable[Edit], addresses: Addres
     library = session.library
     if library is None:
         return set()
-    results = library.results
-    places = {(edit.span.path, edit.span.start) for edit in edits}
+    places = [edit.span for edit in edits]
     recorded = [
         verdict
-        for verdict in results.verdicts
+        for verdict in library.results.verdicts
         for span in [verdict.recording.span]
-        if any(path == span.path and span.start <= at < span.end for path, at in places)
+        if any(at.path == span.path and span.start <= at.start < span.end for at in places)
     ]
-    outputs = PrintedOutputs(results.verdicts, results.runs, library.scripts)
-    reworded = reworded_addresses(addresses, recorded, outputs)
+    reworded = reworded_addresses(addresses, recorded, printed_outputs(library))
     addresses |= reworded
     return {value.path for value in reworded}
 
@@ -191,8 +189,10 @@ def _change_records(
         verdicts = [v for v in results.verdicts if v.recording.span.path != path]
         verdicts += verify(course, results.runs, addresses, [new_document])
         outputs = PrintedOutputs(verdicts, results.runs, library.scripts)
-        before = PrintedOutputs(results.verdicts, results.runs, library.scripts)
-        values = document_values(document, before), document_values(new_document, outputs)
+        values = (
+            document_values(document, printed_outputs(library)),
+            document_values(new_document, outputs),
+        )
         addresses |= carried_addresses(addresses, *values)
         check_bindings(new_document, outputs, addresses)
         yield from record_changes(course, [new_document], outputs, addresses, session.root, read)
@@ -213,7 +213,7 @@ def _collect_news(session: Session, path: str) -> dict[str, Any]:
         "hints": [
             _describe_mistake(session, d, document, marks)
             for d in report.hints
-            if document is not None and d.span.path == document.source.path
+            if d.span.path == document_path
         ],
         "more": max(0, len(report.diagnostics) - _MAX_DIAGNOSTICS),
         "busy": session.busy,
@@ -328,10 +328,8 @@ def new_output(
     unstable_output = find_instability(verdict, run, session.runs.other_runs())
     if unstable_output is not None:
         return unstable_output
-    results, addresses = library.results, dict(session.runs.addresses)
-    outputs = PrintedOutputs(results.verdicts, results.runs, library.scripts)
-    documents = [document for _, document in course.shown_texts]
-    edits, refusals = update_outputs([verdict], documents, outputs, addresses)
+    documents, addresses = [d for _, d in course.shown_texts], dict(session.runs.addresses)
+    edits, refusals = update_outputs([verdict], documents, printed_outputs(library), addresses)
     return refusals[0] if refusals else tuple(edits)
 
 

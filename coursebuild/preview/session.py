@@ -153,11 +153,8 @@ class Session:
 
     def packages(self) -> frozenset[str]:
         """The folders that scripts import from."""
-        return (
-            frozenset(package.path for package in self.course.packages)
-            if self.course
-            else frozenset()
-        )
+        packages = self.course.packages if self.course else ()
+        return frozenset(package.path for package in packages)
 
     def base(self) -> str:
         """The path under which the published site will be, with a slash at both ends."""
@@ -197,8 +194,9 @@ class Session:
             all_pages = tuple(pages.get(page.id, page) for page in course.pages)
             self._show(replace(course, levels=levels, pages=all_pages))
             for owner, diagnostics in changed_owners:
-                assert owner.document is not None
-                self._diagnostics_by_file[owner.path] = (*diagnostics, *self._check(owner.document))
+                assert owner.document is not None and self.course and self._targets
+                mistakes = check_document(self.course, owner.document, self._targets)
+                self._diagnostics_by_file[owner.path] = (*diagnostics, *mistakes)
             self.notify(is_saved=is_saved)
             for owner, _ in changed_owners if self._site else ():
                 self.find(urls.owner_path(owner))
@@ -237,10 +235,6 @@ class Session:
             [(source, isinstance(owner, Lesson), course.words_of(owner))], course.callout_names
         )
         return parsed_document
-
-    def _check(self, document: Document) -> tuple[Diagnostic, ...]:
-        assert self.course is not None and self._targets is not None
-        return check_document(self.course, document, self._targets)
 
     def take_other_saves(self) -> None:
         """Take saves of files other than documents."""

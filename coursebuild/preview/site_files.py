@@ -20,7 +20,6 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.reader import Reader
-from coursebuild.pipeline.requests import DrawnPage
 from coursebuild.pipeline.site import Site, frame_page, page_request
 
 _MOST_PAGES = 64
@@ -118,28 +117,23 @@ class Files:
             # Browsers may ask for shared files of an older page.
             newest = site is self._sites[-1][0]
             if path in files and (newest or path.startswith("assets/")):
-                file = files[path]
                 try:
-                    return file.data if isinstance(file, OutputFile) else file.make()
+                    return files[path].make()
                 except EffectError:
                     return None  # gone since the course was read
         return None
 
     def _find_page(self, path: str) -> bytes:
         if path not in self._framed_pages:
-            page = self._find_drawn(path)
-            assert self._frame is not None
+            assert self._library is not None and self._frame is not None
+            document = self.document(path)
+            mistakes = () if document is None else self._mistakes(document)
+            request = page_request(self._entries[path], self._library, mistakes)
+            page = self._reader.find_page(request.key) or self._reader.draw_page(request)
             if len(self._framed_pages) == _MOST_PAGES:
                 self._framed_pages.clear()
             self._framed_pages[path] = frame_page(page, self._frame)
         return self._framed_pages[path]
-
-    def _find_drawn(self, path: str) -> DrawnPage:
-        assert self._library is not None
-        document = self.document(path)
-        mistakes = () if document is None else self._mistakes(document)
-        request = page_request(self._entries[path], self._library, mistakes)
-        return self._reader.find_page(request.key) or self._reader.draw_page(request)
 
 
 def _with_files(site: Site) -> tuple[Site, Mapping[str, SiteFile]]:

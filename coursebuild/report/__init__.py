@@ -66,18 +66,15 @@ def to_junit(report: Report) -> str:
     """One test case for each script, lab, and file with diagnostics; errors are failures."""
     suites = Element("testsuites")
     suite = SubElement(suites, "testsuite", name="coursebuild")
-    for script in report.scripts:
-        case = _add_case(suite, f"lesson {script.lesson}", script.path, script.seconds)
-        if not script.did_run:
-            SubElement(case, "skipped", message=unrun_reason(script))
-        elif script.status != "ok":
-            SubElement(case, "failure", type=script.status, message=script.status)
-    for lab in report.labs:
-        case = _add_case(suite, f"lesson {lab.lesson}", lab.name, lab.seconds)
-        if lab.untried:
-            SubElement(case, "skipped", message=lab.untried)
-        elif lab.status != "ok":
-            SubElement(case, "failure", type=lab.status, message=lab.status)
+    lines: tuple[ScriptLine | TrialLine, ...] = (*report.scripts, *report.labs)
+    for line in lines:
+        name = line.path if isinstance(line, ScriptLine) else line.name
+        reason = unrun_reason(line) if isinstance(line, ScriptLine) else line.untried
+        case = _add_case(suite, f"lesson {line.lesson}", name, line.seconds)
+        if reason:
+            SubElement(case, "skipped", message=reason)
+        elif line.status != "ok":
+            SubElement(case, "failure", type=line.status, message=line.status)
     for path in dict.fromkeys(d.span.path for d in report.diagnostics):
         case = _add_case(suite, "course", path, 0.0)
         for d in report.diagnostics:

@@ -85,8 +85,6 @@ def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> N
 WRONG_USAGE = [
     ("", "usage: coursebuild [-C DIR] COMMAND ...\n\nBuild a course"),
     ("zip", "coursebuild: there is no command `zip`; `coursebuild help` lists them\n"),
-    ("watch", "coursebuild: there is no command `watch`; did you mean `serve`?\n"),
-    ("list", "coursebuild: there is no command `list`; `check` names every script and lab\n"),
     ("buidl", "coursebuild: there is no command `buidl`; did you mean `build`?\n"),
     ("help stabiliti", "coursebuild: there is no command `stabiliti`; did you mean `stability`?\n"),
     (
@@ -156,17 +154,6 @@ def test_wrong_usage_gives_2_and_touches_nothing(make: Make) -> None:
         assert "Traceback" not in result.err
     assert folder.tree("content") == before
     assert not (folder.root / "public").exists()
-
-
-def test_help_of_a_command_of_other_tools_is_that_of_ours(tmp_path: Path) -> None:
-    folder = Folder(tmp_path)
-    help = folder.main("help", "serve")
-    assert help.status == 0
-    for name in ("watch", "preview"):
-        result = folder.main("help", name)
-        assert (result.status, result.out) == (0, f"`{name}` is `serve` here.\n\n{help.out}")
-    result = folder.main("help", "clean")
-    assert (result.status, result.out.startswith("There is no command `clean`: ")) == (0, True)
 
 
 def test_outside_of_a_course_gives_2(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-import functools
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -246,7 +245,6 @@ class _Reader:
         self._builder.end(_expanded(name))
 
 
-@functools.lru_cache(maxsize=1000)
 def _expanded(name: str) -> str:
     """A name as `ElementTree` writes it, with its namespace."""
     return "{" + name if "}" in name else name

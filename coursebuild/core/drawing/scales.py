@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import re
 from collections.abc import Sequence
@@ -143,20 +142,17 @@ def _scaled(mantissa: int, exponent: int) -> str:
     return power if mantissa == 1 else f"{mantissa}·{power}"
 
 
-_CACHE_SIZE = 1024
 _NO_MARKUP = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 """Includes lone surrogates, which stand for bytes that are not text."""
 _NARROW = frozenset("ijl.,:;'|!()[] ·ft")
 _BROAD = frozenset("mwMW—%@")
 
 
-@functools.lru_cache(maxsize=_CACHE_SIZE)
 def markup_text(text: str) -> str:
     """Text escaped for markup, without characters that markup cannot hold."""
     return escape(_NO_MARKUP.sub("", text))
 
 
-@functools.lru_cache(maxsize=_CACHE_SIZE)
 def text_width(text: str, size: float) -> float:
     """About how wide a text is in a sans-serif face of this size, rather too wide."""
     letters = 0.0

@@ -10,7 +10,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
-from itertools import count
 
 from msgspec.structs import replace
 
@@ -86,21 +85,6 @@ def _insert_table(text: str, lines: Sequence[str], later: Sequence[Span]) -> str
     return text[:start] + line_end.join([*lines, "", ""]) + text[start:]
 
 
-def next_lesson_ids(course: Course) -> list[str]:
-    """The first free id in each level of a course."""
-    ids = {lesson.id for lesson in course.lessons}
-    return [
-        next(id for number in count(1) if (id := f"{level.id}.{number}") not in ids)
-        for level in course.levels
-    ]
-
-
-def next_level_id(course: Course) -> str:
-    """The number behind those of the levels of a course."""
-    numbers = [int(level.id) for level in course.levels if level.id.isdecimal()]
-    return str(max(numbers, default=0) + 1)
-
-
 def with_lesson_renamed(course: Course, old: Lesson, new: str, edits: Sequence[Edit]) -> str:
     """Return the map after edits that give a lesson another id.
 
@@ -154,13 +138,7 @@ def with_feature(course: Course, path: str) -> str:
         line = f"{_line_end(source.text)}features = [{toml_string(path)}]"
         end = _end_of_line(source.text, title.end)
         edit = Edit(source.span(end, end), line)
-    text = apply_edits(source.text, [edit])
-    new_course = parse_course_map(Source(source.path, text)).value
-    if new_course is None or path not in [feature.path for feature in new_course.features]:
-        raise UsageError(
-            f"{source.path} cannot have a feature: add `{path}` to `features` yourself"
-        )
-    return text
+    return _require_valid(course, apply_edits(source.text, [edit]), path, "feature")
 
 
 def _check_free(course: Course, id: str) -> None:
@@ -204,6 +182,7 @@ def _require_valid(course: Course, text: str, id: str, kind: str = "lesson") -> 
         "lesson": [lesson.id for lesson in new_course.lessons if lesson.level == _level_id(id)],
         "level": [level.id for level in new_course.levels],
         "page": [page.id for page in new_course.pages],
+        "feature": [feature.path for feature in new_course.features],
     }
     if mistakes or id not in ids[kind]:
         reason = f": {mistakes[0].message}" if mistakes else ""

@@ -24,6 +24,7 @@ from coursebuild.api import (
     did_you_mean,
     find_blocks,
 )
+from coursebuild.core.model.report_files import BENCH, ENGINES
 from coursebuild.core.model.scenarios import keyframe_scenarios
 from coursebuild.core.syntax.fence import kind_of
 from coursebuild.core.syntax.spans import trim
@@ -106,9 +107,6 @@ def check_benches(course: Course, documents: Iterable[Document]) -> Iterator[Dia
     benches = [bench for document in documents for bench in find_blocks(document, Bench)]
     if not benches:
         return
-    # Late: most courses do not need it.
-    from coursebuild.core.model.report_files import BENCH, ENGINES
-
     models = [model.name for model in course.models]
     for bench in benches:
         if bench.model not in models:

@@ -6,13 +6,22 @@ For what is missing, or does not fit the course, a block shows the command that 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from markupsafe import Markup, escape
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import Library, MjcfModel, Renderer, find_blocks, urls
+from coursebuild.api import (
+    IndexReader,
+    Library,
+    MarkdownWriter,
+    MjcfModel,
+    PageContext,
+    Renderer,
+    find_blocks,
+    urls,
+)
 from coursebuild.core.model import scenario_anchor
 from coursebuild.core.model.diet_findings import DietReport, Finding
 from coursebuild.core.model.measurements import (
@@ -33,9 +42,6 @@ from coursebuild.features.bench.scenario_view import (
     plots,
     scenario_view,
 )
-
-if TYPE_CHECKING:
-    from coursebuild.api import IndexReader, MarkdownWriter, PageContext
 
 
 class BenchView(Struct, frozen=True):

@@ -404,10 +404,7 @@ def _engine_table(words: Strings, scenario: EngineScenario, label: str) -> grids
         (words("measured.position"), errors("position", place)),
         (words("measured.attitude"), errors("attitude", place)),
         (words("measured.velocity"), errors("velocity", speed)),
-        (
-            words("measured.apart"),
-            ["" if r.apart is None else grids.power(r.apart, 2) for r in rows],
-        ),
+        (words("measured.apart"), [grids.power(row.apart, 2) for row in rows]),
         (words("measured.energy"), [grids.percent(row.energy_drift) for row in rows]),
         (words("measured.compile"), [compile_text(row) for row in rows]),
         *((words("measured.worlds", n=n), [_cost_text(row, n) for row in rows]) for n in counts),

@@ -143,6 +143,8 @@ def _lab(subject: Subject, node: ObjectNode, fields: ExerciseFile) -> Lab:
         (("controller",), solution.span()),
     ]
     places += [((name,), node.place(name)) for name in ("model", "key") if name in node.members]
+    # Play runs the `setup` of the first trial in which time passes, if it has one.
+    played = [t for t in fields.trials if t.t] or [t for t in fields.trials if t.setup]
     buttons: list[Button] = []
     readouts: list[Readout] = []
     for i, (trial_node, trial) in enumerate(zip(trials, fields.trials, strict=True)):
@@ -167,7 +169,7 @@ def _lab(subject: Subject, node: ObjectNode, fields: ExerciseFile) -> Lab:
             model=fields.model,
             key=fields.key,
             camera=fields.camera,
-            start=_played_trial(fields),
+            start=played[0].name if played and played[0].setup else None,
             still=fields.still,
             setup=setup,
             controller=controller,
@@ -180,12 +182,6 @@ def _lab(subject: Subject, node: ObjectNode, fields: ExerciseFile) -> Lab:
         code=tuple(code),
         of_exercise=True,
     )
-
-
-def _played_trial(fields: ExerciseFile) -> str | None:
-    """The trial whose `setup` Play runs: the first one in which time passes, if it has one."""
-    trials = [trial for trial in fields.trials if trial.t] or [t for t in fields.trials if t.setup]
-    return trials[0].name if trials and trials[0].setup else None
 
 
 def _text(node: ObjectNode, name: str) -> Excerpt:

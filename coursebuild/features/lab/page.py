@@ -137,21 +137,17 @@ def page_view(page: PageContext, block: Lab) -> LabView:
         start = (names[key] if 0 <= key < len(names) else "") or str(key)
     recorded = view.recorded
     if recorded is not None and recorded.record.scale is not None:
-        remark = _other_engine(page)
+        # Why the labs of a page run with another MuJoCo than its scripts
+        runs, words = page.inputs.runs.values(), page.renderer.words
+        versions = {version for run in runs for version in run.versions}
+        engines = {v.removeprefix("MuJoCo ") for v in versions if v.startswith("MuJoCo ")}
+        other_engines = words.join(sorted(engines - {LAB_ENGINE}))
+        remark = words("lab.two_engines", scripts=other_engines) if other_engines else ""
         recorded = replace(recorded, verification=f"{recorded.verification} {remark}".rstrip())
     view = replace(view, model_href=href, start=start, recorded=recorded)
     if block.label is None:
         return view
     return replace(view, number=page.number(block.label), label=block.label.id)
-
-
-def _other_engine(page: PageContext) -> str:
-    """Why the labs of a page run with another MuJoCo than its scripts; empty where they do not."""
-    name = "MuJoCo "
-    versions = {version for run in page.inputs.runs.values() for version in run.versions}
-    engines = {v.removeprefix(name) for v in versions if v.startswith(name)} - {LAB_ENGINE}
-    words = page.renderer.words
-    return words("lab.two_engines", scripts=words.join(sorted(engines))) if engines else ""
 
 
 def lab_view(words: Strings, place: Place, block: Lab, live: PublishedLab | None) -> LabView:

@@ -1,4 +1,4 @@
-"""What a lab's model asks for: why an engine refuses it, and whether the page's editor takes it."""
+"""Why an engine refuses what a lab's model asks for."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from coursebuild.api import Diagnostic, Excerpt, Source, Span, diagnose
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.run.mjcf import existing_files, read_tags
-from coursebuild.features.lab.model import LONGEST_MODEL, MJCF, Lab
+from coursebuild.features.lab.model import Lab
 
 _NO_PLUGIN = "invalid plugin slot"
 _NO_MEMORY = "ould not allocate memory"
@@ -50,16 +50,6 @@ def diagnose_size(lab: Lab, mjb: bytes, memory: int) -> list[Diagnostic]:
         f"the map: {_PART_OF_MODEL} times the size of the model"
     )
     return [diagnose("lab-engine", lab.place(("model",)), message, help=help)]
-
-
-def editable_source(lab: Lab, root: Path, model: Source) -> str:
-    """The text of a model that a reader can edit; empty if it needs other files or is too long.
-
-    A lab that is an editor already needs none.
-    """
-    if lab.kind == MJCF or len(model.text) > LONGEST_MODEL:
-        return ""
-    return "" if existing_files(root, model.path, model.text) else model.text
 
 
 def _model_texts(lab: Lab, root: Path, model: Source) -> Iterator[Excerpt | Source]:

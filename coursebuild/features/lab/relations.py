@@ -230,17 +230,17 @@ def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagno
             if name not in models:
                 message, help = f"no model `{name}` in models/", did_you_mean(name, models)
                 yield diagnose("lab-model", lab.place(("model",)), message, help=help)
-            elif name in lab.starts and not _is_editable(models[name]):
+            elif name in lab.starts and not is_editable(models[name]):
                 message = (
                     f"readers cannot begin with `{name}`: it needs other files, or is too long"
                 )
                 yield diagnose("lab-model", lab.place(("model",)), message)
 
 
-def _is_editable(model: str) -> bool:
+def is_editable(model: str) -> bool:
     """Whether a model needs no other files, and is not too long for an editor."""
     names = (name for tag in read_tags(model) for name, *_ in tag.attributes)
-    return len(model) <= LONGEST_MODEL and "file" not in names
+    return len(model) <= LONGEST_MODEL and not any(name.startswith("file") for name in names)
 
 
 _SCRIPTED = ("msub", "msubsup", "mover", "munder", "munderover")

@@ -60,7 +60,8 @@ from coursebuild.features.lab.equations.equation_trial import (
 )
 from coursebuild.features.lab.export.script import LabExport, export_lab, record_for_export
 from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Lab
-from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size, editable_source
+from coursebuild.features.lab.refusal import diagnose_refusal, diagnose_size
+from coursebuild.features.lab.relations import is_editable
 from coursebuild.features.lab.reply import LabOutput, TrialReply, read_reply, reply_bytes
 from coursebuild.features.lab.schema import Camera
 
@@ -316,7 +317,8 @@ class _LabTrial(Struct, frozen=True):
             cached=cached_evaluation is not None,
             unexported=export.reason,
         )
-        source = editable_source(lab, self.context.root, self.model)
+        can_edit = lab.kind != MJCF and is_editable(self.model.text)  # that one is an editor
+        source = self.model.text if can_edit else ""
         parts = {"mjb": mjb, "script": export.script, "parity": comparison, "source": source}
         output = replace(evaluation.output, **parts)
         return TrialResult(lab.span, line, output), [*failures, *evaluation.remarks]

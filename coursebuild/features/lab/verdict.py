@@ -90,21 +90,16 @@ def code_diagnostic(lab: Lab, piece: LabCode, message: str) -> Diagnostic:
     """Report a piece of code that cannot be part of a lab."""
     message = message[:1].lower() + message[1:].rstrip(".")
     message = f"{_entry_name(lab, piece.entry)} has code that cannot run: {message}"
-    help = _PYTHON_HELP if _PYTHON.search(piece.code) else _HELP[piece.form]
-    return diagnose("lab-code", lab.place(piece.entry), message, help=help)
+    return diagnose("lab-code", lab.place(piece.entry), message, help=_HELP[piece.form])
 
 
-_PYTHON = re.compile(r"\b(and|or|not|import|def|print)\b| if .* else |:\s*$", re.MULTILINE)
 _OF_MATH = re.compile(
     r"ReferenceError: (abs|sqrt|exp|log|a?(?:sin|cos|tan)|atan2|floor|ceil|round|min|max|pow|pi)\b"
-)
-_PYTHON_HELP = (
-    "code in a lab is JavaScript: `&&`, `||`, `!`, and `test ? a : b` for `a if test else b`"
 )
 _HELP = {
     "statements": "",
     "setter": "",
-    "expression": "an expression has a value and no `;`, as in `data.qpos[0]`",
+    "expression": "an expression of JavaScript has a value and no `;`, as in `data.qpos[0]`",
     "target": "it must be something that can be assigned to, as `model.opt.timestep`",
 }
 
@@ -333,18 +328,12 @@ def references(lab: Lab) -> list[NameReference]:
     return names
 
 
-_ASSIGNS = re.compile(r"(?<![=!<>])=(?![=>])|[<>]>=|\+\+|--")
-"""What can be found in all code that changes something, and in little other code."""
-
-
 def assignment_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
     """Report expressions and conditions that assign; an expression may to variables of its own.
 
     Assigned to on purpose, a condition has parentheses of its own, as is the custom.
     """
     for piece, text in _written_pieces(lab):
-        if not _ASSIGNS.search(piece.code):
-            continue
         nodes = list(walk(parse(piece.code)))
         declared_names = _declared_names(nodes)
         for node in nodes:

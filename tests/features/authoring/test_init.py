@@ -189,8 +189,6 @@ def test_doctor_reports_what_works_and_a_cure_for_the_rest(tmp_path: Path) -> No
         "ok       Python # at ",
         "ok       MuJoCo #\n",
         "ok       MuJoCo # of the browser, in V#, for labs\n",
-        "ok       # fonts and # page templates\n",
-        "GiB free on the disk\n",
         "-        no offscreen rendering: ",
         "--sandbox`",
     ):

@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from coursebuild.api import Source
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.run.script_environment import engine_version
-from coursebuild.features.lab.refusal import editable_source
+from coursebuild.features.lab.relations import is_editable
 from coursebuild.features.lab.reply import (
     Attempt,
     Parity,
@@ -164,19 +163,14 @@ def test_models_are_live_on_their_pages_and_seen_in_the_gallery(site: BuiltSite)
 
 
 def test_model_of_a_lab_is_published_for_the_editor_if_it_is_one_file(
-    site: BuiltSite, tmp_path: Path
+    site: BuiltSite,
 ) -> None:
     (address,) = site.public.glob("assets/labs/model-a-still.*.json")
     source = json.loads(address.read_text("utf-8"))["source"]
     assert (address.parent / source).read_text("utf-8") == STILL_MODEL
-    text = '<mujoco><include file="arm.xml"/></mujoco>'
-    model = Source("models/x.xml", text)
-    lab = make_lab()
-    assert editable_source(lab, tmp_path, model) == text
-    (tmp_path / "models").mkdir()
-    (tmp_path / "models/arm.xml").write_text("<mujoco/>")
-    assert editable_source(lab, tmp_path, model) == ""
-    assert editable_source(lab, tmp_path, Source("models/x.xml", " " * 100_001)) == ""
+    assert is_editable(STILL_MODEL)
+    for model in ('<include file="arm.xml"/>', '<texture fileright="r.png"/>', " " * 100_001):
+        assert not is_editable(model)
 
 
 LINES = fixture_text("documents/lab_lines.json").replace("BALL", BALL)

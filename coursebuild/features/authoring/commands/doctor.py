@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import os
-import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -16,11 +15,9 @@ from pathlib import Path
 from msgspec import Struct
 
 from coursebuild.api import CLEAN, FAILURE, EffectError, UsageError, gate, write
-from coursebuild.core.engine.store import SIZE
 from coursebuild.core.files.course_root import find_course_root
 from coursebuild.core.files.errors import lacking
 from coursebuild.core.files.locks import try_lock
-from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.files.trust import FOLDER, find_store, store_key
 from coursebuild.core.run.environments import find_environment, prepare_environment
 from coursebuild.core.run.sandbox import examine_sandbox
@@ -87,13 +84,11 @@ def run(arguments: argparse.Namespace) -> int:
     required = {
         "MuJoCo": _engines,
         "labs": _lab_engine,
-        "fonts and templates": _fonts,
         "the folder": _folder,
     }
     optional = {
         "kept results": _store,
         "locks": _locks,
-        "the disk": _disk,
         "offscreen rendering": _rendering,
         "`--sandbox`": _sandbox,
     }
@@ -148,13 +143,6 @@ def _lab_engine(folder: Path) -> Iterator[Probe]:
     yield Probe(f"native MuJoCo {LAB_ENGINE} for labs{place}", True)
 
 
-def _fonts(_: Path) -> Iterator[Probe]:
-    fonts = [name for name in Bundle() if name.endswith(".ttf")]
-    templates = template_texts()
-    text = f"{len(fonts)} fonts and {len(templates)} page templates"
-    yield Probe(text, bool(fonts and templates), "install coursebuild again")
-
-
 def _folder(folder: Path) -> Iterator[Probe]:
     ok = os.access(folder, os.W_OK)
     yield Probe(f"{folder} can be written" if ok else f"{folder} cannot be written", ok, _PERMIT)
@@ -186,15 +174,6 @@ def _locks(folder: Path) -> Iterator[Probe]:
         return
     text = "locks, with which two commands on one course wait for each other"
     yield Probe(text if ok else f"no {text}", ok, "use a local disk, or run one command at a time")
-
-
-def _disk(folder: Path) -> Iterator[Probe]:
-    free = shutil.disk_usage(folder).free
-    yield Probe(
-        f"{free / (1 << 30):.1f} GiB free on the disk",
-        free > SIZE,
-        "free some space, or limit .coursebuild: `--cache-size 200M`",
-    )
 
 
 def _rendering(_: Path) -> Iterator[Probe]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import keyword
 import re
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,8 +17,6 @@ from coursebuild.core.registry import CORE_FENCES, features, fence_names
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.authoring.commands import apply_changes
 from coursebuild.features.authoring.course_map import (
-    next_lesson_ids,
-    next_level_id,
     with_feature,
     with_lesson,
     with_level,
@@ -57,12 +54,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
     kinds = parser.add_subparsers(metavar="KIND", required=True, prog=parser.prog)
     lesson = kinds.add_parser("lesson", help="a draft, and its entry in the course map")
     lesson.add_argument("id", metavar="ID", help="id in the course, such as 1.4 in level 1")
-    lesson.add_argument("title", metavar="TITLE", nargs="?", help="title shown to readers")
+    lesson.add_argument("title", metavar="TITLE", help="title shown to readers")
     lesson.add_argument("--slug", help="name in its file and address (default: from the title)")
     lesson.set_defaults(add=_new_lesson)
     level = kinds.add_parser("level", help="an empty level in the course map")
     level.add_argument("id", metavar="ID", help="id in the course: a number or a word")
-    level.add_argument("title", metavar="TITLE", nargs="?", help="title shown to readers")
+    level.add_argument("title", metavar="TITLE", help="title shown to readers")
     level.set_defaults(add=_new_level)
     page = kinds.add_parser(
         "page", help="a page outside the lessons, and its entry in the course map"
@@ -107,14 +104,6 @@ def run(arguments: argparse.Namespace) -> int:
 def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course = load_course(root, code="none")
     id, title = arguments.id, arguments.title
-    if title is None and re.fullmatch(r"[\w-]+(\.[\w-]+)+", id):
-        raise UsageError(f"lesson {id} needs a title", help="it follows the id")
-    if title is None:
-        ids = next_lesson_ids(course) or ["1.1"]
-        help = f"the id comes first: `coursebuild new lesson {ids[-1]} {shlex.quote(id)}`"
-        if ids[:-1]:
-            help += f"; in other levels {', '.join(f'`{id}`' for id in ids[:-1])}"
-        raise UsageError("a lesson needs an id and a title", help=help)
     _check_text(title)
     slug = arguments.slug or _name_from(title, "--slug")
     new_map = with_lesson(course, id, slug, title)
@@ -126,16 +115,8 @@ def _new_lesson(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
 
 def _new_level(root: Path, arguments: argparse.Namespace) -> list[FileChange]:
     course = load_course(root, code="none")
-    id, title = arguments.id, arguments.title
-    if title is None:
-        help = "it follows the id"
-        if not re.fullmatch(r"[\w-]+", id) or id in (level.id for level in course.levels):
-            proposal = f"coursebuild new level {next_level_id(course)} {shlex.quote(id)}"
-            help = f"the id comes first: `{proposal}`"
-        raise UsageError("a level needs an id and a title", help=help)
-    _check_text(title)
-    new_map = with_level(course, id, title)
-    return [FileChange.of(course.map, new_map)]
+    _check_text(arguments.title)
+    return [FileChange.of(course.map, with_level(course, arguments.id, arguments.title))]
 
 
 def _new_page(root: Path, arguments: argparse.Namespace) -> list[FileChange]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from msgspec.structs import replace
 
@@ -46,15 +45,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--leave", action="store_true", help="leave ambiguous mentions as they are")
 
 
-def _move_record(root: Path, old: str, new: str) -> list[FileChange]:
-    """Let what is remembered of a lesson follow it from one path to another."""
-    old, new = record_path(old), record_path(new)
-    if not (root / old).is_file():
-        return []
-    data = read_bytes(root, old)
-    return [FileChange(new, None, data), FileChange(old, data, None)]
-
-
 def run(arguments: argparse.Namespace) -> int:
     """Change the map, the lesson's file, and all references to it."""
     root = options_of(arguments).root
@@ -68,13 +58,18 @@ def run(arguments: argparse.Namespace) -> int:
     texts = edited_texts(edits) | {course.map: with_lesson_renamed(course, lesson, new, in_map)}
     changes = [FileChange.of(*change) for change in texts.items()]
     if lesson.document is not None:
-        data = read_bytes(root, lesson.path)
-        unchanged = FileChange(lesson.path, data, data)
-        lesson_change = next((c for c in changes if c.path == lesson.path), unchanged)
-        changes = [change for change in changes if change is not lesson_change]
-        changes.append(FileChange(replace(lesson, id=new).path, None, lesson_change.new))
-        changes.append(FileChange(lesson.path, lesson_change.old, None))
-        changes += _move_record(root, lesson.path, replace(lesson, id=new).path)
+        new_path = replace(lesson, id=new).path
+        for old_file, new_file in (
+            (lesson.path, new_path),
+            (record_path(lesson.path), record_path(new_path)),
+        ):
+            if (root / old_file).is_file():
+                data = read_bytes(root, old_file)
+                unchanged = FileChange(old_file, data, data)
+                change = next((c for c in changes if c.path == old_file), unchanged)
+                changes = [c for c in changes if c is not change]
+                changes.append(FileChange(new_file, None, change.new))
+                changes.append(FileChange(old_file, change.old, None))
     folders = sorted((*FOLDERS, "src"))
     sources = [s for top in folders for s in read_folder(root, top, (".py", ".js")).value]
     doubtful = doubtful_places(course, lesson, new, edits, sources)

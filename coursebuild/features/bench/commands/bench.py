@@ -304,10 +304,9 @@ def bench_engines(
     run.choice, run.quick = choice, quick
     run.remarks += choice.remarks
     measurement = run.measure_each(scenes.value)
-    if not record:
-        return measurement
-    outcome = record_reports(options.root, mjbench, ENGINES, "engines", measurement)
-    return replace(outcome, remarks=(*measurement.remarks, *outcome.remarks))
+    if record:
+        return record_reports(options.root, mjbench, ENGINES, "engines", measurement)
+    return measurement
 
 
 class _EngineRun(MeasuringRun[EngineReport]):

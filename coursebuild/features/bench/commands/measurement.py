@@ -415,7 +415,7 @@ def write_records(
     root: Path, measurement: Measurement[_T], records: Iterable[tuple[str, bytes]]
 ) -> Measurement[_T]:
     """Write reports, given as (path, bytes), and add what was done to the measurement."""
-    failures, remarks = [], []
+    failures, remarks = [*measurement.failures], [*measurement.remarks]
     for path, data in records:
         try:
             target = resolve_inside(root, path)

@@ -11,7 +11,7 @@ import functools
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import msgspec
 from msgspec import Struct
@@ -21,10 +21,8 @@ from coursebuild.core.engine.tool import code_digest
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.environments import find_environment, prepare_environment
+from coursebuild.core.run.sandbox import Sandbox
 from coursebuild.core.run.script_environment import engine_version
-
-if TYPE_CHECKING:
-    from coursebuild.core.run.sandbox import Sandbox
 
 LAB_ENGINE = "3.14.0"
 """The version of MuJoCo in the browser, as `site/package.json` names it."""

@@ -34,14 +34,6 @@ _OPERATORS: dict[type[ast.AST], str] = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
 _DIRECTIONS = {"<": -1, "<=": -1, ">": 1, ">=": 1, "==": 0}
-_FOREIGN_SIGNS = {
-    "?": "write `a if test else b`",
-    "&&": "write `a and b`",
-    "||": "write `a or b`",
-    "\\": "an expression is written as in Python: `sqrt(x)`, not as in TeX",
-    "=": "an expression assigns nothing; to compare, write `==`",
-}
-"""Signs of other languages, with what to write; the first that there is counts."""
 _HELP: dict[type[ast.AST], str] = {
     ast.BitXor: Fix("a power is `a**b`", "**", "^", safe=True),
     ast.FloorDiv: "write `floor(a/b)`",
@@ -121,10 +113,7 @@ def _parse(text: Excerpt) -> ast.expr | Diagnostic:
         reason = (error.msg or "").partition(". ")[0].removeprefix("invalid syntax")
         reason = reason[:1].lower() + reason[1:]
         message = f"the expression cannot be read{': ' if reason else ' here'}{reason}"
-        help = next(
-            (help for sign, help in _FOREIGN_SIGNS.items() if sign in line),
-            "an expression is written as in Python: `2*sin(x)**2`",
-        )
+        help = "an expression is written as in Python: `2*sin(x)**2`, `a if x > 0 else b`"
         return diagnose("lab-code", text.span(at, at + 1), message, help=help)
     except (ValueError, RecursionError, MemoryError):
         return diagnose("lab-code", text.span(), "the expression cannot be read")

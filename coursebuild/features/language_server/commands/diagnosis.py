@@ -18,13 +18,12 @@ from coursebuild.api import Diagnostic, Edit, Note, Source, Span
 from coursebuild.core.model import CodeSpan, NumberBinding, Text, document_inlines
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.findings import output_findings
-from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.numbers import scan_prose
 from coursebuild.core.text.rules import Severity, rule_address
 from coursebuild.features.language_server.commands.texts import OpenTexts, Places
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.fix import choose_fixes, ways
-from coursebuild.preview.messages import changes_of, new_output
+from coursebuild.preview.messages import changes_of, new_output, printed_outputs
 from coursebuild.preview.session import Session
 from coursebuild.report.values import with_hints
 
@@ -58,9 +57,7 @@ def _diagnose(session: Session, version: int) -> tuple[Diagnostic, ...]:
                 if diagnostic.span.path not in changed_paths
                 or diagnostic.rule not in _COMPARISON_RULES
             )
-            printed = PrintedOutputs(
-                library.results.verdicts, library.results.runs, library.scripts
-            )
+            printed = printed_outputs(library)
             changed_documents = [
                 (id, document)
                 for id, document in course.shown_texts
@@ -212,8 +209,7 @@ def _overlap(first: Span, second: Span) -> bool:
 
 def _bind_numbers(texts: OpenTexts, place: Span) -> Iterator[types.CodeAction]:
     library, document = texts.library, texts.document(place.source)
-    verdicts = library.results.verdicts
-    printed = PrintedOutputs(verdicts, library.results.runs, library.scripts)
+    verdicts, printed = library.results.verdicts, printed_outputs(library)
     outputs = [v.recording.span for v in verdicts if v.recording.span.source == place.source]
     for inline in () if document is None else document_inlines(document):
         is_output = any(_overlap(output, inline.span) for output in outputs)

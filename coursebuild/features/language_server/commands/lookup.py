@@ -28,7 +28,6 @@ from coursebuild.core.pages.numbering import (
     number_prefix,
 )
 from coursebuild.core.scripts.bound_numbers import BoundText
-from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.features.glossary import definition_of
@@ -39,6 +38,7 @@ from coursebuild.features.names.resolve import resolver_of
 from coursebuild.features.references import reference_text, works_of
 from coursebuild.features.symbols import declared_symbol, symbols
 from coursebuild.pipeline.reader import kept_formulas
+from coursebuild.preview.messages import printed_outputs
 
 _ASSIGNMENT = re.compile(r"(\w+)\s*=\s*mujoco\.(Mj(?:Data|Model))\b")
 _NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
@@ -292,8 +292,7 @@ class _Lookup:
         return Referent(formula.span, "\n".join(lines), next(at_offset, declarations[0]).span)
 
     def look_up_binding(self, binding: model.NumberBinding) -> Referent | None:
-        results, number = self.library.results, BoundText.of(binding.text, binding.comma)
-        printed = PrintedOutputs(results.verdicts, results.runs, self.library.scripts)
+        number, printed = BoundText.of(binding.text, binding.comma), printed_outputs(self.library)
         for verdict in printed.of_binding(binding) if number.numbers else ():
             for place in number.shown_places([printed.text(verdict)]):
                 if place.span is not None:
