@@ -24,16 +24,20 @@ from coursebuild.features.importer.outlines import (
     leave_entry,
     left_setting,
     make_level,
+    read_folder,
+    read_nav,
     read_outline,
 )
 from coursebuild.features.importer.segments import read_front_matter
 from coursebuild.features.importer.source_files import (
+    PAIR,
     TEXTS,
     ImportedCourse,
     ImportedLevel,
     ImportedText,
     SourceFiles,
     read_yaml,
+    stem_of,
     title_of_file,
     value_at,
 )
@@ -69,8 +73,11 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         *_read_parts(value_at(quarto, "website", "sidebar"), files),
         *_read_parts(value_at(quarto, "book", "appendices"), files),
         *read_book(files),
-        *_read_nav(value_at(mkdocs, "nav"), str(value_at(mkdocs, "docs_dir") or "docs"), files),
     ]
+    if files.is_mkdocs:
+        folder = posixpath.normpath(str(value_at(mkdocs, "docs_dir") or "docs"))
+        nav = value_at(mkdocs, "nav")
+        parts += read_nav(nav, folder, files, "mkdocs.yml") if nav else read_folder(folder, files)
     own_outline = None if parts else read_outline(files)
     outline = own_outline or Outline(title="", parts=tuple(parts))
     title, parts = outline.title or title, [*outline.parts]
@@ -185,27 +192,22 @@ def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | Im
             yield from (*heads, *inside)
 
 
-def _read_nav(
-    entries: object, folder: str, files: SourceFiles
-) -> Iterator[ImportedText | ImportedLevel]:
-    """Yield the entries of MkDocs' `nav`: a file, or a title with a file or further entries."""
-    for entry in entries if isinstance(entries, list) else ():
-        for title, value in entry.items() if isinstance(entry, Mapping) else [("", entry)]:
-            if isinstance(value, list):
-                parts = _read_nav(value, folder, files)
-                yield from make_level(str(title), parts, "mkdocs.yml", files)
-            elif path := find_text(posixpath.join(folder, str(value)), files):
-                yield ImportedText(file=path, title=str(title))
-            else:
-                leave_entry("mkdocs.yml", f"{title}: {value}" if title else str(value), files)
-
-
 def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
     def natural_order(path: str) -> list[tuple[int, int | str]]:
         parts = re.split(r"(\d+)", path)
         return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
 
+    def is_pair(path: str) -> bool:
+        """Whether a text is a notebook once more, as Jupytext has it."""
+        if path.endswith(".ipynb") or f"{stem_of(path)}.ipynb" not in files:
+            return False
+        is_same = "jupytext" in read_front_matter(files.read_text(path))[0]
+        if is_same:
+            files.leave(path, PAIR, "text")
+        return is_same
+
     texts = sorted((path for path in files if path.endswith(TEXTS)), key=natural_order)
+    texts = [path for path in texts if not is_pair(path)]
     for folder, paths in itertools.groupby(texts, posixpath.dirname):
         lessons = [
             ImportedText(file=path)

@@ -10,6 +10,7 @@ from urllib.parse import unquote, urlsplit
 from msgspec import Struct, field
 from msgspec.structs import replace
 
+from coursebuild.core.drawing.safe_svg import without_refused
 from coursebuild.features.importer.source_files import TEXTS, SourceFiles, stem_of
 
 
@@ -153,6 +154,9 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         if address.startswith("eq") and (resolved := self.resolve_formula(address)):
             return resolved
         parts = urlsplit(re.sub("^(?:project|path):", "", address))
+        if parts.scheme == "javascript":
+            self.leave("link", f"a link to `{address}`, which is a program")
+            return ""
         if parts.scheme or parts.netloc or not parts.path:
             return parts.geturl()
         path = self.resolve_path(parts.path)
@@ -192,7 +196,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
-        return self.path.endswith((".qmd", ".Rmd")) or "mkdocs.yml" in self.files
+        return self.path.endswith((".qmd", ".Rmd")) or self.files.is_mkdocs
 
     def resolve_picture(self, source: str) -> str:
         """Return the new address of a picture; empty where the folder and the file lack it."""
@@ -252,7 +256,12 @@ class LessonContext(Struct, frozen=True, kw_only=True):
 
     def _add_copy(self, name: str, data: bytes) -> str:
         path = f"content/files/{name}"
-        self.copies[path] = data
+        if path not in self.copies and name.lower().endswith(".svg"):
+            data, parts = without_refused(data)
+            if parts:
+                words = f"{name}: {', '.join(dict.fromkeys(parts))}"
+                self.files.account.change("drawing", "without what none here may hold", words)
+        self.copies.setdefault(path, data)
         return posixpath.relpath(path, self.folder).replace(" ", "%20")
 
 

@@ -33,6 +33,7 @@ from coursebuild.features.importer.lost_words import find_lost_words
 from coursebuild.features.importer.other_cells import languages_of_single_cells, write_joined_cells
 from coursebuild.features.importer.references import complete_texts
 from coursebuild.features.importer.source_files import (
+    PAIR,
     TEXTS,
     ImportedCourse,
     ImportedText,
@@ -370,7 +371,9 @@ def _convert_texts(
         files.leave(files_of[link], message, kind)
 
     callouts = frozenset((*CALLOUTS, *context.callouts))
-    completed = complete_texts(new, resolve_label, leave, callouts)
+    completed = complete_texts(
+        new, resolve_label, leave, callouts, has_mentions=not course.has_own_titles
+    )
     out = {text.path: _encode(new_text) for text, new_text in zip(texts, completed, strict=True)}
     return {**out, **context.copies}, context
 
@@ -439,6 +442,8 @@ def _leave_unused(files: SourceFiles, paths: Iterable[str]) -> None:
             message = "not taken for a lesson: add it to the map of the course, and import again"
         elif path.lower().endswith(_OTHER_TEXTS):
             message = "a kind of text that is not read: convert it to Markdown, as by Pandoc"
+        elif path.endswith(".py") and f"{stem_of(path)}.ipynb" in files:
+            message = PAIR
         elif path.endswith(".py") and re.search(rb"(?m)^# ?%%", files.read(path)):
             message = "a script of cells, which `jupytext --to ipynb` makes a notebook of"
         files.leave(path, message)

@@ -173,7 +173,8 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             return directive.callout(name, directive.number, text, True)
         case _ if name in callouts:
             is_folded = name in ("details", "toggle") or "dropdown" in options.get("class", name)
-            title = argument if name in _TITLED else ""
+            has_title = name in _TITLED or (text.strip() and "myst.yml" in context.files)
+            title = argument if has_title else ""
             title += directive.number if name in NUMBERED else ""
             if subtitle := options.get("subtitle"):
                 text = f"**{subtitle}**\n\n{text}"
