@@ -77,7 +77,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
     if segment.kind == "cell":
         return write_cell(segment, context)
     directive = _DIRECTIVE.fullmatch(segment.head)
-    if directive is not None:
+    if directive is not None and not context.path.endswith((".qmd", ".Rmd")):
         new = _convert_directive(directive["name"], directive["argument"], text, context)
         return "\n\n".join((new, *write_outputs(segment, context)))
     match segment.mark[0]:
@@ -190,7 +190,7 @@ def _take_heading(text: str) -> tuple[str, str]:
 
 
 def _convert_fence(head: str, text: str, context: LessonContext) -> str:
-    kind = head.partition(" ")[0]
+    kind = head.partition(" ")[0].strip("{}")
     if raw := re.fullmatch(r"\{?=(\w+)\}?", head):
         if raw[1] == "markdown":
             return _convert_nested(text, context)
@@ -199,9 +199,10 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         context.leave("block that is raw", f"a block of raw {raw[1]}, shown as text")
         return marks.fence("text", text)
     if kind == "admonish":
-        title = _TITLE.search(head)
+        title = re.search(r"[\s=]\"([^\"]*)\"", head.replace('type="', ""))
         name = next(iter(re.findall(r"\b(?:type=[\"'])?([a-z]+)\b", head)[1:]), "note")
-        return _write_callout(name, (title[1] or title[2] or "") if title else "", text, context)
+        is_folded = "collapsible=true" in head
+        return _write_callout(name, title[1] if title else "", text, context, is_folded)
     if listing := re.search(r"\bfile=((?!examples/)\S+)", head) if kind == "python" else None:
         context.files.account.changed["listing of a file", "its name, and its code, not run"] += 1
         return f"**`{listing[1]}`**\n\n{marks.fence('python', text)}"

@@ -46,6 +46,7 @@ _NOT_LESSONS = ("readme", "license", "licence", "changelog", "contributing", "co
 _PAGES = ("index", "intro", "introduction", "about")
 _TITLE_PATHS = ((), ("project",), ("book",), ("website",))
 """Keys below which settings have the title of the course."""
+_SUMMARY_KEYS = ("description", "site_description", "subtitle")
 _LIST_KEYS = ("parts", "chapters", "sections", "children", "toc", "contents", "entries")
 _FILE_KEYS = ("file", "href", "part")
 _TITLE_KEYS = ("caption", "title", "section", "text", "part")
@@ -66,6 +67,13 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     if "_bookdown.yml" in files and "index.Rmd" in files:
         titles.append(read_front_matter(files.read_text("index.Rmd"))[0].get("title"))
     title = next((" ".join(text.split()) for text in titles if isinstance(text, str)), "")
+    summaries = (
+        value_at(mapping, *path, key)
+        for mapping in settings
+        for path in _TITLE_PATHS
+        for key in _SUMMARY_KEYS
+    )
+    summary = next((text for text in summaries if isinstance(text, str)), "")
     parts = [
         *_read_parts(_read_settings("_toc.yml", files), files),
         *_read_parts(value_at(myst, "project"), files),
@@ -104,7 +112,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
             levels += (part for part in run if isinstance(part, ImportedLevel))
     return ImportedCourse(
         title=title or title_of_file(files.name),
-        summary=outline.summary,
+        summary=outline.summary or " ".join(summary.split()),
         language=outline.language,
         has_own_titles=True,
         substitutions=_read_substitutions(settings, files),
@@ -121,6 +129,7 @@ def _read_substitutions(
     """Return what names between braces stand for, as the settings of MyST, Quarto, MkDocs say."""
     places = (("parse", "myst_substitutions"), ("extra",), ("project", "substitutions"), ("book",))
     values = [value_at(mapping, *path) for mapping in settings for path in places]
+    values.append({"config": settings[-1]})  # as macros of MkDocs call its settings
     if (name := "_variables.yml") in files:
         values.append(read_yaml(files.read_text(name)))
     if (name := "conf.py") in files:
@@ -150,7 +159,8 @@ def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
 
 
 _SETTINGS = frozenset(
-    "appendices bibliography bibtex_bibfiles chapters docs_dir nav root sidebar site_name title "
+    "appendices bibliography bibtex_bibfiles chapters description docs_dir nav root sidebar "
+    "site_description site_name subtitle title "
     "toc".split()
 )
 """Keys of settings that are read."""

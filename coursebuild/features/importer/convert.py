@@ -32,6 +32,7 @@ from coursebuild.features.importer.jsx import is_mdx
 from coursebuild.features.importer.lost_words import find_lost_words
 from coursebuild.features.importer.other_cells import languages_of_single_cells, write_joined_cells
 from coursebuild.features.importer.references import complete_texts
+from coursebuild.features.importer.roles import address_of_label
 from coursebuild.features.importer.source_files import (
     PAIR,
     TEXTS,
@@ -338,7 +339,8 @@ def _convert_texts(
             for text in reversed(texts)
             for segment in text.segments
             for anchor in find_anchors(f"{segment.head}\n{segment.text}")
-        },
+        }
+        | {to_anchor(text.label): text.link for text in texts if text.label},
         files=files,
         models=models,
         sources={key: _authors(work) for key, work in _works(files) if key},
@@ -351,9 +353,9 @@ def _convert_texts(
     for text in texts:
         macros = f"{book_macros}{text.macros}"
         try:
-            head = ""
+            head = f'<a id="{to_anchor(text.label)}"></a>\n\n' if text.label else ""
             if macros:
-                head = f"$${macros}$$\n\n"
+                head += f"$${macros}$$\n\n"
                 files.account.changed["macros", "defined in the formulas that use them"] += 1
             new[text.link] = text.title, head + _convert_text(text, context)
         except RecursionError:
@@ -362,7 +364,7 @@ def _convert_texts(
 
     def resolve_label(link: str, anchor: str) -> str:
         text_context = replace(context, path=files_of[link])
-        address = text_context.resolve_anchor(to_anchor(anchor))
+        address = address_of_label(anchor, text_context)
         if not address:
             text_context.leave("link", f"a link to `#{anchor}`, which no text sets")
         return address
@@ -392,7 +394,11 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
             for label in re.findall(r"^[ >]*\[(?!\^)([^\[\]\n]+)\]:", segment.text, re.MULTILINE)
         ),
         script_path=script_path_of(text.path),
-        substitutions={**course_context.substitutions, **text.substitutions},
+        substitutions={
+            **course_context.substitutions,
+            "page.title": text.title,
+            **text.substitutions,
+        },
         title=text.title,
         parts=[],
         scripts=[],

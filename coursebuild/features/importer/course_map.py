@@ -172,8 +172,10 @@ def _read_items(fields: dict[str, Any], name: str) -> list[Any]:
 
 def _read_summary(fields: dict[str, Any]) -> str:
     """Return the summary, with what a learner should be able to do by then."""
-    checkpoint = _read_text(fields, "checkpoint")
-    return f"{_read_text(fields, 'summary')} {checkpoint and f'Checkpoint: {checkpoint}'}".strip()
+    summary, checkpoint = (_read_text(fields, name) for name in ("summary", "checkpoint"))
+    if not checkpoint:
+        return summary
+    return f"{re.sub(r'(?<=[^.!?])$', '.', summary)} Checkpoint: {checkpoint}".strip()
 
 
 _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")

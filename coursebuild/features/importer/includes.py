@@ -111,15 +111,15 @@ def expand_includes(
 
 
 def _find(name: str, path: str, files: SourceFiles) -> str:
-    """Return the path of a file that a text names: beside it, or from a folder that holds it."""
-    folder = posixpath.dirname(path)
-    while True:
+    """Return the path of a file that a text names, from its own folder or another that may be."""
+    folders = [posixpath.dirname(path)]
+    while folders[-1]:
+        folders.append(posixpath.dirname(folders[-1]))
+    for folder in (*folders, *files.included_folders):
         path = posixpath.normpath(posixpath.join(folder, name.lstrip("/")))
         if place := files.find(path, is_hidden=path.endswith(TEXTS)):
             return place
-        if not folder:
-            return ""
-        folder = posixpath.dirname(folder)
+    return ""
 
 
 def _part_of(text: str, part: str, *, by_lines: bool) -> str | None:

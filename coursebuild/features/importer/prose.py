@@ -20,6 +20,7 @@ from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, t
 from coursebuild.features.importer.displays import WORDS, normalize_formulas
 from coursebuild.features.importer.pandoc_tables import rewrite_tables
 from coursebuild.features.importer.roles import (
+    address_of_label,
     convert_attributes,
     convert_code,
     convert_cross_reference,
@@ -66,7 +67,7 @@ _LINE = re.compile(
     r"-(?P<label>\w+(?:-\w+)*)\]?)"
     r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
     r"|(?<!\^)\^[^\s\^\[\]]+\^(?!\^))"
-    r"|(?P<change>\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
+    r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
     r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
@@ -377,10 +378,11 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             context.leave("citation", message)
             return f"`{whole}`"
         case "told":
-            is_source = match["work"] in context.sources
-            return (
-                context.cite_in_words(match["work"], match["cited"] or "") if is_source else whole
-            )
+            if match["work"] in context.sources:
+                return context.cite_in_words(match["work"], match["cited"] or "")
+            is_label = "myst.yml" in context.files and not match["cited"]
+            address = address_of_label(match["work"], context) if is_label else ""
+            return write_link("", address) or whole
         case "pair":
             return _rewrite_line(match["held"], context)
         case "proof":

@@ -204,14 +204,17 @@ def _edit_links(
             start, _, target_anchor = address.partition("#")
             text = texts.get(start or link, text)
             if target_anchor not in text.anchors:
-                if reference := _REFERENCE.fullmatch(inline.span.text):
+                if start and inline.span.text[-1] == ")":
+                    yield Edit(span, start)
+                elif reference := _REFERENCE.fullmatch(inline.span.text):
                     yield Edit(
                         inline.span, reference[1] or title_of_file(anchor.rpartition(":")[2])
                     )
                 continue
             yield Edit(span, address)
         if inline.span.text.startswith("[]("):
-            words = text.headings.get(target_anchor, "")
+            kind = {"fig": "the figure", "tbl": "the table"}.get(target_anchor.partition("-")[0])
+            words = text.headings.get(target_anchor) or kind or ""
             words = words if words and "](" not in words else text.title
             at = inline.span.start + 1
             if ":" not in target_anchor:  # what is numbered is called by its number

@@ -30,6 +30,13 @@ def words_of_link(address: str, old: str) -> str:
     return urlsplit(address).hostname or title_of_file(re.split("[:#]", old)[-1])
 
 
+def address_of_label(label: str, context: LessonContext) -> str:
+    """Return the address of what has a label of MyST; empty where no text sets it."""
+    name = label_anchor(label)
+    anchors = (to_anchor(label), f"fig:{name}", f"tab:{name}")
+    return next(filter(None, map(context.resolve_anchor, anchors)), "")
+
+
 def convert_role(name: str, body: str, context: LessonContext) -> str:
     """Return a role with this text in Markdown."""
     parts = re.fullmatch(r"(?P<words>.*\S)\s*<(?P<target>[^<>]+)>", body)
@@ -42,9 +49,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case "doc":
             return write_link(words or title_of_file(target), context.resolve_link(f"{target}.md"))
         case "ref" | "numref" | "prf:ref" | "any":
-            label = label_anchor(target)
-            anchors = (to_anchor(target), f"fig:{label}", f"tab:{label}")
-            address = next(filter(None, map(context.resolve_anchor, anchors)), "")
+            address = address_of_label(target, context)
             if not address:
                 message = f"a link to `{target}`, which no text sets"
                 context.leave(f"role `{{{name}}}`", message)

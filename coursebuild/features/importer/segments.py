@@ -55,6 +55,7 @@ _NEEDLESS = (
     "sidebar_position",
     "myst",
     "substitutions",
+    "label",
     "colab",
     "header-includes",
     "math",

@@ -13,7 +13,7 @@ import re
 import stat
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Mapping, ValuesView
+from collections.abc import Iterator, Mapping, Sequence, ValuesView
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -82,6 +82,11 @@ class ImportedText(Struct, frozen=True, kw_only=True):
     """What names between braces stand for in it, as its metadata say."""
     macros: str = ""
     """The definitions of macros in its metadata."""
+
+    @property
+    def label(self) -> str:
+        """The label that its metadata give the whole text; may be empty."""
+        return self.substitutions.get("label", "")
 
     @property
     def link(self) -> str:
@@ -250,6 +255,13 @@ class SourceFiles:
     def is_mkdocs(self) -> bool:
         """Whether it is a project of MkDocs."""
         return "mkdocs.yml" in self or "mkdocs.yaml" in self
+
+    @cached_property
+    def included_folders(self) -> Sequence[str]:
+        """The folders in which MkDocs finds what texts include, besides their own."""
+        names = (name for name in ("mkdocs.yml", "mkdocs.yaml") if name in self)
+        pattern = r"\b(?:base_path|include_dir):[ \t]*(?:\[|\n[ \t]*-[ \t]*)?[\"']?([\w./-]+)"
+        return re.findall(pattern, "".join(map(self.read_text, names)))
 
     def has_signs(self, path: str) -> bool:
         """Whether the tool of a text draws hyphens in a row as a dash."""
