@@ -9,8 +9,7 @@ import textwrap
 
 from msgspec.structs import replace
 
-from coursebuild.api import marks
-from coursebuild.core.model.course import CALLOUTS
+from coursebuild.api import marks, model
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.absent_labs import write_absent_lab
@@ -35,7 +34,7 @@ from coursebuild.features.importer.source_files import Segment
 from coursebuild.features.lab.model import BUILT_IN_KINDS
 
 _CALLOUTS = {
-    **{name: name for name in CALLOUTS},
+    **{name: name for name in model.CALLOUTS},
     "hint": "tip",
     **dict.fromkeys(("attention", "failure", "bug"), "caution"),
     **dict.fromkeys(("danger", "error"), "warning"),
@@ -97,35 +96,22 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             return _write_callout(name, title, text, context, is_folded)
         case "/":
             name, _, title = (part.strip() for part in head.partition("|"))
-            match name:
-                case "tab":
-                    return _write_tab(title, text, context)
-                case "html" | "define" | "caption" | "":
-                    return _convert_nested(text, context)
-                case _:
-                    is_folded = name == "details"
-                    return _write_callout(
-                        "note" if is_folded else name,
-                        title,
-                        re.sub(r"\A(?:[ ]{4}[\w-]+:.*\n?)+", "", text),
-                        context,
-                        is_folded,
-                    )
+            if name == "tab":
+                return _write_tab(title, text, context)
+            if name in ("html", "define", "caption", ""):
+                return _convert_nested(text, context)
+            text = re.sub(r"\A(?:[ ]{4}[\w-]+:.*\n?)+", "", text)
+            return _write_callout(name, title, text, context, name == "details")
         case _:
             return _convert_fence(head, text, context)
 
 
-def _bold_headings(text: str) -> str:
+def _write_tabs(text: str, context: LessonContext) -> str:
     """Return a set of tabs of Quarto with their titles, which are headings, in bold."""
-    first = re.search(r"^(#{1,6})[ \t]", text, re.MULTILINE)
-    if first is None:
-        return text
-    pattern = rf"^{first[1]}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
-    parts = re.split(r"(^(?P<mark>`{3,}|~{3,}).*?^(?P=mark)[ \t]*$)", text, flags=re.M | re.S)
-    for at in range(0, len(parts), 3):  # what lies between blocks of code, which have two groups
-        parts[at] = re.sub(pattern, r"\n**\1**\n", parts[at], flags=re.MULTILINE)
-        parts[at + 2 : at + 3] = [""]
-    return "".join(parts)
+    context.files.account.changed[_TAB] += 1
+    first = re.search(r"^#{1,6}(?=[ \t])", text, re.MULTILINE)
+    pattern = rf"^{first[0] if first else '#'}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
+    return _convert_nested(text, context, re.compile(pattern, re.MULTILINE))
 
 
 def _write_tab(title: str, text: str, context: LessonContext) -> str:
@@ -136,29 +122,23 @@ def _write_tab(title: str, text: str, context: LessonContext) -> str:
 def _convert_division(head: str, text: str, context: LessonContext) -> str:
     """Convert what stands between colons: a callout of Quarto or Docusaurus, or a division."""
     callout = re.search(r"callout-(\w+)", head)
+    plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)  # as in Docusaurus
+    label = re.search(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", head)
     attribute = _TITLE.search(head)
     title = (attribute[1] or attribute[2] or "") if attribute else ""
-    is_folded = re.search(r"collapse=\"?true", head) is not None
-    if callout is not None:
-        title, text = (title, text) if title else _take_heading(text)
-        label = re.search(r"#([a-z]+)-([\w-]+)", head)
-        title += f" {{#{label[1]}:{to_anchor(label[2])}}}" if label else ""
-        return _write_callout(callout[1], title, text, context, is_folded)
-    plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)
-    if plain is not None:  # as Docusaurus and its likes write callouts
-        if plain[1] == "details":
-            return _write_callout("note", plain[2] or plain[3] or "", text, context, True)
-        if plain[1].lower() in _CALLOUTS:
-            title = plain[2] or plain[3] or ""
-            return _write_callout(plain[1].lower(), title, text, context)
     classes = re.findall(r"\.([\w-]+)", head)
-    proof = re.search(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", head)
-    if proof is not None or (kind := next((c for c in classes if c in _PROOF_CLASSES), "")):
-        title, text = (title, text) if title else _take_heading(text)
-        if proof is None:
-            return _write_callout(kind, title, text, context)
-        title += f" {{#{proof[1]}:{to_anchor(proof[2])}}}"
-        return _write_callout(PROOF_LABELS[proof[1]], title, text, context)
+    kind = PROOF_LABELS[label[1]] if label else ""
+    kind = kind or next((name for name in classes if name in _PROOF_CLASSES), "")
+    if callout is not None:
+        kind = callout[1]
+    elif plain is not None and plain[1].lower() in _CALLOUTS:
+        kind, title = plain[1].lower(), plain[2] or plain[3] or ""
+    if kind:
+        if not (title or plain):
+            title, text = _take_heading(text)
+        title += f" {{#{label[1]}:{to_anchor(label[2])}}}" if label else ""
+        is_folded = kind == "details" or re.search(r"collapse=\"?true", head) is not None
+        return _write_callout(kind, title, text, context, is_folded)
     if condition := re.search(r"content-(visible|hidden).*?(when|unless)-format=\W?(\w+)", head):
         is_visible = (condition[1] == "visible") == (condition[2] == "when")
         if is_visible != ("html" in condition[3]):
@@ -169,8 +149,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         context.leave("division", f"documentation that its tool makes from the code of `{head}`")
         return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
     if "panel-tabset" in classes:
-        context.files.account.changed[_TAB] += 1
-        return _convert_nested(_bold_headings(text), context)
+        return _write_tabs(text, context)
     context.files.account.changed["division", "what it holds, without a frame"] += 1
     if figure := re.search(r"#fig-([\w-]+)", head):
         return f'<a id="fig-{to_anchor(figure[1])}"></a>\n\n{_convert_nested(text, context)}'
@@ -251,17 +230,19 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     return (f"**{words}**\n\n" if words else "") + new
 
 
-def _convert_nested(text: str, context: LessonContext) -> str:
+def _convert_nested(text: str, context: LessonContext, title: re.Pattern[str] | None = None) -> str:
+    """Return what a block holds; `title` is a heading in it that is a paragraph in bold."""
     if context.depth == _MAX_DEPTH:
         message = f"blocks that nest more than {_MAX_DEPTH} deep, shown as written"
         context.leave("block in blocks", message)
         return marks.fence("text", text)
     context = replace(context, depth=context.depth + 1)
-    parts = (
-        replace(part, text=lower_titles(part.text)) if part.kind == "prose" else part
-        for part in read_markdown(text, place=context.place)
-    )
-    texts = (convert_segment(part, context).strip("\n") for part in parts)
+    texts = []
+    for part in read_markdown(text, place=context.place):
+        if part.kind == "prose":
+            bold = title.sub(r"\n**\1**\n", part.text) if title else part.text
+            part = replace(part, text=lower_titles(bold))
+        texts.append(convert_segment(part, context).strip("\n"))
     return "\n\n".join(text for text in texts if text.strip())
 
 

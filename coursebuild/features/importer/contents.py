@@ -46,7 +46,6 @@ _NOT_LESSONS = ("readme", "license", "licence", "changelog", "contributing", "co
 _PAGES = ("index", "intro", "introduction", "about")
 _TITLE_PATHS = ((), ("project",), ("book",), ("website",))
 """Keys below which settings have the title of the course."""
-_SUMMARY_KEYS = ("description", "site_description", "subtitle")
 _LIST_KEYS = ("parts", "chapters", "sections", "children", "toc", "contents", "entries")
 _FILE_KEYS = ("file", "href", "part")
 _TITLE_KEYS = ("caption", "title", "section", "text", "part")
@@ -62,18 +61,18 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     """
     names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
     myst, quarto, _, mkdocs = settings = [_read_settings(name, files) for name in names]
-    titles = [value_at(mapping, *path, "title") for mapping in settings for path in _TITLE_PATHS]
-    titles.append(value_at(mkdocs, "site_name"))
-    if "_bookdown.yml" in files and "index.Rmd" in files:
-        titles.append(read_front_matter(files.read_text("index.Rmd"))[0].get("title"))
-    title = next((" ".join(text.split()) for text in titles if isinstance(text, str)), "")
-    summaries = (
-        value_at(mapping, *path, key)
-        for mapping in settings
-        for path in _TITLE_PATHS
-        for key in _SUMMARY_KEYS
-    )
-    summary = next((text for text in summaries if isinstance(text, str)), "")
+
+    def find_words(*keys: str) -> str:
+        places = (
+            (mapping, path, key) for mapping in settings for path in _TITLE_PATHS for key in keys
+        )
+        texts = (value_at(mapping, *path, key) for mapping, path, key in places)
+        return next((" ".join(text.split()) for text in texts if isinstance(text, str)), "")
+
+    title = find_words("title", "site_name")
+    if not title and "_bookdown.yml" in files and "index.Rmd" in files:
+        front_matter, _ = read_front_matter(files.read_text("index.Rmd"))
+        title = str(front_matter.get("title") or "")
     parts = [
         *_read_parts(_read_settings("_toc.yml", files), files),
         *_read_parts(value_at(myst, "project"), files),
@@ -112,7 +111,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
             levels += (part for part in run if isinstance(part, ImportedLevel))
     return ImportedCourse(
         title=title or title_of_file(files.name),
-        summary=outline.summary or " ".join(summary.split()),
+        summary=outline.summary or find_words("description", "site_description", "subtitle"),
         language=outline.language,
         has_own_titles=True,
         substitutions=_read_substitutions(settings, files),
@@ -148,8 +147,8 @@ def _named_values(value: object, name: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
-    path = next((path for path in (name, name.replace(".yml", ".yaml")) if path in files), None)
-    if path is None:
+    path = files.find_settings(name)
+    if not path:
         return {}
     value = read_yaml(files.read_text(path))
     files.account.changed["map", "content/course.toml"] += 1

@@ -187,20 +187,13 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         self.cited.add(key)
         return f"{self.sources[key]} [@{key}{place and f', {place}'}]".lstrip()
 
-    def resolve_file(self, address: str) -> str:
-        """Return the new address of a file that HTML names; empty where the folder lacks it."""
-        path = self.resolve_path(urlsplit(address).path)
-        if path.endswith(TEXTS) or stem_of(path) in self.targets or path not in self.files:
-            return ""
-        return self.add_file(path)
-
     @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
         return self.path.endswith((".qmd", ".Rmd")) or self.files.is_mkdocs
 
     def resolve_picture(self, source: str) -> str:
-        """Return the new address of a picture; empty where the folder and the file lack it."""
+        """Return the new address of a picture or file; empty where none here has it."""
         name = source.removeprefix("attachment:")
         if name in self.pictures:
             return self.add_picture(name)

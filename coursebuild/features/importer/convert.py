@@ -13,11 +13,10 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import EffectError, Store, UsageError
+from coursebuild.api import EffectError, Store, UsageError, model
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange, change_files
-from coursebuild.core.model.course import BIBLIOGRAPHY, CALLOUTS
 from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.absent_labs import lab_files
@@ -91,7 +90,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
                     files.leave(map_path, message, "prerequisite")
     packages = dict(_own_packages(files, texts))
     if context.cited:
-        out[BIBLIOGRAPHY] = _encode(_cited_works(files, context.cited))
+        out[model.BIBLIOGRAPHY] = _encode(_cited_works(files, context.cited))
     unused = {*files} - files.read_paths - {*models}
     out |= packages | {path: files.read(source) for source, path in models.items()}
     texts_and_models = (data for path, data in out.items() if path.endswith((".md", ".xml")))
@@ -372,7 +371,7 @@ def _convert_texts(
     def leave(link: str, kind: str, message: str) -> None:
         files.leave(files_of[link], message, kind)
 
-    callouts = frozenset((*CALLOUTS, *context.callouts))
+    callouts = frozenset((*model.CALLOUTS, *context.callouts))
     completed = complete_texts(
         new, resolve_label, leave, callouts, has_mentions=not course.has_own_titles
     )

@@ -201,15 +201,16 @@ def _edit_links(
         target_anchor = text.anchors.get(anchor) or text.anchors.get(_letters(anchor)) or ""
         if anchor and target_anchor != anchor:
             address = f"{start}#{target_anchor}" if target_anchor else resolve_label(link, anchor)
-            start, _, target_anchor = address.partition("#")
-            text = texts.get(start or link, text)
-            if target_anchor not in text.anchors:
-                if start and inline.span.text[-1] == ")":
-                    yield Edit(span, start)
-                elif reference := _REFERENCE.fullmatch(inline.span.text):
-                    yield Edit(
-                        inline.span, reference[1] or title_of_file(anchor.rpartition(":")[2])
-                    )
+            owner, _, target_anchor = address.partition("#")
+            target = texts.get(owner or link, text)
+            if target_anchor in target.anchors:
+                text = target
+            elif start:  # the text is there
+                address = start
+            else:
+                if reference := _REFERENCE.fullmatch(inline.span.text):
+                    words = reference[1] or title_of_file(anchor.rpartition(":")[2])
+                    yield Edit(inline.span, words)
                 continue
             yield Edit(span, address)
         if inline.span.text.startswith("[]("):

@@ -33,7 +33,8 @@ def words_of_link(address: str, old: str) -> str:
 def address_of_label(label: str, context: LessonContext) -> str:
     """Return the address of what has a label of MyST; empty where no text sets it."""
     name = label_anchor(label)
-    anchors = (to_anchor(label), f"fig:{name}", f"tab:{name}")
+    kinds = ("tab", "fig") if label.startswith("t") else ("fig", "tab")
+    anchors = (to_anchor(label), *(f"{kind}:{name}" for kind in kinds))
     return next(filter(None, map(context.resolve_anchor, anchors)), "")
 
 
@@ -222,7 +223,7 @@ def convert_tag(tag: str, context: LessonContext) -> str:
         return tag
     address = attribute[3].removeprefix("attachment:")
     before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
-    if new_address := context.resolve_picture(address) or context.resolve_file(address):
+    if new_address := context.resolve_picture(address):
         return before + new_address + after
     context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
     if re.match("<img", tag, re.IGNORECASE):

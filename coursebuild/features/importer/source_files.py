@@ -251,17 +251,21 @@ class SourceFiles:
         has_none = bool(settings) and "math" not in "".join(map(self.read_text, settings))
         return not has_none and not (self.folder / ".gitbook.yaml").is_file()
 
-    @cached_property
+    def find_settings(self, name: str) -> str:
+        """Return the path of settings in YAML, which have two extensions; empty for none."""
+        return next((path for path in (name, name.replace(".yml", ".yaml")) if path in self), "")
+
+    @property
     def is_mkdocs(self) -> bool:
         """Whether it is a project of MkDocs."""
-        return "mkdocs.yml" in self or "mkdocs.yaml" in self
+        return bool(self.find_settings("mkdocs.yml"))
 
     @cached_property
     def included_folders(self) -> Sequence[str]:
         """The folders in which MkDocs finds what texts include, besides their own."""
-        names = (name for name in ("mkdocs.yml", "mkdocs.yaml") if name in self)
+        settings = self.find_settings("mkdocs.yml")
         pattern = r"\b(?:base_path|include_dir):[ \t]*(?:\[|\n[ \t]*-[ \t]*)?[\"']?([\w./-]+)"
-        return re.findall(pattern, "".join(map(self.read_text, names)))
+        return re.findall(pattern, self.read_text(settings)) if settings else []
 
     def has_signs(self, path: str) -> bool:
         """Whether the tool of a text draws hyphens in a row as a dash."""
