@@ -29,7 +29,7 @@ from coursebuild.features.importer.directives import (
 from coursebuild.features.importer.jsx import without_jsx
 from coursebuild.features.importer.other_cells import language_of, write_other_cell
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.segments import lower_titles, read_markdown
+from coursebuild.features.importer.segments import change_prose, lower_titles, read_markdown
 from coursebuild.features.importer.source_files import Segment
 from coursebuild.features.lab.model import BUILT_IN_KINDS
 
@@ -68,9 +68,13 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
 
 def _convert(segment: Segment, context: LessonContext) -> str:
     context, head, text = context.at(segment.place), segment.head, segment.text
+
+    def name_callouts(text: str) -> str:
+        return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
+
     if segment.kind == "prose":
         text = rewrite_prose(without_jsx(text, context) if context.is_mdx else text, context)
-        return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
+        return name_callouts(text)
     if language := language_of(segment):
         return write_other_cell(segment, language, context)
     if segment.kind == "cell":
@@ -83,8 +87,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
         case ":":
             return _convert_division(head, text, context)
         case ">":
-            quotation = marks.block_quote(_convert_nested(text, context))
-            return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], quotation)
+            return name_callouts(marks.block_quote(_convert_nested(text, context)))
         case "=":
             return _write_tab(head, text, context)
         case "!" | "?":
@@ -124,8 +127,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     callout = re.search(r"callout-(\w+)", head)
     plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)  # as in Docusaurus
     label = re.search(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", head)
-    attribute = _TITLE.search(head)
-    title = (attribute[1] or attribute[2] or "") if attribute else ""
+    title = _title_of(head)
     classes = re.findall(r"\.([\w-]+)", head)
     kind = PROOF_LABELS[label[1]] if label else ""
     kind = kind or next((name for name in classes if name in _PROOF_CLASSES), "")
@@ -154,6 +156,12 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     if figure := re.search(r"#fig-([\w-]+)", head):
         return f'<a id="fig-{to_anchor(figure[1])}"></a>\n\n{_convert_nested(text, context)}'
     return _convert_nested(text, context)
+
+
+def _title_of(head: str) -> str:
+    """The title that the head of a block has by a name; may be empty."""
+    title = _TITLE.search(head)
+    return (title[1] or title[2] or "") if title else ""
 
 
 _PROOF_CLASSES = ("theorem", "lemma", "definition", "proof", "remark", "solution", "exercise")
@@ -218,8 +226,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         head += f' title="{caption}"' if caption else ""
     change = "dropped: its tool colours the lines beside it"
     text = context.files.account.replace(_HIGHLIGHT, "", text, "comment in code", change)
-    title = _TITLE.search(head)
-    words = re.sub(r"(?<!\\)[_*`]", r"\\\g<0>", title[1] or title[2] or "") if title else ""
+    words = re.sub(r"(?<!\\)[_*`]", r"\\\g<0>", _title_of(head))
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
     kind = f"block of `{language}`" if language else "block without a kind"
@@ -237,12 +244,12 @@ def _convert_nested(text: str, context: LessonContext, title: re.Pattern[str] | 
         context.leave("block in blocks", message)
         return marks.fence("text", text)
     context = replace(context, depth=context.depth + 1)
-    texts = []
-    for part in read_markdown(text, place=context.place):
-        if part.kind == "prose":
-            bold = title.sub(r"\n**\1**\n", part.text) if title else part.text
-            part = replace(part, text=lower_titles(bold))
-        texts.append(convert_segment(part, context).strip("\n"))
+
+    def lower(prose: str) -> str:
+        return lower_titles(title.sub(r"\n**\1**\n", prose) if title else prose)
+
+    parts = change_prose(read_markdown(text, place=context.place), lower)
+    texts = (convert_segment(part, context).strip("\n") for part in parts)
     return "\n\n".join(text for text in texts if text.strip())
 
 

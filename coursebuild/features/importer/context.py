@@ -163,8 +163,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         anchor = f"#{parts.fragment}" if parts.fragment else ""
         stem = stem_of(path)  # the first text of a folder is often called by the folder
         folder = path if stem == path else stem.removesuffix("/index")
-        route = path.removeprefix("docs/")
-        names = (stem, path, f"{folder}/index", f"{folder}/README", route)
+        own_route = path.removeprefix("docs/")
+        names = (stem, path, f"{folder}/index", f"{folder}/README", own_route)
         target = next(filter(None, map(self.targets.get, names)), None)
         if target is not None:
             return target + anchor

@@ -202,9 +202,9 @@ def _edit_links(
         if anchor and target_anchor != anchor:
             address = f"{start}#{target_anchor}" if target_anchor else resolve_label(link, anchor)
             owner, _, target_anchor = address.partition("#")
-            target = texts.get(owner or link, text)
-            if target_anchor in target.anchors:
-                text = target
+            owner_text = texts.get(owner or link, text)
+            if target_anchor in owner_text.anchors:
+                text = owner_text
             elif start:  # the text is there
                 address = start
             else:
@@ -214,8 +214,9 @@ def _edit_links(
                 continue
             yield Edit(span, address)
         if inline.span.text.startswith("[]("):
-            kind = {"fig": "the figure", "tbl": "the table"}.get(target_anchor.partition("-")[0])
-            words = text.headings.get(target_anchor) or kind or ""
+            names = {"fig": "the figure", "tbl": "the table"}
+            name = names.get(target_anchor.partition("-")[0], "")
+            words = text.headings.get(target_anchor) or name
             words = words if words and "](" not in words else text.title
             at = inline.span.start + 1
             if ":" not in target_anchor:  # what is numbered is called by its number
