@@ -393,11 +393,7 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
             for label in re.findall(r"^[ >]*\[(?!\^)([^\[\]\n]+)\]:", segment.text, re.MULTILINE)
         ),
         script_path=script_path_of(text.path),
-        substitutions={
-            **course_context.substitutions,
-            "page.title": text.title,
-            **text.substitutions,
-        },
+        substitutions={**course_context.substitutions, **text.substitutions},
         title=text.title,
         parts=[],
         scripts=[],

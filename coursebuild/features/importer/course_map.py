@@ -300,7 +300,7 @@ def _read_file(
         summary=text.summary or read.summary,
         segments=read.segments,
         pictures=read.pictures,
-        substitutions=read.substitutions,
+        substitutions={"page.title": title, **read.substitutions},
         macros=read.macros,
     )
 

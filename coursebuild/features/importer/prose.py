@@ -388,8 +388,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "proof":
             return _write_proof(match, context)
         case "substitution":
-            is_statement = _STATEMENTS.fullmatch(match.string) is not None
-            return convert_substitution(whole, context, is_statement)
+            return convert_substitution(whole, context, bool(_STATEMENTS.fullmatch(match.string)))
         case "marked":
             is_marked = whole[:2] == "==" or context.has_marks
             tag = _MARKS[whole[:2] if whole[:2] in _MARKS else whole[0]]

@@ -176,7 +176,7 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     if (value := context.substitutions.get(key)) is not None:
         return value
     call = _CALL.fullmatch(whole)
-    texts = [one or two for one, two in _QUOTED.findall(call["arguments"])] if call else [whole]
+    texts = ["".join(text) for text in _QUOTED.findall(call["arguments"])] if call else []
     message = f"`{whole}`, which its tool replaces: write what it stands for"
     context.leave("substitution", message)
     return "" if is_statement else ", ".join(f"`{text}`" for text in texts or [whole])
