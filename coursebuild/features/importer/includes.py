@@ -1,8 +1,8 @@
 """Texts and lines of other files that a text includes, put where it does so.
 
 mdBook writes `{{#include FILE:LINES}}` or `{{#include FILE:ANCHOR}}`, MkDocs `--8<-- "FILE:LINES"`
-or `--8<-- "FILE:SECTION"` or `{!FILE!}`, Quarto `{{< include FILE >}}`, MyST a directive with
-options.
+or `--8<-- "FILE:SECTION"` or `{!FILE!}` or, as code, `{* FILE *}`,
+Quarto `{{< include FILE >}}`, MyST a directive with options.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ _MARK = re.compile(
     r"(?P<mdbook>[^{}\s][^{}]*?)[ ]*\}\}"
     r"|\{\{<[ ]*include[ ]+(?P<quarto>\S+)[ ]*>\}\}"
     r"|\{%-?[ ]*include(?:-markdown)?[ ]+[\"'](?P<markdown>[^\"'\n]+)[\"'][^%]*%\}"
+    r"|^\{\*[ ]*(?P<listing>[^\s{}]+)[^{}\n]*\*\}[ \t]*$"
     r"|\{!>?[ \t]*(?P<inclusion>[^{}!\s]+)[^{}!\n]*!\}"
     r"|^(?P<indent>[ \t]*)-{1,}8<-{1,}[ \t]+[\"'](?P<mkdocs>[^\"'\n]+)[\"'][ \t]*$",
     re.MULTILINE | re.DOTALL,
@@ -82,7 +83,7 @@ def expand_includes(
             files.account.change("title of the page", "the map has it", mark["mdbook"])
             return ""
         name = mark["mdbook"] or mark["quarto"] or mark["mkdocs"] or mark["inclusion"]
-        name = name or mark["markdown"]
+        name = name or mark["markdown"] or mark["listing"]
         line = f"line {text.count(chr(10), 0, mark.start()) + 1}"
         file, _, part = name.split()[0].partition(":")
         target = _find(file, path, files)
@@ -102,8 +103,9 @@ def expand_includes(
         files.account.changed["file that is included", "its lines stand in the text"] += 1
         expanded = expand_includes(part_text, target, files, depth + 1, lesson=lesson or path)
         included = expanded.strip("\n")
-        if mark["command"] == "playground":
-            return f"```rust\n{included}\n```"
+        if mark["listing"] or mark["command"] == "playground":
+            language = "rust" if mark["command"] else target.rpartition(".")[2]
+            return f"```{language}\n{included}\n```"
         indent = mark["indent"] or re.split(r"[^ \t]|\n", text[: mark.start()])[-1]
         return (mark["indent"] or "") + included.replace("\n", f"\n{indent}")
 

@@ -285,6 +285,11 @@ def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
         ("`{{ #include }}`", "`{{ #include }}`"),
         ("```rust\n{{#include gone.rs}}\n```", "```rust\n{{#include gone.rs}}\n```"),
         ('--8<-- "gone.md"\n\n`{!gone.md!}`', "`gone.md`\n\n`{!gone.md!}`"),
+        ("{* hidden/c.py hl[2] *}", "```py\nd = 1\n```"),
+        (
+            "```{code-cell}\nplt.rc('a', b=1)\n```",
+            "```python file=examples/l1_1_a.py\nplt.rc('a', b=1)\n```",
+        ),
         ("{% raw %}\n`{% include 'p.md' %}`\n{% endraw %}\n", "`{% include 'p.md' %}`"),
         ("- B\n\n  {% include-markdown 'hidden/.b.md'\n  %}", "- B\n\n  C\n  D"),
         ("{% block b %}\nB, {% c %}.\n{% endblock %}", "B, `{% c %}`."),
@@ -302,7 +307,12 @@ def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
 )
 def test_what_stands_in_a_line_or_a_block(tmp_path: Path, text: str, expected: str) -> None:
     (tmp_path / "old/.obsidian").mkdir(parents=True)
-    files = {"p.png": "\x89PNG", "mkdocs.yml": "site_name: A", "hidden/.b.md": "C\nD\n"}
+    files = {
+        "p.png": "\x89PNG",
+        "mkdocs.yml": "site_name: A",
+        "hidden/.b.md": "C\nD\n",
+        "hidden/c.py": "d = 1\n",
+    }
     new = lesson(tmp_path, "a.md", f"\nOne\n===\n\n{text}\n", **files)
     assert new == f"{expected}\n"
 
