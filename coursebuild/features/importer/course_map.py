@@ -214,7 +214,8 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
                 lesson.old_id if fits else next(other_ids), other_ids, used_lesson_ids
             )
             lessons.append(read(lesson, lesson_id))
-        title = _plain_text(level.title) or f"Level {id}"
+        first = lessons[0].title if lessons and course.has_own_titles else ""
+        title = _plain_text(level.title) or first or f"Level {id}"
         levels.append(replace(level, id=id, title=title, lessons=tuple(lessons)))
     used_ids = {*RESERVED_IDS}
     for page in course.pages:

@@ -185,6 +185,8 @@ def test_folders_of_mkdocs_are_parts_in_the_order_of_their_pages_file(tmp_path: 
     outline, _, _ = import_map(tmp_path / "named", files)
     guide = ["docs/guide/index.md", "docs/guide/a.md", "docs/guide/b.md"]
     assert outline == [("S", ["docs/start.md"]), ("Guide", guide)]
+    files["mkdocs.yaml"] = 'nav:\n  - "":\n      - start.md\n'
+    assert import_map(tmp_path / "untitled", files)[0] == [("docs/start.md", ["docs/start.md"])]
     files["mkdocs.yaml"] = "site_name: S\n"
     files["docs/.pages"] = "nav:\n  - guide\n  - ...\n"
     files["docs/guide/.pages"] = "title: How\nnav:\n  - b.md\n  - Title: a.md\n"
