@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
@@ -145,10 +146,27 @@ def read_svg(data: bytes) -> ET.Element | str:
     return root
 
 
-class _Reader:
-    """The state of one reading."""
+def without_refused(data: bytes) -> tuple[bytes, list[str]]:
+    """Return a drawing without the parts that it may not hold, and these parts, in words.
 
-    def __init__(self) -> None:
+    It is as it was where it holds none, or is refused as a whole.
+    """
+    parts: list[str] = []
+    with contextlib.suppress(_RefusedError):
+        root = _Reader(parts).read(data)
+        if parts:
+            ET.register_namespace("", SVG[1:-1])
+            data = ET.tostring(root, encoding="utf-8")
+    return data, parts
+
+
+class _Reader:
+    """The state of one reading; parts that a drawing may not hold are left out where they count."""
+
+    def __init__(self, refused: list[str] | None = None) -> None:
+        self._refused = refused
+        self._left_depth = 0
+        """Elements around the place of which the outermost is left out."""
         self._builder = ET.TreeBuilder()
         self._parser = parser = expat.ParserCreate("utf-8", "}")
         self._depth = self._count = self._style_length = 0
@@ -183,6 +201,13 @@ class _Reader:
     def _refuse(self, part: str) -> None:
         raise _RefusedError(f"contains {part} on line {self._parser.CurrentLineNumber}")
 
+    def _leave_out(self, part: str) -> None:
+        """Leave a part out, or refuse the drawing for it."""
+        if self._refused is None:
+            self._refuse(part)
+        else:
+            self._refused.append(part)
+
     def _declaration(self, version: str, encoding: str | None, standalone: int) -> None:
         if encoding is not None and encoding.lower() not in _ENCODINGS:
             raise _RefusedError(f"is not in UTF-8, but in `{encoding}`")
@@ -200,6 +225,9 @@ class _Reader:
         self._refuse(f"`&{name};`")
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
+        if self._left_depth:
+            self._left_depth += 1
+            return
         tag = _expanded(name)
         element = tag.removeprefix(SVG)
         self._depth += 1
@@ -213,33 +241,42 @@ class _Reader:
         is_known = element in _ELEMENTS and tag != element
         is_inert = tag.startswith(_INERT)
         if self._style is not None or not (is_known or is_inert):
-            self._refuse(f"`<{element.rpartition('}')[2]}>`{_of_namespace(element)}")
+            self._leave_out(f"`<{element.rpartition('}')[2]}>`{_of_namespace(element)}")
+            self._left_depth = 1
+            return
         expanded = {_expanded(key): value for key, value in attributes.items()}
-        for pair in expanded.items():
+        for pair in tuple(expanded.items()):
             if pair not in self._judged or pair[0] in _LINKS or is_inert:
                 if pair[0] not in _ATTRIBUTES and pair[0] not in _LINKS:
                     self._add_style(pair[1])
                 fault = _attribute_fault(tag, *pair)
                 if fault:
-                    self._refuse(f"{fault} of `<{element.rpartition('}')[2]}>`")
-                if not is_inert:
+                    self._leave_out(f"{fault} of `<{element.rpartition('}')[2]}>`")
+                    del expanded[pair[0]]
+                elif not is_inert:
                     self._judged.add(pair)
         self._builder.start(tag, expanded)
         if element == "style":
             self._style = []
 
     def _data(self, text: str) -> None:
-        self._builder.data(text)
         if self._style is not None:
             self._style.append(text)
+        elif not self._left_depth:
+            self._builder.data(text)
 
     def _end(self, name: str) -> None:
+        if self._left_depth:
+            self._left_depth -= 1
+            self._depth -= not self._left_depth
+            return
         if self._style is not None:
             sheet = "".join(self._style)
             self._add_style(sheet)
-            fault = _css_fault(sheet, is_sheet=True)
-            if fault:
-                self._refuse(f"{fault} of a style sheet")
+            if fault := _css_fault(sheet, is_sheet=True):
+                self._leave_out(f"{fault} of a style sheet")
+            else:
+                self._builder.data(sheet)
             self._style = None
         self._depth -= 1
         self._builder.end(_expanded(name))

@@ -9,8 +9,7 @@ import textwrap
 
 from msgspec.structs import replace
 
-from coursebuild.api import marks
-from coursebuild.core.model.course import CALLOUTS
+from coursebuild.api import marks, model
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.absent_labs import write_absent_lab
@@ -30,12 +29,12 @@ from coursebuild.features.importer.directives import (
 from coursebuild.features.importer.jsx import without_jsx
 from coursebuild.features.importer.other_cells import language_of, write_other_cell
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.segments import lower_titles, read_markdown
+from coursebuild.features.importer.segments import change_prose, lower_titles, read_markdown
 from coursebuild.features.importer.source_files import Segment
 from coursebuild.features.lab.model import BUILT_IN_KINDS
 
 _CALLOUTS = {
-    **{name: name for name in CALLOUTS},
+    **{name: name for name in model.CALLOUTS},
     "hint": "tip",
     **dict.fromkeys(("attention", "failure", "bug"), "caution"),
     **dict.fromkeys(("danger", "error"), "warning"),
@@ -69,23 +68,26 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
 
 def _convert(segment: Segment, context: LessonContext) -> str:
     context, head, text = context.at(segment.place), segment.head, segment.text
+
+    def name_callouts(text: str) -> str:
+        return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
+
     if segment.kind == "prose":
         text = rewrite_prose(without_jsx(text, context) if context.is_mdx else text, context)
-        return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
+        return name_callouts(text)
     if language := language_of(segment):
         return write_other_cell(segment, language, context)
     if segment.kind == "cell":
         return write_cell(segment, context)
     directive = _DIRECTIVE.fullmatch(segment.head)
-    if directive is not None:
+    if directive is not None and not context.path.endswith((".qmd", ".Rmd")):
         new = _convert_directive(directive["name"], directive["argument"], text, context)
         return "\n\n".join((new, *write_outputs(segment, context)))
     match segment.mark[0]:
         case ":":
             return _convert_division(head, text, context)
         case ">":
-            quotation = marks.block_quote(_convert_nested(text, context))
-            return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], quotation)
+            return name_callouts(marks.block_quote(_convert_nested(text, context)))
         case "=":
             return _write_tab(head, text, context)
         case "!" | "?":
@@ -97,35 +99,22 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             return _write_callout(name, title, text, context, is_folded)
         case "/":
             name, _, title = (part.strip() for part in head.partition("|"))
-            match name:
-                case "tab":
-                    return _write_tab(title, text, context)
-                case "html" | "define" | "caption" | "":
-                    return _convert_nested(text, context)
-                case _:
-                    is_folded = name == "details"
-                    return _write_callout(
-                        "note" if is_folded else name,
-                        title,
-                        re.sub(r"\A(?:[ ]{4}[\w-]+:.*\n?)+", "", text),
-                        context,
-                        is_folded,
-                    )
+            if name == "tab":
+                return _write_tab(title, text, context)
+            if name in ("html", "define", "caption", ""):
+                return _convert_nested(text, context)
+            text = re.sub(r"\A(?:[ ]{4}[\w-]+:.*\n?)+", "", text)
+            return _write_callout(name, title, text, context, name == "details")
         case _:
             return _convert_fence(head, text, context)
 
 
-def _bold_headings(text: str) -> str:
+def _write_tabs(text: str, context: LessonContext) -> str:
     """Return a set of tabs of Quarto with their titles, which are headings, in bold."""
-    first = re.search(r"^(#{1,6})[ \t]", text, re.MULTILINE)
-    if first is None:
-        return text
-    pattern = rf"^{first[1]}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
-    parts = re.split(r"(^(?P<mark>`{3,}|~{3,}).*?^(?P=mark)[ \t]*$)", text, flags=re.M | re.S)
-    for at in range(0, len(parts), 3):  # what lies between blocks of code, which have two groups
-        parts[at] = re.sub(pattern, r"\n**\1**\n", parts[at], flags=re.MULTILINE)
-        parts[at + 2 : at + 3] = [""]
-    return "".join(parts)
+    context.files.account.changed[_TAB] += 1
+    first = re.search(r"^#{1,6}(?=[ \t])", text, re.MULTILINE)
+    pattern = rf"^{first[0] if first else '#'}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
+    return _convert_nested(text, context, re.compile(pattern, re.MULTILINE))
 
 
 def _write_tab(title: str, text: str, context: LessonContext) -> str:
@@ -136,29 +125,22 @@ def _write_tab(title: str, text: str, context: LessonContext) -> str:
 def _convert_division(head: str, text: str, context: LessonContext) -> str:
     """Convert what stands between colons: a callout of Quarto or Docusaurus, or a division."""
     callout = re.search(r"callout-(\w+)", head)
-    attribute = _TITLE.search(head)
-    title = (attribute[1] or attribute[2] or "") if attribute else ""
-    is_folded = re.search(r"collapse=\"?true", head) is not None
-    if callout is not None:
-        title, text = (title, text) if title else _take_heading(text)
-        label = re.search(r"#([a-z]+)-([\w-]+)", head)
-        title += f" {{#{label[1]}:{to_anchor(label[2])}}}" if label else ""
-        return _write_callout(callout[1], title, text, context, is_folded)
-    plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)
-    if plain is not None:  # as Docusaurus and its likes write callouts
-        if plain[1] == "details":
-            return _write_callout("note", plain[2] or plain[3] or "", text, context, True)
-        if plain[1].lower() in _CALLOUTS:
-            title = plain[2] or plain[3] or ""
-            return _write_callout(plain[1].lower(), title, text, context)
+    plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)  # as in Docusaurus
+    label = re.search(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", head)
+    title = _title_of(head)
     classes = re.findall(r"\.([\w-]+)", head)
-    proof = re.search(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", head)
-    if proof is not None or (kind := next((c for c in classes if c in _PROOF_CLASSES), "")):
-        title, text = (title, text) if title else _take_heading(text)
-        if proof is None:
-            return _write_callout(kind, title, text, context)
-        title += f" {{#{proof[1]}:{to_anchor(proof[2])}}}"
-        return _write_callout(PROOF_LABELS[proof[1]], title, text, context)
+    kind = PROOF_LABELS[label[1]] if label else ""
+    kind = kind or next((name for name in classes if name in _PROOF_CLASSES), "")
+    if callout is not None:
+        kind = callout[1]
+    elif plain is not None and plain[1].lower() in _CALLOUTS:
+        kind, title = plain[1].lower(), plain[2] or plain[3] or ""
+    if kind:
+        if not (title or plain):
+            title, text = _take_heading(text)
+        title += f" {{#{label[1]}:{to_anchor(label[2])}}}" if label else ""
+        is_folded = kind == "details" or re.search(r"collapse=\"?true", head) is not None
+        return _write_callout(kind, title, text, context, is_folded)
     if condition := re.search(r"content-(visible|hidden).*?(when|unless)-format=\W?(\w+)", head):
         is_visible = (condition[1] == "visible") == (condition[2] == "when")
         if is_visible != ("html" in condition[3]):
@@ -169,12 +151,17 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         context.leave("division", f"documentation that its tool makes from the code of `{head}`")
         return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
     if "panel-tabset" in classes:
-        context.files.account.changed[_TAB] += 1
-        return _convert_nested(_bold_headings(text), context)
+        return _write_tabs(text, context)
     context.files.account.changed["division", "what it holds, without a frame"] += 1
     if figure := re.search(r"#fig-([\w-]+)", head):
         return f'<a id="fig-{to_anchor(figure[1])}"></a>\n\n{_convert_nested(text, context)}'
     return _convert_nested(text, context)
+
+
+def _title_of(head: str) -> str:
+    """The title that the head of a block has by a name; may be empty."""
+    title = _TITLE.search(head)
+    return (title[1] or title[2] or "") if title else ""
 
 
 _PROOF_CLASSES = ("theorem", "lemma", "definition", "proof", "remark", "solution", "exercise")
@@ -190,7 +177,7 @@ def _take_heading(text: str) -> tuple[str, str]:
 
 
 def _convert_fence(head: str, text: str, context: LessonContext) -> str:
-    kind = head.partition(" ")[0]
+    kind = head.partition(" ")[0].strip("{}")
     if raw := re.fullmatch(r"\{?=(\w+)\}?", head):
         if raw[1] == "markdown":
             return _convert_nested(text, context)
@@ -199,9 +186,10 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         context.leave("block that is raw", f"a block of raw {raw[1]}, shown as text")
         return marks.fence("text", text)
     if kind == "admonish":
-        title = _TITLE.search(head)
+        title = re.search(r"[\s=]\"([^\"]*)\"", head.replace('type="', ""))
         name = next(iter(re.findall(r"\b(?:type=[\"'])?([a-z]+)\b", head)[1:]), "note")
-        return _write_callout(name, (title[1] or title[2] or "") if title else "", text, context)
+        is_folded = "collapsible=true" in head
+        return _write_callout(name, title[1] if title else "", text, context, is_folded)
     if listing := re.search(r"\bfile=((?!examples/)\S+)", head) if kind == "python" else None:
         context.files.account.changed["listing of a file", "its name, and its code, not run"] += 1
         return f"**`{listing[1]}`**\n\n{marks.fence('python', text)}"
@@ -238,8 +226,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         head += f' title="{caption}"' if caption else ""
     change = "dropped: its tool colours the lines beside it"
     text = context.files.account.replace(_HIGHLIGHT, "", text, "comment in code", change)
-    title = _TITLE.search(head)
-    words = re.sub(r"(?<!\\)[_*`]", r"\\\g<0>", title[1] or title[2] or "") if title else ""
+    words = re.sub(r"(?<!\\)[_*`]", r"\\\g<0>", _title_of(head))
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
     kind = f"block of `{language}`" if language else "block without a kind"
@@ -250,16 +237,18 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     return (f"**{words}**\n\n" if words else "") + new
 
 
-def _convert_nested(text: str, context: LessonContext) -> str:
+def _convert_nested(text: str, context: LessonContext, title: re.Pattern[str] | None = None) -> str:
+    """Return what a block holds; `title` is a heading in it that is a paragraph in bold."""
     if context.depth == _MAX_DEPTH:
         message = f"blocks that nest more than {_MAX_DEPTH} deep, shown as written"
         context.leave("block in blocks", message)
         return marks.fence("text", text)
     context = replace(context, depth=context.depth + 1)
-    parts = (
-        replace(part, text=lower_titles(part.text)) if part.kind == "prose" else part
-        for part in read_markdown(text, place=context.place)
-    )
+
+    def lower(prose: str) -> str:
+        return lower_titles(title.sub(r"\n**\1**\n", prose) if title else prose)
+
+    parts = change_prose(read_markdown(text, place=context.place), lower)
     texts = (convert_segment(part, context).strip("\n") for part in parts)
     return "\n\n".join(text for text in texts if text.strip())
 

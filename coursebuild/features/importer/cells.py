@@ -29,7 +29,7 @@ _WINDOW = re.compile(
 """What opens a window where there is none."""
 _DISPLAY = re.compile(r"^([ \t]*)display\(", re.MULTILINE)
 """What Jupyter shows without an import."""
-_FIGURE = re.compile(r"\b(?:plt|pyplot|ax|axs|axes)\.(?!close|switch_backend)[a-z]\w*\(")
+_FIGURE = re.compile(r"\b(?:plt|pyplot|ax|axs|axes)\.(?!close|io|rc|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
 _MAGIC = re.compile(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)

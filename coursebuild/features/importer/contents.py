@@ -24,16 +24,20 @@ from coursebuild.features.importer.outlines import (
     leave_entry,
     left_setting,
     make_level,
+    read_folder,
+    read_nav,
     read_outline,
 )
 from coursebuild.features.importer.segments import read_front_matter
 from coursebuild.features.importer.source_files import (
+    PAIR,
     TEXTS,
     ImportedCourse,
     ImportedLevel,
     ImportedText,
     SourceFiles,
     read_yaml,
+    stem_of,
     title_of_file,
     value_at,
 )
@@ -57,11 +61,18 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     """
     names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
     myst, quarto, _, mkdocs = settings = [_read_settings(name, files) for name in names]
-    titles = [value_at(mapping, *path, "title") for mapping in settings for path in _TITLE_PATHS]
-    titles.append(value_at(mkdocs, "site_name"))
-    if "_bookdown.yml" in files and "index.Rmd" in files:
-        titles.append(read_front_matter(files.read_text("index.Rmd"))[0].get("title"))
-    title = next((" ".join(text.split()) for text in titles if isinstance(text, str)), "")
+
+    def find_words(*keys: str) -> str:
+        places = (
+            (mapping, path, key) for mapping in settings for path in _TITLE_PATHS for key in keys
+        )
+        texts = (value_at(mapping, *path, key) for mapping, path, key in places)
+        return next((" ".join(text.split()) for text in texts if isinstance(text, str)), "")
+
+    title = find_words("title", "site_name")
+    if not title and "_bookdown.yml" in files and "index.Rmd" in files:
+        front_matter, _ = read_front_matter(files.read_text("index.Rmd"))
+        title = str(front_matter.get("title") or "")
     parts = [
         *_read_parts(_read_settings("_toc.yml", files), files),
         *_read_parts(value_at(myst, "project"), files),
@@ -69,8 +80,11 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         *_read_parts(value_at(quarto, "website", "sidebar"), files),
         *_read_parts(value_at(quarto, "book", "appendices"), files),
         *read_book(files),
-        *_read_nav(value_at(mkdocs, "nav"), str(value_at(mkdocs, "docs_dir") or "docs"), files),
     ]
+    if files.is_mkdocs:
+        folder = posixpath.normpath(str(value_at(mkdocs, "docs_dir") or "docs"))
+        nav = value_at(mkdocs, "nav")
+        parts += read_nav(nav, folder, files, "mkdocs.yml") if nav else read_folder(folder, files)
     own_outline = None if parts else read_outline(files)
     outline = own_outline or Outline(title="", parts=tuple(parts))
     title, parts = outline.title or title, [*outline.parts]
@@ -97,7 +111,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
             levels += (part for part in run if isinstance(part, ImportedLevel))
     return ImportedCourse(
         title=title or title_of_file(files.name),
-        summary=outline.summary,
+        summary=outline.summary or find_words("description", "site_description", "subtitle"),
         language=outline.language,
         has_own_titles=True,
         substitutions=_read_substitutions(settings, files),
@@ -114,6 +128,7 @@ def _read_substitutions(
     """Return what names between braces stand for, as the settings of MyST, Quarto, MkDocs say."""
     places = (("parse", "myst_substitutions"), ("extra",), ("project", "substitutions"), ("book",))
     values = [value_at(mapping, *path) for mapping in settings for path in places]
+    values.append({"config": settings[-1]})  # as macros of MkDocs call its settings
     if (name := "_variables.yml") in files:
         values.append(read_yaml(files.read_text(name)))
     if (name := "conf.py") in files:
@@ -132,8 +147,8 @@ def _named_values(value: object, name: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
-    path = next((path for path in (name, name.replace(".yml", ".yaml")) if path in files), None)
-    if path is None:
+    path = files.find_settings(name)
+    if not path:
         return {}
     value = read_yaml(files.read_text(path))
     files.account.changed["map", "content/course.toml"] += 1
@@ -143,7 +158,8 @@ def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
 
 
 _SETTINGS = frozenset(
-    "appendices bibliography bibtex_bibfiles chapters docs_dir nav root sidebar site_name title "
+    "appendices bibliography bibtex_bibfiles chapters description docs_dir nav root sidebar "
+    "site_description site_name subtitle title "
     "toc".split()
 )
 """Keys of settings that are read."""
@@ -185,27 +201,22 @@ def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | Im
             yield from (*heads, *inside)
 
 
-def _read_nav(
-    entries: object, folder: str, files: SourceFiles
-) -> Iterator[ImportedText | ImportedLevel]:
-    """Yield the entries of MkDocs' `nav`: a file, or a title with a file or further entries."""
-    for entry in entries if isinstance(entries, list) else ():
-        for title, value in entry.items() if isinstance(entry, Mapping) else [("", entry)]:
-            if isinstance(value, list):
-                parts = _read_nav(value, folder, files)
-                yield from make_level(str(title), parts, "mkdocs.yml", files)
-            elif path := find_text(posixpath.join(folder, str(value)), files):
-                yield ImportedText(file=path, title=str(title))
-            else:
-                leave_entry("mkdocs.yml", f"{title}: {value}" if title else str(value), files)
-
-
 def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
     def natural_order(path: str) -> list[tuple[int, int | str]]:
         parts = re.split(r"(\d+)", path)
         return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
 
+    def is_pair(path: str) -> bool:
+        """Whether a text is a notebook once more, as Jupytext has it."""
+        if path.endswith(".ipynb") or f"{stem_of(path)}.ipynb" not in files:
+            return False
+        is_same = "jupytext" in read_front_matter(files.read_text(path))[0]
+        if is_same:
+            files.leave(path, PAIR, "text")
+        return is_same
+
     texts = sorted((path for path in files if path.endswith(TEXTS)), key=natural_order)
+    texts = [path for path in texts if not is_pair(path)]
     for folder, paths in itertools.groupby(texts, posixpath.dirname):
         lessons = [
             ImportedText(file=path)

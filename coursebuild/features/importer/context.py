@@ -10,6 +10,7 @@ from urllib.parse import unquote, urlsplit
 from msgspec import Struct, field
 from msgspec.structs import replace
 
+from coursebuild.core.drawing.safe_svg import without_refused
 from coursebuild.features.importer.source_files import TEXTS, SourceFiles, stem_of
 
 
@@ -153,13 +154,17 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         if address.startswith("eq") and (resolved := self.resolve_formula(address)):
             return resolved
         parts = urlsplit(re.sub("^(?:project|path):", "", address))
+        if parts.scheme == "javascript":
+            self.leave("link", f"a link to `{address}`, which is a program")
+            return ""
         if parts.scheme or parts.netloc or not parts.path:
             return parts.geturl()
         path = self.resolve_path(parts.path)
         anchor = f"#{parts.fragment}" if parts.fragment else ""
         stem = stem_of(path)  # the first text of a folder is often called by the folder
         folder = path if stem == path else stem.removesuffix("/index")
-        names = (stem, path, f"{folder}/index", f"{folder}/README")
+        own_route = path.removeprefix("docs/")
+        names = (stem, path, f"{folder}/index", f"{folder}/README", own_route)
         target = next(filter(None, map(self.targets.get, names)), None)
         if target is not None:
             return target + anchor
@@ -182,20 +187,13 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         self.cited.add(key)
         return f"{self.sources[key]} [@{key}{place and f', {place}'}]".lstrip()
 
-    def resolve_file(self, address: str) -> str:
-        """Return the new address of a file that HTML names; empty where the folder lacks it."""
-        path = self.resolve_path(urlsplit(address).path)
-        if path.endswith(TEXTS) or stem_of(path) in self.targets or path not in self.files:
-            return ""
-        return self.add_file(path)
-
     @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
-        return self.path.endswith((".qmd", ".Rmd")) or "mkdocs.yml" in self.files
+        return self.path.endswith((".qmd", ".Rmd")) or self.files.is_mkdocs
 
     def resolve_picture(self, source: str) -> str:
-        """Return the new address of a picture; empty where the folder and the file lack it."""
+        """Return the new address of a picture or file; empty where none here has it."""
         name = source.removeprefix("attachment:")
         if name in self.pictures:
             return self.add_picture(name)
@@ -252,7 +250,12 @@ class LessonContext(Struct, frozen=True, kw_only=True):
 
     def _add_copy(self, name: str, data: bytes) -> str:
         path = f"content/files/{name}"
-        self.copies[path] = data
+        if path not in self.copies and name.lower().endswith(".svg"):
+            data, parts = without_refused(data)
+            if parts:
+                words = f"{name}: {', '.join(dict.fromkeys(parts))}"
+                self.files.account.change("drawing", "without what none here may hold", words)
+        self.copies.setdefault(path, data)
         return posixpath.relpath(path, self.folder).replace(" ", "%20")
 
 

@@ -13,11 +13,10 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import EffectError, Store, UsageError
+from coursebuild.api import EffectError, Store, UsageError, model
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange, change_files
-from coursebuild.core.model.course import BIBLIOGRAPHY, CALLOUTS
 from coursebuild.core.run.mjcf import existing_files
 from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.absent_labs import lab_files
@@ -32,7 +31,9 @@ from coursebuild.features.importer.jsx import is_mdx
 from coursebuild.features.importer.lost_words import find_lost_words
 from coursebuild.features.importer.other_cells import languages_of_single_cells, write_joined_cells
 from coursebuild.features.importer.references import complete_texts
+from coursebuild.features.importer.roles import address_of_label
 from coursebuild.features.importer.source_files import (
+    PAIR,
     TEXTS,
     ImportedCourse,
     ImportedText,
@@ -89,7 +90,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
                     files.leave(map_path, message, "prerequisite")
     packages = dict(_own_packages(files, texts))
     if context.cited:
-        out[BIBLIOGRAPHY] = _encode(_cited_works(files, context.cited))
+        out[model.BIBLIOGRAPHY] = _encode(_cited_works(files, context.cited))
     unused = {*files} - files.read_paths - {*models}
     out |= packages | {path: files.read(source) for source, path in models.items()}
     texts_and_models = (data for path, data in out.items() if path.endswith((".md", ".xml")))
@@ -337,7 +338,8 @@ def _convert_texts(
             for text in reversed(texts)
             for segment in text.segments
             for anchor in find_anchors(f"{segment.head}\n{segment.text}")
-        },
+        }
+        | {to_anchor(text.label): text.link for text in texts if text.label},
         files=files,
         models=models,
         sources={key: _authors(work) for key, work in _works(files) if key},
@@ -350,9 +352,9 @@ def _convert_texts(
     for text in texts:
         macros = f"{book_macros}{text.macros}"
         try:
-            head = ""
+            head = f'<a id="{to_anchor(text.label)}"></a>\n\n' if text.label else ""
             if macros:
-                head = f"$${macros}$$\n\n"
+                head += f"$${macros}$$\n\n"
                 files.account.changed["macros", "defined in the formulas that use them"] += 1
             new[text.link] = text.title, head + _convert_text(text, context)
         except RecursionError:
@@ -361,7 +363,7 @@ def _convert_texts(
 
     def resolve_label(link: str, anchor: str) -> str:
         text_context = replace(context, path=files_of[link])
-        address = text_context.resolve_anchor(to_anchor(anchor))
+        address = address_of_label(anchor, text_context)
         if not address:
             text_context.leave("link", f"a link to `#{anchor}`, which no text sets")
         return address
@@ -369,8 +371,10 @@ def _convert_texts(
     def leave(link: str, kind: str, message: str) -> None:
         files.leave(files_of[link], message, kind)
 
-    callouts = frozenset((*CALLOUTS, *context.callouts))
-    completed = complete_texts(new, resolve_label, leave, callouts)
+    callouts = frozenset((*model.CALLOUTS, *context.callouts))
+    completed = complete_texts(
+        new, resolve_label, leave, callouts, has_mentions=not course.has_own_titles
+    )
     out = {text.path: _encode(new_text) for text, new_text in zip(texts, completed, strict=True)}
     return {**out, **context.copies}, context
 
@@ -439,6 +443,8 @@ def _leave_unused(files: SourceFiles, paths: Iterable[str]) -> None:
             message = "not taken for a lesson: add it to the map of the course, and import again"
         elif path.lower().endswith(_OTHER_TEXTS):
             message = "a kind of text that is not read: convert it to Markdown, as by Pandoc"
+        elif path.endswith(".py") and f"{stem_of(path)}.ipynb" in files:
+            message = PAIR
         elif path.endswith(".py") and re.search(rb"(?m)^# ?%%", files.read(path)):
             message = "a script of cells, which `jupytext --to ipynb` makes a notebook of"
         files.leave(path, message)

@@ -172,8 +172,10 @@ def _read_items(fields: dict[str, Any], name: str) -> list[Any]:
 
 def _read_summary(fields: dict[str, Any]) -> str:
     """Return the summary, with what a learner should be able to do by then."""
-    checkpoint = _read_text(fields, "checkpoint")
-    return f"{_read_text(fields, 'summary')} {checkpoint and f'Checkpoint: {checkpoint}'}".strip()
+    summary, checkpoint = (_read_text(fields, name) for name in ("summary", "checkpoint"))
+    if not checkpoint:
+        return summary
+    return f"{re.sub(r'(?<=[^.!?])$', '.', summary)} Checkpoint: {checkpoint}".strip()
 
 
 _COMPLETE = ("", "complete", "completed", "done", "published", "final", "ready")
@@ -192,20 +194,13 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
 
     def read(text: ImportedText, id: str, used_ids: set[str] | None = None) -> ImportedText:
         try:
-            return _read_file(
-                text,
-                id,
-                files,
-                used_ids,
-                has_hidden_lines=course.has_hidden_lines,
-                has_own_titles=course.has_own_titles,
-            )
+            return _read_file(text, id, files, course, used_ids)
         except UsageError as error:
             errors.append(error)
             message = f"it {str(error).removeprefix(f'{text.file} ')}: a lesson without a text"
             files.leave(text.file, message, "text")
             planned = replace(text, file="", title=text.title or title_of_file(text.file))
-            return _read_file(planned, id, files)
+            return _read_file(planned, id, files, course)
 
     used_ids = set[str]()
     for number, level in enumerate(course.levels, 1):
@@ -219,7 +214,8 @@ def read_texts(course: ImportedCourse, files: SourceFiles) -> ImportedCourse:
                 lesson.old_id if fits else next(other_ids), other_ids, used_lesson_ids
             )
             lessons.append(read(lesson, lesson_id))
-        title = _plain_text(level.title) or f"Level {id}"
+        first = lessons[0].title if lessons and course.has_own_titles else ""
+        title = _plain_text(level.title) or first or f"Level {id}"
         levels.append(replace(level, id=id, title=title, lessons=tuple(lessons)))
     used_ids = {*RESERVED_IDS}
     for page in course.pages:
@@ -246,10 +242,8 @@ def _read_file(
     text: ImportedText,
     id: str,
     files: SourceFiles,
+    course: ImportedCourse,
     used_ids: set[str] | None = None,
-    *,
-    has_hidden_lines: bool = False,
-    has_own_titles: bool = False,
 ) -> ImportedText:
     """Read the file of a lesson with this id, or of a page, whose id is made from its title.
 
@@ -269,7 +263,7 @@ def _read_file(
             source = number_examples(source)
         if text.file.endswith(".qmd"):  # there a tag need not be apart from a block
             source = _TAG_BESIDE_BLOCK.sub(r"\g<0>\n", source)
-        if has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
+        if course.has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
             files.account.changed["hidden lines of Rust", "dropped: readers did not see them"] += 1
             source = visible_text
         read = read_segments(source, text.file, title)
@@ -282,7 +276,7 @@ def _read_file(
         message = f"`{name}` of its metadata ({words}), which a {kind} does not have"
         files.leave(text.file, message, "metadata of a text")
     files.account.changed["text", "a lesson" if id else "a page"] += 1
-    if has_own_titles and title and read.title and title.casefold() != read.title.casefold():
+    if course.has_own_titles and title and read.title and title.casefold() != read.title.casefold():
         words = f"“{title}” is “{read.title}”"
         files.account.change("title in the map", "the title of the text itself", words)
         title = read.title
@@ -298,10 +292,18 @@ def _read_file(
         path = ""  # a title alone
         message = "a text of which nothing is left: a lesson that is planned"
         files.leave(text.file, message, "text")
-    text = replace(text, summary=text.summary or read.summary)
-    text = replace(text, segments=read.segments, pictures=read.pictures)
-    text = replace(text, substitutions=read.substitutions, macros=read.macros)
-    return replace(text, id=id or page, slug=slug, title=title, path=path)
+    return replace(
+        text,
+        id=id or page,
+        slug=slug,
+        title=title,
+        path=path,
+        summary=text.summary or read.summary,
+        segments=read.segments,
+        pictures=read.pictures,
+        substitutions={"page.title": title, **read.substitutions},
+        macros=read.macros,
+    )
 
 
 _TAG_BESIDE_BLOCK = re.compile(

@@ -124,7 +124,7 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             return directive.nested("\\\n".join(text.strip("\n").split("\n")))
         case "code" | "code-block" | "sourcecode" | "highlight" | "parsed-literal":
             language = argument if name != "parsed-literal" else ""
-            caption = options.get("caption", "")
+            caption = options.get("caption") or options.get("filename") or ""
             head = f"**{rewrite_prose(caption, context)}**\n\n" if caption else ""
             code = text.strip("\n")
             return head + marks.fence((language or "text") + directive.number, code) if code else ""
@@ -172,8 +172,11 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
         case "solution":  # its argument is the label of an exercise
             return directive.callout(name, directive.number, text, True)
         case _ if name in callouts:
+            if name == "admonition" and (kind := options.get("class", "")) in callouts:
+                name = kind
             is_folded = name in ("details", "toggle") or "dropdown" in options.get("class", name)
-            title = argument if name in _TITLED else ""
+            has_title = directive.name in _TITLED or (text.strip() and "myst.yml" in context.files)
+            title = argument if has_title else ""
             title += directive.number if name in NUMBERED else ""
             if subtitle := options.get("subtitle"):
                 text = f"**{subtitle}**\n\n{text}"
@@ -195,7 +198,8 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
 def _write_figure(directive: Directive, context: LessonContext) -> str:
     caption = directive.nested(directive.text).strip() if directive.text.strip() else ""
     if not directive.argument.strip():  # what it shows is in it
-        return caption
+        anchor = f'<a id="fig-{label_anchor(directive.label)}"></a>\n\n' if directive.label else ""
+        return anchor + caption
     first, _, rest = caption.partition("\n\n")
     first = " ".join(first.split())
     alt = directive.options.get("alt") or first

@@ -1,8 +1,8 @@
 """Texts and lines of other files that a text includes, put where it does so.
 
 mdBook writes `{{#include FILE:LINES}}` or `{{#include FILE:ANCHOR}}`, MkDocs `--8<-- "FILE:LINES"`
-or `--8<-- "FILE:SECTION"` or `{!FILE!}`, Quarto `{{< include FILE >}}`, MyST a directive with
-options.
+or `--8<-- "FILE:SECTION"` or `{!FILE!}` or, as code, `{* FILE *}`,
+Quarto `{{< include FILE >}}`, MyST a directive with options.
 """
 
 from __future__ import annotations
@@ -14,21 +14,24 @@ import re
 import textwrap
 from collections.abc import Mapping, Sequence
 
-from coursebuild.features.importer.source_files import TOO_MUCH, SourceFiles
+from coursebuild.features.importer.source_files import TEXTS, TOO_MUCH, SourceFiles
 
 _MAX_DEPTH = 10
 """Files that may include each other in a row."""
 _MOST_LINES = 100_000
 """After so many lines of a file no more of it are chosen: some could be chosen again and again."""
 _MARK = re.compile(
-    r"(?P<escape>\\)?\{\{[ ]*#(?P<command>include|rustdoc_include|playground|title)[ ]+"
+    r"\{%-?[ ]*raw[ ]*-?%\}\n?(?P<raw>.*?)\{%-?[ ]*endraw[ ]*-?%\}"
+    r"|(?P<escape>\\)?\{\{[ ]*#(?P<command>include|rustdoc_include|playground|title)[ ]+"
     r"(?P<mdbook>[^{}\s][^{}]*?)[ ]*\}\}"
     r"|\{\{<[ ]*include[ ]+(?P<quarto>\S+)[ ]*>\}\}"
-    r"|\{%-?[ ]*include(?:-markdown)?[ ]+[\"'](?P<markdown>[^\"'\n]+)[\"'][^%\n]*%\}"
+    r"|\{%-?[ ]*include(?:-markdown)?[ ]+[\"'](?P<markdown>[^\"'\n]+)[\"'][^%]*%\}"
+    r"|^\{\*[ ]*(?P<listing>[^\s{}]+)[^{}\n]*\*\}[ \t]*$"
     r"|\{!>?[ \t]*(?P<inclusion>[^{}!\s]+)[^{}!\n]*!\}"
     r"|^(?P<indent>[ \t]*)-{1,}8<-{1,}[ \t]+[\"'](?P<mkdocs>[^\"'\n]+)[\"'][ \t]*$",
-    re.MULTILINE,
+    re.MULTILINE | re.DOTALL,
 )
+_FENCE = re.compile(r"^[ \t>]*(?:`{3,}|~{3,})", re.MULTILINE)
 _ANCHOR = r"^.*?ANCHOR(?P<end>_END)?:[ \t]*(?P<name>[\w-]+).*\n?"
 _SECTION = (
     r"^.*?-{1,}8<-{1,}[ \t]*\[[ \t]*(?P<end>end|start)[ \t]*:[ \t]*(?P<name>[\w-]+)[ \t]*\].*\n?"
@@ -74,42 +77,51 @@ def expand_includes(
     def expand(mark: re.Match[str]) -> str:
         if mark["escape"]:
             return mark[0][1:]
+        if mark["raw"]:
+            return mark["raw"]
         if mark["command"] == "title":
             files.account.change("title of the page", "the map has it", mark["mdbook"])
             return ""
         name = mark["mdbook"] or mark["quarto"] or mark["mkdocs"] or mark["inclusion"]
-        name = name or mark["markdown"]
+        name = name or mark["markdown"] or mark["listing"]
         line = f"line {text.count(chr(10), 0, mark.start()) + 1}"
         file, _, part = name.split()[0].partition(":")
         target = _find(file, path, files)
-        if not target or depth == _MAX_DEPTH:
-            message = f"`{name}`, which is not in the folder: what it holds is missing"
-            files.leave(path, message, "file that is included", line)
-            return ""
-        part_text = _part_of(files.read_text(target), part, by_lines=True)
-        if part_text is None or not files.may_include(part_text, lesson or path):
-            problem = "the file has no such part" if part_text is None else TOO_MUCH
+        part_text, problem = None, "which is not in the folder: its name stands in its place"
+        if target and depth < _MAX_DEPTH:
+            part_text = _part_of(files.read_text(target), part, by_lines=True)
+            problem = "the file has no such part"
+        if part_text is not None and not files.may_include(part_text, lesson or path):
+            part_text, problem = None, TOO_MUCH
+        if part_text is None:
             files.leave(path, f"`{name}`: {problem}", "file that is included", line)
-            return ""
+            before = text[: mark.start()]
+            is_in_code = (
+                len(_FENCE.findall(before)) % 2 or before.rpartition("\n")[2].count("`") % 2
+            )
+            return mark[0] if is_in_code else f"`{name}`"
         files.account.changed["file that is included", "its lines stand in the text"] += 1
         expanded = expand_includes(part_text, target, files, depth + 1, lesson=lesson or path)
         included = expanded.strip("\n")
-        if mark["command"] == "playground":
-            return f"```rust\n{included}\n```"
-        return textwrap.indent(included, mark["indent"] or "")
+        if mark["listing"] or mark["command"] == "playground":
+            language = "rust" if mark["command"] else target.rpartition(".")[2]
+            return f"```{language}\n{included}\n```"
+        indent = mark["indent"] or re.split(r"[^ \t]|\n", text[: mark.start()])[-1]
+        return (mark["indent"] or "") + included.replace("\n", f"\n{indent}")
 
     return _MARK.sub(expand, _place_imports(text))
 
 
 def _find(name: str, path: str, files: SourceFiles) -> str:
-    """Return the path of a file that a text names: beside it, or from a folder that holds it."""
-    folder = posixpath.dirname(path)
-    while True:
-        if place := files.find(posixpath.normpath(posixpath.join(folder, name.lstrip("/")))):
+    """Return the path of a file that a text names, from its own folder or another that may be."""
+    folders = [posixpath.dirname(path)]
+    while folders[-1]:
+        folders.append(posixpath.dirname(folders[-1]))
+    for folder in (*folders, *files.included_folders):
+        path = posixpath.normpath(posixpath.join(folder, name.lstrip("/")))
+        if place := files.find(path, is_hidden=path.endswith(TEXTS)):
             return place
-        if not folder:
-            return ""
-        folder = posixpath.dirname(folder)
+    return ""
 
 
 def _part_of(text: str, part: str, *, by_lines: bool) -> str | None:

@@ -20,6 +20,7 @@ from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, t
 from coursebuild.features.importer.displays import WORDS, normalize_formulas
 from coursebuild.features.importer.pandoc_tables import rewrite_tables
 from coursebuild.features.importer.roles import (
+    address_of_label,
     convert_attributes,
     convert_code,
     convert_cross_reference,
@@ -35,7 +36,7 @@ from coursebuild.features.importer.source_files import title_of_file
 
 _ATTRIBUTES = (
     r"\{(?:[ ]*(?:#[^\s{}\"'#]+|\.[A-Za-z][\w:-]*"
-    r"|[\w:-]+=(?:\"(?:\\.|[^\"\\\n])*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}"
+    r"|[\w:-]+=(?:\"(?:\\.|[^\"\\\n])*\"|'[^'\n]*'|[^\s{}\"']+)|-))+[ ]*\}|\{[ ][a-z][\w-]*[ ]\}"
     r"|\{:[^{}\n]*\}"
 )
 _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
@@ -52,7 +53,7 @@ _LINE = re.compile(
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)(?:\{=\w+\})?)"
     rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?P<hover>{_LINK_TITLE})?[ \t]*\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
-    r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`)*)\]"
+    r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`|(?<!!)\[[^\[\]\n`]*\](?!\())*)\]"
     rf"\((?P<address>(?:@ref[ ]+)?{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
     r"|(?P<digits>\$(?P<tex>(?!\\\$)[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
@@ -60,13 +61,13 @@ _LINE = re.compile(
     r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
     r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]"
-    r"(?:\[(?P<path>[A-Za-z_]\w*(?:\.\w+)+)?\]|(?=\[\^)))"
+    r"(?:\[(?P<path>[A-Za-z_]\w*(?:[.-]\w+)+)?\]|(?=\[\^)))"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
     rf"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst|{'|'.join(PROOF_LABELS)})"
     r"-(?P<label>\w+(?:-\w+)*)\]?)"
     r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
     r"|(?<!\^)\^[^\s\^\[\]]+\^(?!\^))"
-    r"|(?P<change>\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
+    r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
     r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
@@ -84,8 +85,7 @@ _LINE = re.compile(
     r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
-    r"|(?P<tag><(?i:a|img|source|video)[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
-    r"|(?P<markdown>(?P<before><[a-z]\w*(?:[ ][^<>\n]*?)?)[ ]markdown(?:=[\"'\w]+)?(?=[ >]))"
+    r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
     r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z])-{2,3}(?=[a-z]))"
     rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
@@ -183,8 +183,7 @@ _KINDS = {
     "block": ("block of Obsidian", "an anchor"),
     "keys": ("keys", "their names"),
     "definition": ("link by reference", "its new address"),
-    "tag": ("tag of HTML", "its new address"),
-    "markdown": ("tag of HTML", "without `markdown`: its text always is"),
+    "tag": ("tag of HTML", "its new address; without classes, and without `markdown`"),
     "attributes": ("attributes", "an anchor, or dropped: a page has its own look"),
     "dashes": ("dashes", "the sign that its tool draws"),
     "span": ("attributes", "its words alone"),
@@ -379,16 +378,17 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             context.leave("citation", message)
             return f"`{whole}`"
         case "told":
-            is_source = match["work"] in context.sources
-            return (
-                context.cite_in_words(match["work"], match["cited"] or "") if is_source else whole
-            )
+            if match["work"] in context.sources:
+                return context.cite_in_words(match["work"], match["cited"] or "")
+            is_label = "myst.yml" in context.files and not match["cited"]
+            address = address_of_label(match["work"], context) if is_label else ""
+            return write_link("", address) or whole
         case "pair":
             return _rewrite_line(match["held"], context)
         case "proof":
             return _write_proof(match, context)
         case "substitution":
-            return convert_substitution(whole, context)
+            return convert_substitution(whole, context, bool(_STATEMENTS.fullmatch(match.string)))
         case "marked":
             is_marked = whole[:2] == "==" or context.has_marks
             tag = _MARKS[whole[:2] if whole[:2] in _MARKS else whole[0]]
@@ -426,8 +426,6 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return whole.removesuffix(address) + (context.resolve_link(address) or GONE)
         case "tag":
             return convert_tag(whole, context)
-        case "markdown":  # a tag whose text is Markdown, as it always is here
-            return match["before"]
         case "dashes":
             return "–—"[len(whole) - 2] if context.files.has_signs(context.path) else whole
         case "attributes":
@@ -441,6 +439,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return whole
 
 
+_STATEMENTS = re.compile(r"\s*(?:\{%[^%\n]*%\}\s*)+")
+"""A line of nothing but statements of Jinja or Liquid."""
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = re.compile(rf"(?<![\w@])@({_KEY})")

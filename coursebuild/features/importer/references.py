@@ -44,24 +44,29 @@ def complete_texts(
     resolve_label: Callable[[str, str], str],
     leave: Callable[[str, str, str], None],
     callouts: frozenset[str],
+    *,
+    has_mentions: bool,
 ) -> Iterator[str]:
     """Yield the new texts of lessons and pages, each by its link and with its title, completed.
 
     `resolve_label` gives the address of an anchor for a link in a text; empty if no text sets it.
     `leave` is told of what a page cannot hold, and is changed: the link, the kind, a message.
+    Without mentions, "Level 1" is about another thing than the first level.
     """
     read = {
         link: _read(link, title, text, leave, callouts) for link, (title, text) in texts.items()
     }
     for link, text in read.items():
         edits = {edit.span.start: edit for edit in _edit_links(link, read, resolve_label)}
+        if not has_mentions:
+            edits |= {edit.span.start: edit for edit in _break_mentions(text.document)}
         edits |= {edit.span.start: edit for edit in _carry_macros(text.document)}
         yield _GONE.sub("", apply_edits(text.document.source.text, edits.values())).lstrip("\n")
 
 
 _PASSES = 3
 """How often HTML is dropped: an end whose beginning was dropped is seen the next time."""
-_ANCHOR = re.compile(r'<a id="[^"<>]*">')
+_ANCHOR = re.compile(r'<a id="[^"<>]*">|[ ]?\{#[^{}\n]*\}')
 _MEDIA = re.compile(
     r"<(?:(?:img|source)\b[^<>]*>(?:</img>)?"
     r"|(?P<name>video|audio)\b[^<>]*(?:/>|>(?:.*?</(?P=name)\s*>)?))",
@@ -87,9 +92,10 @@ def _read(
             *(part.span for html in _raw_html(document) for part in html.forbidden),
             *(d.span for d in parse.diagnostics if d.rule == "html-unbalanced"),
             *(
-                d.span
+                Span(source, *anchor.span())
                 for d in parse.diagnostics
-                if d.rule == "anchor-repeated" and _ANCHOR.fullmatch(d.span.text)
+                if d.rule == "anchor-repeated"
+                and (anchor := _ANCHOR.search(text, max(d.span.start - 3, 0), d.span.end + 1))
             ),
         ]
         for span in spans:
@@ -195,21 +201,34 @@ def _edit_links(
         target_anchor = text.anchors.get(anchor) or text.anchors.get(_letters(anchor)) or ""
         if anchor and target_anchor != anchor:
             address = f"{start}#{target_anchor}" if target_anchor else resolve_label(link, anchor)
-            start, _, target_anchor = address.partition("#")
-            text = texts.get(start or link, text)
-            if target_anchor not in text.anchors:
+            owner, _, target_anchor = address.partition("#")
+            owner_text = texts.get(owner or link, text)
+            if target_anchor in owner_text.anchors:
+                text = owner_text
+            elif start:  # the text is there
+                address = start
+            else:
                 if reference := _REFERENCE.fullmatch(inline.span.text):
-                    yield Edit(
-                        inline.span, reference[1] or title_of_file(anchor.rpartition(":")[2])
-                    )
+                    words = reference[1] or title_of_file(anchor.rpartition(":")[2])
+                    yield Edit(inline.span, words)
                 continue
             yield Edit(span, address)
         if inline.span.text.startswith("[]("):
-            words = text.headings.get(target_anchor, "")
+            names = {"fig": "the figure", "tbl": "the table"}
+            name = names.get(target_anchor.partition("-")[0], "")
+            words = text.headings.get(target_anchor) or name
             words = words if words and "](" not in words else text.title
             at = inline.span.start + 1
             if ":" not in target_anchor:  # what is numbered is called by its number
                 yield Edit(Span(inline.span.source, at, at), words)
+
+
+def _break_mentions(document: model.Document) -> Iterator[Edit]:
+    """Put an empty comment into what would become a link to a lesson or level."""
+    for link in model.find_inlines(document, model.Link):
+        if link.mention:
+            at = link.target_span.start
+            yield Edit(Span(document.source, at, at), "<!-- -->")
 
 
 def _carry_macros(document: model.Document) -> Iterator[Edit]:

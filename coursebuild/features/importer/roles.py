@@ -30,6 +30,14 @@ def words_of_link(address: str, old: str) -> str:
     return urlsplit(address).hostname or title_of_file(re.split("[:#]", old)[-1])
 
 
+def address_of_label(label: str, context: LessonContext) -> str:
+    """Return the address of what has a label of MyST; empty where no text sets it."""
+    name = label_anchor(label)
+    kinds = ("tab", "fig") if label.startswith("t") else ("fig", "tab")
+    anchors = (to_anchor(label), *(f"{kind}:{name}" for kind in kinds))
+    return next(filter(None, map(context.resolve_anchor, anchors)), "")
+
+
 def convert_role(name: str, body: str, context: LessonContext) -> str:
     """Return a role with this text in Markdown."""
     parts = re.fullmatch(r"(?P<words>.*\S)\s*<(?P<target>[^<>]+)>", body)
@@ -42,9 +50,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case "doc":
             return write_link(words or title_of_file(target), context.resolve_link(f"{target}.md"))
         case "ref" | "numref" | "prf:ref" | "any":
-            label = label_anchor(target)
-            anchors = (to_anchor(target), f"fig:{label}", f"tab:{label}")
-            address = next(filter(None, map(context.resolve_anchor, anchors)), "")
+            address = address_of_label(target, context)
             if not address:
                 message = f"a link to `{target}`, which no text sets"
                 context.leave(f"role `{{{name}}}`", message)
@@ -140,8 +146,15 @@ _FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split
 """Names between braces that only place or mark what stands between them."""
 
 
-def convert_substitution(whole: str, context: LessonContext) -> str:
-    """Return what stands for a name between braces; or the whole as code, which is left."""
+_CALL = re.compile(r"\{\{-?[ ]*[\w.]+\((?P<arguments>.*)\)[ ]*-?\}\}")
+_QUOTED = re.compile(r"\"([^\"]+)\"|'([^']+)'")
+
+
+def convert_substitution(whole: str, context: LessonContext, is_statement: bool) -> str:
+    """Return what stands for a name between braces; or the whole as code, which is left.
+
+    A statement shows nothing itself, and of a call of a macro its texts are shown.
+    """
     title = re.search(r"(?:title|caption)=\"([^\"]*)\"", whole)
     if number := re.fullmatch(r"\{\{(?:eq|t)?ref:[ ]*([^{}\s]+)[ ]*\}\}", whole):
         if address := context.resolve_formula(number[1]):
@@ -162,14 +175,16 @@ def convert_substitution(whole: str, context: LessonContext) -> str:
     key = address if name in ("var", "meta") else name
     if (value := context.substitutions.get(key)) is not None:
         return value
-    message = f"`{whole}`, which its tool replaces; it is code now: write what it stands for"
+    call = _CALL.fullmatch(whole)
+    texts = ["".join(text) for text in _QUOTED.findall(call["arguments"])] if call else []
+    message = f"`{whole}`, which its tool replaces: write what it stands for"
     context.leave("substitution", message)
-    return f"`{whole}`"
+    return "" if is_statement else ", ".join(f"`{text}`" for text in texts or [whole])
 
 
 def tell_emoji(name: str, context: LessonContext) -> str:
     """Return the name of a sign between colons as it is, and note it where its tool draws signs."""
-    if "mkdocs.yml" in context.files or "docusaurus.config.js" in context.files:
+    if context.files.is_mkdocs or "docusaurus.config.js" in context.files:
         context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
     return name
 
@@ -191,14 +206,24 @@ def convert_wiki_link(whole: str, page: str, part: str, words: str, context: Les
 _ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
 
 
+_WITH_FILE = re.compile(r"<(?:a|img|source|video)\b", re.IGNORECASE)
+_LOOK = re.compile(
+    r"[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
+)
+
+
 def convert_tag(tag: str, context: LessonContext) -> str:
-    """Return a tag of HTML with the new address of the file of the folder that it names."""
-    attribute = _ATTRIBUTE.search(tag)
+    """Return a tag of HTML with the new address of the file of the folder that it names.
+
+    A class names a look that its tool gives; here it could be that of another thing.
+    """
+    tag = _LOOK.sub("", tag)
+    attribute = _ATTRIBUTE.search(tag) if _WITH_FILE.match(tag) else None
     if attribute is None or re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
         return tag
     address = attribute[3].removeprefix("attachment:")
     before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
-    if new_address := context.resolve_picture(address) or context.resolve_file(address):
+    if new_address := context.resolve_picture(address):
         return before + new_address + after
     context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
     if re.match("<img", tag, re.IGNORECASE):

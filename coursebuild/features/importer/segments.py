@@ -8,7 +8,7 @@ import contextlib
 import json
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -55,6 +55,7 @@ _NEEDLESS = (
     "sidebar_position",
     "myst",
     "substitutions",
+    "label",
     "colab",
     "header-includes",
     "math",
@@ -117,12 +118,7 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
             return f"({heading['label']})=\n" if heading["label"] else ""
         return f"## {_text_of(heading)}" if heading["text"] is None else f"#{heading[0].strip()}"
 
-    shifted = [
-        replace(segment, text=_HEADING.sub(shift_heading, segment.text))
-        if segment.kind == "prose"
-        else segment
-        for segment in segments
-    ]
+    shifted = (*change_prose(segments, lambda prose: _HEADING.sub(shift_heading, prose)),)
     myst = metadata.get("myst")
     inner = (myst if isinstance(myst, dict) else metadata).get("substitutions")
     words = {**metadata, **(inner if isinstance(inner, dict) else {})}
@@ -130,7 +126,7 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
     return ReadText(
         str(metadata.get("title") or (titles or [""])[0]).strip(),
         " ".join("".join(str(metadata[key]) for key in summaries).split()),
-        tuple(shifted),
+        shifted,
         pictures,
         {
             str(key): value
@@ -149,10 +145,14 @@ def _raise_title(segments: list[Segment], title: str) -> list[Segment]:
     if first is None or first[2].casefold() != title.casefold():
         return segments
     surplus = re.compile(rf"^{first[1]}(?=\#)", re.MULTILINE)
-    return [
-        replace(segment, text=surplus.sub("", segment.text)) if segment.kind == "prose" else segment
-        for segment in segments
-    ]
+    return [*change_prose(segments, lambda prose: surplus.sub("", prose))]
+
+
+def change_prose(segments: Iterable[Segment], change: Callable[[str], str]) -> Iterator[Segment]:
+    """Yield segments, of which those of prose are changed."""
+    for segment in segments:
+        is_prose = segment.kind == "prose"
+        yield replace(segment, text=change(segment.text)) if is_prose else segment
 
 
 _GATES = re.compile(

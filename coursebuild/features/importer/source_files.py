@@ -13,7 +13,7 @@ import re
 import stat
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Mapping, ValuesView
+from collections.abc import Iterator, Mapping, Sequence, ValuesView
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -82,6 +82,11 @@ class ImportedText(Struct, frozen=True, kw_only=True):
     """What names between braces stand for in it, as its metadata say."""
     macros: str = ""
     """The definitions of macros in its metadata."""
+
+    @property
+    def label(self) -> str:
+        """The label that its metadata give the whole text; may be empty."""
+        return self.substitutions.get("label", "")
 
     @property
     def link(self) -> str:
@@ -189,6 +194,7 @@ _MAX_DEPTH = 100
 """Folders around a folder."""
 _MAX_INCLUDED = 2_000_000
 """Characters that a lesson may include: files that include each other could become endless."""
+PAIR = "the text of a notebook, which is taken"
 TOO_MUCH = "with it the lesson would include too much text"
 _BAD_NAME = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")
 _OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
@@ -245,6 +251,22 @@ class SourceFiles:
         has_none = bool(settings) and "math" not in "".join(map(self.read_text, settings))
         return not has_none and not (self.folder / ".gitbook.yaml").is_file()
 
+    def find_settings(self, name: str) -> str:
+        """Return the path of settings in YAML, which have two extensions; empty for none."""
+        return next((path for path in (name, name.replace(".yml", ".yaml")) if path in self), "")
+
+    @property
+    def is_mkdocs(self) -> bool:
+        """Whether it is a project of MkDocs."""
+        return bool(self.find_settings("mkdocs.yml"))
+
+    @cached_property
+    def included_folders(self) -> Sequence[str]:
+        """The folders in which MkDocs finds what texts include, besides their own."""
+        settings = self.find_settings("mkdocs.yml")
+        pattern = r"\b(?:base_path|include_dir):[ \t]*(?:\[|\n[ \t]*-[ \t]*)?[\"']?([\w./-]+)"
+        return re.findall(pattern, self.read_text(settings)) if settings else []
+
     def has_signs(self, path: str) -> bool:
         """Whether the tool of a text draws hyphens in a row as a dash."""
         signs = "smart-punctuation = true"
@@ -254,12 +276,17 @@ class SourceFiles:
             or ("book.toml" in self and signs in self.read_text("book.toml"))
         )
 
-    def find(self, path: str) -> str:
-        """Return the path of a file, given perhaps with links to folders; empty for no file."""
+    def find(self, path: str, *, is_hidden: bool = False) -> str:
+        """Return the path of a file, given perhaps with links to folders; empty for no file.
+
+        A hidden one is found where only what is part of a text or of the map is asked for.
+        """
         if path in self._real_paths:
             return path
         real = "" if "\0" in path else self._real_path(path)
-        if self.is_single and self._is_found(path, real):
+        if (self.is_single and self._is_found(path, real)) or (
+            is_hidden and real and Path(self.folder, real).is_file()
+        ):
             self._real_paths[real] = real
         return real if real in self._real_paths else ""
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from coursebuild.core.drawing.safe_svg import read_svg
+from coursebuild.core.drawing.safe_svg import read_svg, without_refused
 from support.fixture_cases import fixture_tables
 from support.hostile_svg import HARMLESS, HOSTILE, mutants
 
@@ -32,6 +32,12 @@ WORDINGS = {
 def test_each_reason_has_its_words() -> None:
     wordings = {inside: read_svg(SVG.format("urn:x", inside).encode()) for inside in WORDINGS}
     assert wordings == WORDINGS
+
+
+def test_what_is_left_of_a_drawing_is_one_that_may_be_shown() -> None:
+    for _, data in (*HOSTILE, *HARMLESS):
+        left, parts = without_refused(data)
+        assert left == data if not parts else not isinstance(read_svg(left), str)
 
 
 WHOLE = {

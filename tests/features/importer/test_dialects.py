@@ -283,6 +283,22 @@ def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
             "**[B](#at)**\n\n## B {#at}",
         ),
         ("`{{ #include }}`", "`{{ #include }}`"),
+        ("```rust\n{{#include gone.rs}}\n```", "```rust\n{{#include gone.rs}}\n```"),
+        ('--8<-- "gone.md"\n\n`{!gone.md!}`', "`gone.md`\n\n`{!gone.md!}`"),
+        ("{* hidden/c.py hl[2] *}", "```py\nd = 1\n```"),
+        (
+            "```{code-cell}\nplt.rc('a', b=1)\n```",
+            "```python file=examples/l1_1_a.py\nplt.rc('a', b=1)\n```",
+        ),
+        ("{% raw %}\n`{% include 'p.md' %}`\n{% endraw %}\n", "`{% include 'p.md' %}`"),
+        ("- B\n\n  {% include-markdown 'hidden/.b.md'\n  %}", "- B\n\n  C\n  D"),
+        ("{% block b %}\nB, {% c %}.\n{% endblock %}", "B, `{% c %}`."),
+        ("{{ api('/a/b', 2) }} {{ c() }}", "`/a/b` `{{ c() }}`"),
+        ("[[1]](#b) [B](#b){ data-c }\n\n## B", "[[1]](#b) [B](#b)\n\n## B"),
+        ('A `<p class="row">` <i class="row b">B</i>', 'A `<p class="row">` <i>B</i>'),
+        ("As [Lesson 1.1](a.md), Level 1 is.", "As [Lesson 1.1](lesson:1.1), Level <!-- -->1 is."),
+        ("## B {#b}\n\n## C {#b}", "## B {#b}\n\n## C"),
+        ("[B](javascript:c())", "B"),
         (
             '```{code-cell}\nprint("%d"\n      % 3)\n```',
             '```python file=examples/l1_1_a.py\nprint("%d"\n      % 3)\n```',
@@ -291,7 +307,12 @@ def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
 )
 def test_what_stands_in_a_line_or_a_block(tmp_path: Path, text: str, expected: str) -> None:
     (tmp_path / "old/.obsidian").mkdir(parents=True)
-    files = {"p.png": "\x89PNG", "mkdocs.yml": "site_name: A"}
+    files = {
+        "p.png": "\x89PNG",
+        "mkdocs.yml": "site_name: A",
+        "hidden/.b.md": "C\nD\n",
+        "hidden/c.py": "d = 1\n",
+    }
     new = lesson(tmp_path, "a.md", f"\nOne\n===\n\n{text}\n", **files)
     assert new == f"{expected}\n"
 
@@ -304,6 +325,23 @@ def test_links_and_signs_that_cannot_stay_are_told(tmp_path: Path) -> None:
     left = account_of(course).partition("## Left")[2]
     assert "- `:smile:`, shown as written: write the sign, if its tool draws one\n" in left
     assert "- the link of a figure to `https://a.org`, which has a number here\n" in left
+
+
+def test_the_argument_of_a_note_is_its_title_where_myst_reads_it(tmp_path: Path) -> None:
+    note = "# One\n\n```{note} B\nC.\n```\n"
+    assert lesson(tmp_path / "sphinx", "a.md", note) == "> [!note]\n> B\n> C.\n"
+    files = {"myst.yml": "project: {}\n"}
+    assert lesson(tmp_path / "myst", "a.md", note, **files) == "> [!note] B\n> C.\n"
+
+
+def test_a_drawing_loses_only_what_none_may_hold(tmp_path: Path) -> None:
+    start = '<svg xmlns="http://www.w3.org/2000/svg"'
+    text = '<switch><foreignObject><p xmlns="">B</p></foreignObject><text>B</text></switch></svg>'
+    files = {"a.md": "# One\n\n![B](b.svg)\n", "b.svg": f'{start} host="C">{text}'}
+    course = convert_files(tmp_path, files)
+    drawing = course.files["content/files/b.svg"].decode()
+    assert drawing == f"{start}><switch><text>B</text></switch></svg>"
+    assert "  - b.svg: `host` of `<svg>`, `<foreignObject>`\n" in account_of(course)
 
 
 def test_a_picture_is_described_by_its_attributes(tmp_path: Path) -> None:

@@ -173,6 +173,38 @@ def test_nav_of_mkdocs_and_chapters_of_quarto_keep_their_order(tmp_path: Path) -
     assert left == ["the map names `gone.qmd`, which is not in the folder or no text"]
 
 
+def test_folders_of_mkdocs_are_parts_in_the_order_of_their_pages_file(tmp_path: Path) -> None:
+    files = {
+        "mkdocs.yaml": "site_name: S\nnav:\n  - Start: start.md\n  - Guide: guide/\n",
+        "docs/start.md": "",
+        "docs/guide/b.md": "",
+        "docs/guide/a.md": "",
+        "docs/guide/index.md": "",
+        "includes/abbreviations.md": "*[ABC]: Alphabet\n",
+    }
+    outline, _, _ = import_map(tmp_path / "named", files)
+    guide = ["docs/guide/index.md", "docs/guide/a.md", "docs/guide/b.md"]
+    assert outline == [("S", ["docs/start.md"]), ("Guide", guide)]
+    files["mkdocs.yaml"] = 'nav:\n  - "":\n      - start.md\n'
+    assert import_map(tmp_path / "untitled", files)[0] == [("docs/start.md", ["docs/start.md"])]
+    files["mkdocs.yaml"] = "site_name: S\n"
+    files["docs/.pages"] = "nav:\n  - guide\n  - ...\n"
+    files["docs/guide/.pages"] = "title: How\nnav:\n  - b.md\n  - Title: a.md\n"
+    outline, _, _ = import_map(tmp_path / "found", files)
+    assert outline == [("How", ["docs/guide/b.md", "docs/guide/a.md"]), ("S", ["docs/start.md"])]
+
+
+def test_a_notebook_and_its_text_are_one_lesson(tmp_path: Path) -> None:
+    files = {
+        "a.ipynb": '{"nbformat": 4, "cells": [{"cell_type": "markdown", "source": "# A\\n\\nB."}]}',
+        "a.md": "---\njupytext:\n  formats: md,ipynb\n---\n# A\n\nB.\n",
+        "a.py": "# %%\nx = 1\n",
+    }
+    outline, _, left = import_map(tmp_path, files)
+    assert [titles for _, titles in outline] == [["A"]]
+    assert left == ["the text of a notebook, which is taken"] * 2
+
+
 def test_toctrees_of_sphinx_are_the_map(tmp_path: Path) -> None:
     index = """# Manual
 
