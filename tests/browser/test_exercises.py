@@ -167,6 +167,9 @@ def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None
         text.fill(f"{reach}.x = 1")
         press(hold, "Check")
         expect(verdicts(hold).last).to_contain_text(f"ReferenceError: {reach} is not defined")
+    text.fill("model.nv = 1e9")  # of which the page would die
+    press(hold, "Check")
+    expect(verdicts(hold).last).to_contain_text("only a getter")
     text.fill('import("x")')
     press(hold, "Check")
     expect(verdicts(hold).last).to_contain_text("was seen")
