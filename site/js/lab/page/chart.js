@@ -137,8 +137,10 @@ export class Chart {
     const { plot, width, height, shown } = this
     const all = shown.ghost === null ? [shown] : [shown, shown.ghost]
     const measured = plot.points?.data ?? []
-    const [low, high] = (plot.log ? decades : spanOf)(plot, ...extent([...all.flatMap(({ traces }) => traces), measured.map(([, y]) => y)]))
-    const [start, end] = shown.across ?? spanOf({ ymin: plot.xmin, ymax: plot.xmax }, ...extent(all.map(({ x }) => x)))
+    const [least, most] = extent([...all.flatMap(({ traces }) => traces), measured.map(([, y]) => y)])
+    const [low, high] = plot.log ? decades(plot, least, most) : spanOf(plot, least, most)
+    const [first, last] = extent(all.map(({ x }) => x))
+    const [start, end] = shown.across ?? spanOf({ ymin: plot.xmin, ymax: plot.xmax }, first, last)
     const layout = [low, high, start, end, width, height].join()
     if (layout === this.layout) return
     this.layout = layout
@@ -175,9 +177,9 @@ export class Chart {
     this.frame.replaceChildren(...parts)
     const marks = measured.map(([x, y]) => draw('circle', { cx: this.scaleX(x), cy: this.scaleY(clamp(y, this.scaleY)), r: 3 }))
     this.measured.replaceChildren(...marks)
-    const last = measured[measured.length - 1]
-    if (last && plot.points.label) {
-      const place = { x: this.scaleX(last[0]), y: this.scaleY(clamp(last[1], this.scaleY)) - 9, 'text-anchor': 'end' }
+    const point = measured[measured.length - 1]
+    if (point && plot.points.label) {
+      const place = { x: this.scaleX(point[0]), y: this.scaleY(clamp(point[1], this.scaleY)) - 9, 'text-anchor': 'end' }
       this.measured.append(write(plot.points.label, place))
     }
   }
@@ -329,7 +331,7 @@ function extent(columns) {
 }
 
 /** The range of a logarithmic axis: whole decades around the data. */
-function decades({ ymin, ymax }, low, high) {
+function decades({ ymin = null, ymax = null }, low, high) {
   const lower = ymin ?? 10 ** Math.floor(Math.log10(low > 0 ? low : 1e-3))
   const upper = ymax ?? 10 ** Math.ceil(Math.log10(high > 0 ? high : 1))
   return [lower, upper > lower ? upper : 10 * lower]

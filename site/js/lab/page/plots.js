@@ -48,7 +48,10 @@ export class Plot extends Samples {
     this.dirty = false
     const { config, kept, history } = this
     const { time, resting, marks } = now
-    const curves = ([times, ...columns]) => ({ times, x: config.x ? columns.pop() : times, traces: columns })
+    const curves = (columns) => {
+      const [times, ...traces] = columns
+      return { times, x: config.x ? traces.pop() : times, traces }
+    }
     this.chart.draw({
       ...curves(history.table()),
       ghost: kept && curves(kept),
