@@ -52,7 +52,7 @@ async function judgeHere({ config, module, mjb, wasm }) {
   try {
     const model = config.exercise.subject === 'model' ? null : fetchBytes(mjb)
     const [engine, code, bytes] = await Promise.all([host.start(wasm), importModule(module), model])
-    confine()
+    confine(engine.mj)
     tell('judging')
     let index = 0
     for (const verdict of judge(engine, config, code, bytes)) tell('verdict', { index: index++, ...verdict })

@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page
 
 from support.built_sites import Site
 from support.fixture_cases import fixture_text
-from support.lab_page import PAGE, lab, until, watch_page
+from support.lab_page import lab, watch_page
 
 pytestmark = [pytest.mark.browser, pytest.mark.long]
 
@@ -99,23 +99,3 @@ def test_with_a_graphics_processor_there_are_shadows_too(
         darker = plain_greens - np.array(page.evaluate(GREENS, ENDLESS)) > 15
         assert 500 < darker.sum() < 0.2 * darker.size
         assert console == []
-
-
-def test_text_of_plots_has_its_size_on_dense_screens(
-    browsers: Mapping[str, Browser], base: str
-) -> None:
-    for density in (1, 3):
-        with browsers["plain"].new_context(device_scale_factor=density) as context:
-            context.add_init_script(
-                "const { prototype } = CanvasRenderingContext2D, { fillText } = prototype\n"
-                "window.sizes = new Set()\n"
-                "prototype.fillText = function (...all) {\n"
-                "  window.sizes.add(parseFloat(this.font) / devicePixelRatio)\n"
-                "  return fillText.apply(this, all)\n"
-                "}"
-            )
-            page, _ = watch_page(context)
-            page.goto(base + PAGE)
-            lab(page, state=None)
-            until(page, "() => sizes.size > 0")
-            assert page.evaluate("[...sizes]") == [12], density

@@ -50,9 +50,17 @@ const REACH = [
 
 /**
  * Take from this worker, for good, all by which its code could reach the network, what a browser keeps, or other pages, and by which it
- * could speak to the page in the place of its judge.
+ * could speak to the page in the place of its judge. Sizes of the model and its data can be read only: with another one the engine would
+ * leave its arrays, and end the page.
+ *
+ * @param {Record<string, any>} mj the engine's bindings
  */
-export function confine() {
+export function confine(mj) {
+  for (const { prototype } of [mj.MjModel, mj.MjData]) {
+    for (const [name, property] of Object.entries(Object.getOwnPropertyDescriptors(prototype))) {
+      if (property.set && /^[np]/.test(name)) Object.defineProperty(prototype, name, { ...property, set: undefined }) // `nv`, `pstack`
+    }
+  }
   // What a text begins and nobody awaits, such as an import, fails silently: at each step, the page would be told again.
   globalThis.addEventListener?.('unhandledrejection', (event) => event.preventDefault())
   for (let owner = globalThis; owner !== null; owner = Object.getPrototypeOf(owner)) {

@@ -1,84 +1,127 @@
 /**
- * A plot of whole curves as SVG, for labs without an engine: axes, lines with their names at the ends, arrows of a phase plane, and the
- * point to which the reader has come. Style sheets colour it, as they do the plots of the static form.
+ * A plot as SVG: axes, lines with their names at the ends, arrows of a phase plane, and the values where the reader points. Style sheets
+ * colour it, as they do the plots of the static form.
  */
 
-import { draw, h } from './dom.js'
-import { formatLabel } from './numbers.js'
+import { draw, freshId, h } from './dom.js'
+import { valuesAt } from './history.js'
+import { formatLabel, superscript } from './numbers.js'
 import { spanOf, spread } from './span.js'
 
+const PIXEL = parseFloat(getComputedStyle(document.documentElement).fontSize) / 16 // where texts have their usual size
 const DASHES = ['', '6 3', '2 3', '8 3 2 3', '1 4']
-const LETTER = 7 // px, of a letter or a digit
-const TOP = 24
-const BOTTOM = 38
-const GAP = 13 // between names
+const LETTER = 7 * PIXEL // of a letter or a digit
+const TOP = 24 * PIXEL
+const BOTTOM = 38 * PIXEL
+const GAP = 13 * PIXEL // between names
+const ROOM = 9 // px beside a point
+const FAR = 1e4 // px, beyond which a line goes up or down whatever its value
+const FIGURES = 4 // of a value where the reader points
+const MOST_POWERS = 6 // labels of a logarithmic axis
+const SLOP = 4 // px that a pointer moves before it sets the time
 const ARROWS = [17, 11] // of a field, across and up
 const COLOURS = 6
+
+/**
+ * What a plot shows: samples at `times`, whose `traces` stand over `x`, and earlier curves, pale, in `ghost`. `at` is the time that the
+ * lab shows. Its lines reach from `from` to `to` (that time, where nothing else is said), and are pale outside if that is asked for.
+ * `across` is the range of the horizontal axis, or null, if it follows the data and the times are not on it.
+ *
+ * @typedef {{x: ArrayLike<number>, traces: ArrayLike<number>[]}} Curves
+ * @typedef {Curves & {times: ArrayLike<number>, ghost: Curves | null, across: number[] | null, at: number, from?: number, to?: number,
+ *   pale?: boolean, marks?: {time: number, label: string}[]}} Shown `marks`: when which control was used
+ */
 
 export class Chart {
   /**
    * @param {Record<string, any>} plot of the lab's JSON
-   * @param {{axis: Record<string, any>, caption: string, height: number, seek: (x: number) => void,
-   *   direction: (point: [number, number]) => number[]}} options `seek`: the reader points at a place of the axis
+   * @param {{words: (key: string, values?: Record<string, any>) => string, across: string, height: number, format: (time: number) => string,
+   *   seek: ((time: number) => void) | null, direction?: (point: [number, number]) => number[]}} options `across`: what the horizontal
+   *   axis is, if its label does not say; `seek`: the reader points at a time
    */
-  constructor(plot, { axis, caption, height, seek, direction }) {
+  constructor(plot, { words, across, height, format, seek, direction }) {
     this.plot = plot
-    this.axis = axis
+    this.format = format
     this.direction = direction
-    this.svg = draw('svg', { role: 'img', 'aria-label': `${caption}: ${plot.traces.map(({ label }) => label).join(', ')}` })
+    this.caption = words('lab.plot', { ylabel: plot.ylabel || words('lab.value'), xlabel: plot.xlabel || across })
+    this.svg = draw('svg', { role: 'img', 'aria-label': `${this.caption}: ${plot.traces.map(({ label }) => label).join(', ')}` })
+    const clip = freshId('plot')
+    this.edge = draw('rect')
     this.frame = draw('g')
     this.field = draw('path', { class: 'lab-field' })
-    this.ghosts = plot.traces.map((_, i) => draw('path', { class: `lab-ghost ${colour('lab-trace', i)}` }))
-    this.lines = plot.traces.map((trace, i) =>
-      draw('path', { class: `lab-trace ${colour('lab-trace', i)}`, 'stroke-dasharray': dashOf(trace, i) }),
-    )
-    this.marks = draw('g', { class: 'lab-measured' })
+    this.ghosts = plot.traces.map((_, i) => draw('path', { class: `lab-ghost ${colour(i)}` }))
+    this.lines = plot.traces.map((trace, i) => draw('path', { class: `lab-trace ${colour(i)}`, 'stroke-dasharray': dashOf(trace, i) }))
+    this.measured = draw('g', { class: 'lab-measured' })
+    this.changes = draw('path', { class: 'lab-change' })
     this.cursor = draw('path', { class: 'lab-cursor' })
-    this.points = plot.traces.map((_, i) => draw('circle', { class: `lab-point ${colour('lab-trace', i)}`, r: '4.5' }))
-    this.names = plot.traces.map(({ label }, i) => write(label, { class: `lab-name ${colour('lab-name', i)}` }))
-    this.svg.append(this.frame, this.field, ...this.ghosts, this.cursor, ...this.lines, this.marks, ...this.points, ...this.names)
+    this.points = plot.traces.map((_, i) => draw('circle', { class: `lab-point ${colour(i)}`, r: '4.5' }))
+    this.names = plot.traces.map(({ label }, i) => write(label, { class: `lab-name ${colour(i)}` }))
+    this.notes = [write('', { class: 'lab-over' }), ...plot.traces.map((_, i) => write('', { class: `lab-over lab-name ${colour(i)}` }))]
+    const hole = draw('clipPath', { id: clip })
+    hole.append(this.edge)
+    const inside = draw('g', { 'clip-path': `url(#${clip})` })
+    inside.append(this.field, ...this.ghosts, ...this.lines)
+    this.svg.append(hole, this.frame, this.cursor, inside, this.measured, this.changes, ...this.points, ...this.names, ...this.notes)
     this.element = h('figure', { class: 'lab-chart' }, this.svg)
-    this.element.style.setProperty('--height', `${plot.height ?? height}px`)
+    this.element.style.setProperty('--height', `${(plot.height ?? height) / 16}rem`)
     this.width = this.height = 0
-    this.data = this.ghost = null
-    this.count = 0
+    this.layout = '' // of the axes, as they are drawn
+    /** @type {Shown | null} */
+    this.shown = null
+    /** @type {number | null} the time at which the reader points */
+    this.pointed = null
     this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
     this.resizer.observe(this.element)
-    if (plot.x === null) this.watchPointer(seek)
+    if (seek !== null) this.watchPointer(seek)
   }
 
   watchPointer(seek) {
-    this.svg.classList.add('lab-seek')
-    const point = (event) => {
-      const { left } = this.svg.getBoundingClientRect()
-      seek(this.scaleX.invert(event.clientX - left))
+    const { svg } = this
+    let start = null
+    const point = (time) => {
+      this.pointed = time
+      if (this.layout !== '') this.drawTime()
     }
-    this.svg.addEventListener('pointerdown', (event) => {
-      if (event.button !== 0 || this.data === null) return
-      this.svg.setPointerCapture(event.pointerId)
-      point(event)
+    svg.classList.add('lab-seek')
+    svg.addEventListener('pointerdown', (event) => {
+      start = event.button === 0 ? event.clientX : null
+      if (start !== null) svg.setPointerCapture(event.pointerId)
     })
-    this.svg.addEventListener('pointermove', (event) => {
-      if (this.svg.hasPointerCapture(event.pointerId)) point(event)
+    svg.addEventListener('pointermove', (event) => {
+      if (!this.shown?.times.length) return
+      point(this.timeAt(event))
+      if (start !== null && Math.abs(event.clientX - start) > SLOP) seek(this.pointed)
     })
+    svg.addEventListener('click', (event) => {
+      if (this.shown?.times.length) seek(this.timeAt(event))
+    })
+    for (const type of ['pointerup', 'pointercancel']) svg.addEventListener(type, () => (start = null))
+    svg.addEventListener('pointerleave', () => point(null))
   }
 
-  /**
-   * Show other curves.
-   *
-   * @param {{x: number[], traces: number[][]}} data @param {{x: number[], traces: number[][]} | null} ghost the curves of the start
-   */
-  set(data, ghost) {
-    this.data = data
-    this.ghost = ghost
-    if (this.width > 0) this.layOut()
+  /** The time at a pointer: of its place on the axis, or, without one, of the sample that is nearest to it. */
+  timeAt({ clientX, clientY }) {
+    const { scaleX, scaleY } = this
+    const { left, top } = this.svg.getBoundingClientRect()
+    const { times, x, traces, across } = this.shown
+    if (across !== null) return clamp(scaleX.invert(clientX - left), { low: times[0], high: times[times.length - 1] })
+    let [least, nearest] = [Infinity, 0]
+    for (const values of traces) {
+      for (let i = 0; i < times.length; i++) {
+        const distance = Math.hypot(scaleX(x[i]) + left - clientX, scaleY(values[i]) + top - clientY)
+        if (distance < least) [least, nearest] = [distance, i]
+      }
+    }
+    return times[nearest]
   }
 
-  /** Show the lines up to a sample, and the point there. @param {number} count of samples @param {{x: number, values: number[]}} at */
-  show(count, at) {
-    this.count = count
-    this.at = at
-    if (this.width > 0 && this.data !== null) this.drawLines()
+  /** @param {Shown} shown */
+  draw(shown) {
+    this.shown = shown
+    if (this.width === 0) return
+    this.layOut()
+    this.drawLines()
+    this.drawTime()
   }
 
   resize(width, height) {
@@ -86,124 +129,133 @@ export class Chart {
     this.width = Math.floor(width)
     this.height = Math.floor(height)
     this.svg.setAttribute('viewBox', `0 0 ${this.width} ${this.height}`)
-    if (this.data !== null) this.layOut()
+    if (this.shown !== null) this.draw(this.shown)
   }
 
-  /** Find the scales, and draw what does not move. */
+  /** Find the scales, and draw what does not move, unless it stands there. */
   layOut() {
-    const { plot, axis, width, height, data, ghost } = this
-    const all = ghost === null ? [data] : [data, ghost]
-    const range = (bounds, columns) => {
-      const [least, most] = extent(columns)
-      return spanOf(bounds, least, most)
-    }
-    const [low, high] = range(
-      plot,
-      [...all.flatMap(({ traces }) => traces), (plot.points?.data ?? []).map(([, y]) => y)],
-    )
-    const across =
-      plot.x === null
-        ? [axis.min, axis.max]
-        : range(
-            { ymin: plot.xmin, ymax: plot.xmax },
-            all.map(({ x }) => x),
-          )
-    const ticksY = ticksOf(low, high, Math.max(2, Math.round((height - TOP - BOTTOM) / 42)))
+    const { plot, width, height, shown } = this
+    const all = shown.ghost === null ? [shown] : [shown, shown.ghost]
+    const measured = plot.points?.data ?? []
+    const [least, most] = extent([...all.flatMap(({ traces }) => traces), measured.map(([, y]) => y)])
+    const [low, high] = plot.log ? decades(plot, least, most) : spanOf(plot, least, most)
+    const [first, last] = extent(all.map(({ x }) => x))
+    const [start, end] = shown.across ?? spanOf({ ymin: plot.xmin, ymax: plot.xmax }, first, last)
+    const layout = [low, high, start, end, width, height].join()
+    if (layout === this.layout) return
+    this.layout = layout
+    const bottom = height - BOTTOM
+    const ticksY = (plot.log ? powersOf : ticksOf)(low, high, Math.max(2, Math.round((bottom - TOP) / (30 * PIXEL))))
     const left = 12 + LETTER * Math.max(...ticksY.map(({ text }) => text.length))
     const room = Math.min(14 + LETTER * Math.max(...plot.traces.map(({ label }) => label.length)), 0.3 * width)
-    const right = width - (plot.x === null ? room : 12)
-    const bottom = height - BOTTOM
-    this.scaleX = scale(across[0], across[1], left, right)
-    this.scaleY = scale(low, high, bottom, TOP)
-    const ticksX = ticksOf(across[0], across[1], Math.max(2, Math.round((right - left) / 80)))
+    const right = width - (shown.across === null ? 12 : room)
+    this.scaleX = scale(start, end, left, right)
+    this.scaleY = scale(low, high, bottom, TOP, plot.log)
+    for (const [name, value] of Object.entries({ x: left, y: TOP, width: right - left, height: bottom - TOP })) {
+      this.edge.setAttribute(name, String(value))
+    }
     const parts = []
     for (const { value, text } of ticksY) {
       const y = this.scaleY(value)
       parts.push(draw('path', { class: 'lab-grid', d: `M${left} ${y}H${right}` }))
       parts.push(write(text, { x: left - 6, y: y + 4, 'text-anchor': 'end' }))
     }
-    for (const { value, text } of ticksX) {
+    for (const { value, text } of ticksOf(start, end, Math.max(2, Math.round((right - left) / (60 * PIXEL))))) {
       const x = this.scaleX(value)
       parts.push(draw('path', { class: 'lab-axis', d: `M${x} ${bottom}v4` }))
-      parts.push(write(text, { x, y: bottom + 17, 'text-anchor': 'middle' }))
+      parts.push(write(text, { x, y: bottom + 17 * PIXEL, 'text-anchor': 'middle' }))
     }
     parts.push(draw('path', { class: 'lab-axis', d: `M${left} ${TOP}V${bottom}H${right}` }))
-    parts.push(write(plot.ylabel || '', { x: 0, y: 12 }))
+    parts.push(write(plot.ylabel || '', { x: 0, y: 12 * PIXEL }))
     parts.push(write(plot.xlabel || '', { x: (left + right) / 2, y: height - 5, 'text-anchor': 'middle' }))
-    for (const { y: value, label } of plot.refLines) {
-      if (value < low || value > high) continue
-      const y = this.scaleY(value)
-      parts.push(draw('path', { class: 'lab-reference', d: `M${left} ${y}H${right}` }))
-      parts.push(write(label, { x: left + 4, y: y > TOP + 14 ? y - 4 : y + 13 }))
-    }
+    const lines = plot.refLines.filter(({ y }) => y >= low && y <= high)
+    const places = spread(lines.map(({ y }) => this.scaleY(y) - 4), GAP, TOP + GAP, bottom)
+    lines.forEach(({ y, label }, i) => {
+      parts.push(draw('path', { class: 'lab-reference', d: `M${left} ${this.scaleY(y)}H${right}` }))
+      parts.push(write(label, { class: 'lab-over', x: left + 4, y: places[i] }))
+    })
     this.frame.replaceChildren(...parts)
-    const marks = plot.points?.data ?? []
-    this.marks.replaceChildren(...marks.map(([x, y]) => draw('circle', { cx: this.scaleX(x), cy: this.scaleY(clamp(y, this.scaleY)), r: 3 })))
-    const last = marks[marks.length - 1]
-    if (last && plot.points.label) {
-      const place = { x: this.scaleX(last[0]), y: this.scaleY(clamp(last[1], this.scaleY)) - 9, 'text-anchor': 'end' }
-      this.marks.append(write(plot.points.label, place))
+    const marks = measured.map(([x, y]) => draw('circle', { cx: this.scaleX(x), cy: this.scaleY(clamp(y, this.scaleY)), r: 3 }))
+    this.measured.replaceChildren(...marks)
+    const point = measured[measured.length - 1]
+    if (point && plot.points.label) {
+      const place = { x: this.scaleX(point[0]), y: this.scaleY(clamp(point[1], this.scaleY)) - 9, 'text-anchor': 'end' }
+      this.measured.append(write(plot.points.label, place))
     }
-    this.ghosts.forEach((path, i) => path.setAttribute('d', ghost ? this.path(ghost.x, ghost.traces[i], ghost.x.length) : ''))
-    this.field.setAttribute('d', plot.field ? this.arrows() : '')
-    this.drawLines()
   }
 
   drawLines() {
-    const { data, at, count, plot } = this
-    this.lines.forEach((path, i) => path.setAttribute('d', this.path(data.x, data.traces[i], count)))
-    const shown = at !== undefined && this.isInside(at.x)
-    const x = shown ? this.scaleX(at.x) : 0
-    this.cursor.setAttribute('d', shown && plot.x === null ? `M${x} ${TOP}V${this.height - BOTTOM}` : '')
-    this.points.forEach((circle, i) => {
-      const y = at?.values[i]
-      const known = shown && Number.isFinite(y) && y >= this.scaleY.low && y <= this.scaleY.high
-      circle.classList.toggle('lab-hidden', !known)
-      if (!known) return
-      circle.setAttribute('cx', String(x))
-      circle.setAttribute('cy', String(this.scaleY(y)))
+    const { shown, plot, scaleX, scaleY } = this
+    const { times, x, traces, ghost, at, from = -Infinity, to = at, pale = false, across } = shown
+    const count = times.length
+    let [first, end] = [0, count]
+    while (first < count && times[first] < from) first += 1
+    while (end > first && times[end - 1] > to) end -= 1
+    if (plot.field) this.field.setAttribute('d', this.arrows())
+    traces.forEach((values, i) => {
+      const earlier = ghost === null ? '' : this.path(ghost.x, ghost.traces[i], 0, ghost.x.length)
+      this.ghosts[i].setAttribute('d', earlier + (pale ? this.path(x, values, 0, count) : ''))
+      this.lines[i].setAttribute('d', this.path(x, values, first, end))
     })
-    const ends = data.traces.map((values) => {
-      for (let i = count - 1; i >= 0; i--) if (Number.isFinite(values[i])) return this.scaleY(clamp(values[i], this.scaleY))
+    const last = (pale ? count : end) - 1
+    const ends = traces.map((values) => {
+      for (let i = last; i >= 0; i--) if (Number.isFinite(scaleY(values[i]))) return scaleY(clamp(values[i], scaleY))
       return null
     })
     const places = spread(ends, GAP, TOP + 4, this.height - BOTTOM)
     this.names.forEach((text, i) => {
-      const hidden = places[i] === null || plot.x !== null
-      text.classList.toggle('lab-hidden', hidden)
-      text.setAttribute('x', String((count > 0 ? this.scaleX(data.x[count - 1]) : 0) + 9))
-      text.setAttribute('y', String((places[i] ?? 0) + 4))
+      text.classList.toggle('lab-hidden', across === null || places[i] === null)
+      if (places[i] !== null) put(text, scaleX(x[last]) + ROOM, places[i] + 4)
     })
   }
 
-  isInside(x) {
-    return Number.isFinite(x) && x >= this.scaleX.low && x <= this.scaleX.high
+  /** Draw when controls were used, and the values at the time that is shown or at which the reader points. */
+  drawTime() {
+    const { shown, scaleX, scaleY, height } = this
+    const { times, x, traces, at, pale, across, marks = [] } = shown
+    const [bottom, count] = [height - BOTTOM, times.length]
+    const time = this.pointed ?? at
+    const isRead = count > 0 && (this.pointed !== null || (pale === true && at < times[count - 1]))
+    const [along, ...values] = valuesAt(times, [x, ...traces], time)
+    const place = scaleX(along)
+    const isSeen = count > 0 && along >= scaleX.low && along <= scaleX.high
+    this.cursor.setAttribute('d', isSeen && across !== null ? `M${place} ${TOP}V${bottom}` : '')
+    const changes = across === null ? [] : marks.filter((mark) => mark.time >= scaleX.low)
+    this.changes.setAttribute('d', changes.map((mark) => `M${scaleX(mark.time)} ${bottom - 10}l-5 10h10z`).join(''))
+    const pixels = values.map((y) => (isSeen && y >= scaleY.low && y <= scaleY.high ? scaleY(y) : null))
+    this.points.forEach((circle, i) => {
+      circle.classList.toggle('lab-hidden', pixels[i] === null)
+      if (pixels[i] !== null) put(circle, place, pixels[i], 'c')
+    })
+    const near = changes.filter((mark) => Math.abs(scaleX(mark.time) - place) <= 5).map(({ label }) => label)
+    const texts = [[this.format(time), ...near].join(', '), ...values.map((y) => formatLabel(Number(y?.toPrecision(FIGURES))))]
+    const isLeft = place < (scaleX.from + scaleX.to) / 2
+    const places = spread([isSeen ? TOP + 4 : null, ...pixels], GAP, TOP + 4, bottom)
+    this.notes.forEach((text, i) => {
+      text.classList.toggle('lab-hidden', !isRead || places[i] === null)
+      if (!isRead || places[i] === null) return
+      text.textContent = texts[i]
+      text.setAttribute('text-anchor', isLeft ? 'start' : 'end')
+      put(text, place + (isLeft ? ROOM : -ROOM), places[i] + 4)
+    })
   }
 
-  /** The path of a line, interrupted where it has no value, and cut at the lower and upper edges. */
-  path(xs, ys, count) {
+  /** The path of a line through some samples, interrupted where it has no value; of those that share a place across, where it turns. */
+  path(xs, ys, from, to) {
     const { scaleX, scaleY } = this
+    const { low, high } = scaleX
+    const side = (i) => Number(xs[i] > high) - Number(xs[i] < low)
+    const goesOn = (values, i) => (values[i] - values[i - 1]) * (values[i + 1] - values[i]) >= 0
     let path = ''
-    let pen = false
-    const add = (x, y) => {
-      path += `${pen ? 'L' : 'M'}${scaleX(x).toFixed(1)} ${scaleY(y).toFixed(1)}`
-      pen = true
-    }
-    for (let i = 1; i < count; i++) {
-      const [x0, y0, x1, y1] = [xs[i - 1], ys[i - 1], xs[i], ys[i]]
-      if (!Number.isFinite(y0 - y1) || !Number.isFinite(x0 - x1)) {
-        pen = false
-        continue
+    let last = NaN // across; NaN: the line begins
+    for (let i = from; i < to; i++) {
+      const [x, y] = [scaleX(xs[i]), scaleY(ys[i])]
+      if (!Number.isFinite(x + y)) last = NaN
+      else if (Number.isNaN(last) || i + 1 === to || !(isNear(x, last) && goesOn(xs, i) && goesOn(ys, i))) {
+        if (side(i) !== 0 && side(i - 1) === side(i) && side(i + 1) === side(i)) continue
+        path += `${Number.isNaN(last) ? 'M' : 'L'}${x.toFixed(1)} ${Math.min(Math.max(y, -FAR), FAR).toFixed(1)}`
+        last = x
       }
-      const edges = [scaleY.low, scaleY.high].map((edge) => (edge - y0) / (y1 - y0)).sort((a, b) => a - b)
-      const [from, to] = y0 === y1 ? (y0 === clamp(y0, scaleY) ? [0, 1] : [1, 0]) : [Math.max(edges[0], 0), Math.min(edges[1], 1)]
-      if (from > to) {
-        pen = false
-        continue
-      }
-      if (!pen) add(x0 + from * (x1 - x0), y0 + from * (y1 - y0))
-      add(x0 + to * (x1 - x0), y0 + to * (y1 - y0))
-      pen = to === 1
     }
     return path
   }
@@ -241,7 +293,14 @@ function write(text, attributes) {
   return element
 }
 
-const colour = (name, i) => `${name}-${(i % COLOURS) + 1}`
+function put(element, x, y, prefix = '') {
+  element.setAttribute(`${prefix}x`, x.toFixed(1))
+  element.setAttribute(`${prefix}y`, y.toFixed(1))
+}
+
+const colour = (i) => `lab-trace-${(i % COLOURS) + 1}`
+
+const isNear = (x, last) => Math.abs(x - last) < 1
 
 function dashOf({ dash }, index) {
   if (Array.isArray(dash)) return dash.join(' ')
@@ -249,9 +308,10 @@ function dashOf({ dash }, index) {
 }
 
 /** A map from values to places on the drawing. */
-function scale(low, high, from, to) {
-  const slope = (to - from) / (high - low)
-  const map = (value) => from + (value - low) * slope
+function scale(low, high, from, to, isLogarithmic = false) {
+  const of = isLogarithmic ? Math.log : (value) => value
+  const slope = (to - from) / (of(high) - of(low))
+  const map = (value) => from + (of(value) - of(low)) * slope
   return Object.assign(map, { low, high, from, to, slope, invert: (place) => low + (place - from) / slope })
 }
 
@@ -268,6 +328,24 @@ function extent(columns) {
     }
   }
   return low <= high ? [low, high] : [undefined, undefined]
+}
+
+/** The range of a logarithmic axis: whole decades around the data. */
+function decades({ ymin = null, ymax = null }, low, high) {
+  const lower = ymin ?? 10 ** Math.floor(Math.log10(low > 0 ? low : 1e-3))
+  const upper = ymax ?? 10 ** Math.ceil(Math.log10(high > 0 ? high : 1))
+  return [lower, upper > lower ? upper : 10 * lower]
+}
+
+/** Powers of ten from `low` to `high`, not more than can be read. */
+function powersOf(low, high) {
+  const first = Math.ceil(Math.log10(low) - 1e-9)
+  const last = Math.floor(Math.log10(high) + 1e-9)
+  const stride = Math.max(1, Math.ceil((last - first) / MOST_POWERS))
+  return Array.from({ length: Math.max(0, Math.floor((last - first) / stride)) + 1 }, (_, i) => {
+    const power = first + i * stride
+    return { value: 10 ** power, text: `10${superscript(power)}` }
+  })
 }
 
 /** About `count` round numbers from `low` to `high`. */

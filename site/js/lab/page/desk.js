@@ -42,15 +42,13 @@ export class Desk extends Shell {
   build() {
     const { config, words } = this
     const { axis } = config
-    const captions = config.plots.map(({ ylabel, xlabel }) =>
-      words('lab.plot', { ylabel: ylabel || words('lab.value'), xlabel: xlabel || axis.name }),
-    )
     this.charts = config.plots.map(
       (plot, i) =>
         new Chart(plot, {
-          axis,
-          caption: captions[i],
+          words,
+          across: axis.name,
           height: config.height,
+          format: (x) => this.textOf(x),
           seek: (x) => this.seek(x),
           direction: ([x, y]) => this.result.direction(this.place, plot.field, x, y),
         }),
@@ -74,7 +72,7 @@ export class Desk extends Shell {
       format: (x) => formatNumber(x, this.digits).trim(),
     })
     const charts = h('div', { class: 'lab-charts', role: 'group', tabIndex: 0 }, ...this.charts.map((chart) => chart.element))
-    charts.setAttribute('aria-label', words('lab.live.curve', { caption: captions.join('; ') }))
+    charts.setAttribute('aria-label', words('lab.live.curve', { caption: this.charts.map(({ caption }) => caption).join('; ') }))
     charts.addEventListener('keydown', (event) => this.onKey(event))
     const link = () => this.share({ values: this.values, steps: 0, time: this.place, physics: new Float64Array() })
     const foot = h('div', { class: 'lab-foot' }, this.makeButton('link', link), this.makeHelp(['keys_curve']))
@@ -100,8 +98,7 @@ export class Desk extends Shell {
     this.result = curves.run(values)
     this.samples = this.result.samples()
     this.first ??= this.samples
-    const ghost = values === initial || this.first === this.samples ? null : this.first
-    this.charts.forEach((chart, i) => chart.set(this.samples.plots[i], ghost?.plots[i] ?? null))
+    this.ghost = values === initial || this.first === this.samples ? null : this.first
     this.controls.show(values)
     if (this.result.failure !== null) {
       const { kind } = this.result.failure
@@ -115,16 +112,18 @@ export class Desk extends Shell {
   showPlace() {
     const { config, curves, result: run, samples } = this
     const x = (this.place = Math.min(Math.max(this.place, run.start), run.end))
-    const isMotion = config.kind === 'ode'
-    let count = samples.times.length
-    if (isMotion) while (count > 0 && samples.times[count - 1] > x) count -= 1
-    const readouts = run.readouts(x)
-    const env = run.at(x)
-    this.charts.forEach((chart, i) => {
-      const { x: across, traces } = curves.plots[i]
-      chart.show(count, { x: across ? across(env) : x, values: traces.map((value) => value(env)) })
-    })
-    this.readouts.show(readouts)
+    const { min, max } = config.axis
+    this.charts.forEach((chart, i) =>
+      chart.draw({
+        ...samples.plots[i],
+        times: samples.times,
+        ghost: this.ghost?.plots[i] ?? null,
+        across: curves.plots[i].x ? null : [min, max],
+        at: x,
+        to: config.kind === 'ode' ? x : Infinity,
+      }),
+    )
+    this.readouts.show(run.readouts(x))
     const text = this.textOf(x)
     this.slider.value = String(x)
     this.slider.setAttribute('aria-valuetext', text)

@@ -20,7 +20,6 @@ export class History {
     this.end = 0
     this.stride = 1
     this.counter = 0
-    this.gaps = false
   }
 
   get length() {
@@ -37,10 +36,7 @@ export class History {
     if (this.counter++ % this.stride !== 0) return
     if (this.end === this.columns[0].length) this.makeRoom()
     this.columns[0][this.end] = time
-    for (let i = 1; i < this.columns.length; i++) {
-      const value = (this.columns[i][this.end] = values[offset + i - 1])
-      if (!Number.isFinite(value)) this.gaps = true
-    }
+    for (let i = 1; i < this.columns.length; i++) this.columns[i][this.end] = values[offset + i - 1]
     this.end += 1
     if (this.window !== null) {
       // One sample before the window stays, so that the line reaches its edge.
@@ -91,19 +87,18 @@ export class History {
     return this.columns.map((column) => column.subarray(this.start, this.end))
   }
 
-  /** The values at a time (s), between two samples on a straight line. @returns {number[]} */
+  /** The values at a time (s). @returns {number[]} */
   at(time) {
     const [times, ...columns] = this.table()
-    const i = Math.max(0, times.findLastIndex((x) => x <= time))
-    const part = i + 1 < times.length ? Math.max(0, time - times[i]) / (times[i + 1] - times[i]) : 0
-    return columns.map((column) => (part > 0 ? column[i] + part * (column[i + 1] - column[i]) : column[i]))
+    return valuesAt(times, columns, time)
   }
+}
 
-  /** The samples for uPlot: times, then one array for each trace, with `null` where its line is interrupted. @returns {any} */
-  data() {
-    const columns = this.table()
-    return this.gaps ? columns.map((column) => Array.from(column, (x) => (Number.isFinite(x) ? x : null))) : columns
-  }
+/** The values of columns at a time, between two samples on a straight line. */
+export function valuesAt(times, columns, time) {
+  const i = Math.max(0, times.findLastIndex((x) => x <= time))
+  const part = i + 1 < times.length ? Math.max(0, time - times[i]) / (times[i + 1] - times[i]) : 0
+  return columns.map((column) => (part > 0 ? column[i] + part * (column[i + 1] - column[i]) : column[i]))
 }
 
 export const PLAYING = { time: 0, resting: false, marks: [] }

@@ -13,7 +13,6 @@ import { curvesText, fillScript } from './export.js'
 import { History } from './history.js'
 import { digitsOfStep, formatReadout, formatTime } from './numbers.js'
 import { followLegend } from './legend.js'
-import { Orbit } from './orbit.js'
 import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
@@ -107,7 +106,7 @@ export class Instrument extends Shell {
       look: (camera) => this.view.look(camera),
       seek,
     })
-    this.plots = config.plots.map((plot) => (plot.x ? new Orbit(plot, words) : new Plot(plot, words, seek)))
+    this.plots = config.plots.map((plot) => new Plot(plot, words, seek))
     this.goal = this.makeGoal({ show: () => this.simulation.replay({ values: this.initial, events: config.goal.log }) })
     this.motion = h('p', { class: 'lab-motion', hidden: true })
     this.controls.show(this.values)

@@ -1,27 +1,14 @@
 /** The page's colours for canvases, to which style sheets do not apply, and a watcher of their changes. */
 
-const TRACES = 6
-
-/** Resolve a CSS colour, as it applies inside an element, to `rgb(…)`; one that is `kept` stays itself in high contrast. */
-export function resolve(element, colour, kept = false) {
+/** Resolve a CSS colour, as it applies inside an element, to `rgb(…)`. */
+export function resolve(element, colour) {
   const probe = document.createElement('span')
   probe.hidden = true
   probe.style.color = colour
-  if (kept) probe.style.setProperty('forced-color-adjust', 'none')
   element.append(probe)
   const text = getComputedStyle(probe).color
   probe.remove()
   return text
-}
-
-/** The colours of a plot. */
-export function palette(element) {
-  return {
-    text: resolve(element, 'var(--ink-soft)'),
-    grid: resolve(element, 'var(--rule)', true),
-    rule: resolve(element, 'var(--rule-firm)'),
-    traces: Array.from({ length: TRACES }, (_, i) => resolve(element, `var(--trace-${i + 1})`, true)),
-  }
 }
 
 /** A CSS colour `rgb(r g b)` as numbers in [0, 1]. */

@@ -81,7 +81,7 @@ export class Host {
       if (this.queues.get(id) !== queue) return // disposed of, or loaded again
       const session = new Session(id, post, now)
       this.sessions.set(id, session)
-      if (config.attempt !== undefined) confine() // its worker is dedicated
+      if (config.attempt !== undefined) confine(engine.mj) // its worker is dedicated
       session.open(engine, source, config, config.attempt === undefined ? code : watchableCode(config, code), own)
       this.queues.delete(id)
       queue.forEach((message) => session.receive(message))
