@@ -226,11 +226,11 @@ def _one_file(course_files: _Course, extraction: Extraction) -> _OneFile:
     path, name = extraction.path, extraction.path.rpartition("/")[2]
     files, style = course_files.files_of(extraction), course_files.style
     key = step_key("one file", path, extraction.text, files, style)
-    known = course_files.options.store.get_value(_KIND, key, _OneFile)
-    if known is not None and all(
-        course_files.answer(path, module) == answer for module, answer in known.answers.items()
+    earlier = course_files.options.store.get_value(_KIND, key, _OneFile)
+    if earlier is not None and all(
+        course_files.answer(path, module) == answer for module, answer in earlier.answers.items()
     ):
-        return known
+        return earlier
     answers: dict[str, str] = {}
 
     def find_module(module: str) -> CourseModule | None:

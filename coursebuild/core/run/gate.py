@@ -40,7 +40,7 @@ from coursebuild.core.files.locks import temporary_folder
 
 Enclose: TypeAlias = Callable[[Sequence[str], Mapping[str, str]], tuple[list[str], dict[str, str]]]
 """Makes, of a command and its environment, those that run it in a sandbox."""
-Stream: TypeAlias = "int | IO[bytes] | None"
+Stream: TypeAlias = "int | IO[bytes]"
 
 PIPE, NOTHING, OWN = subprocess.PIPE, subprocess.DEVNULL, None
 """Streams: one to this process, none, and the one that this process has itself."""
@@ -152,9 +152,9 @@ def start(
     environment: Mapping[str, str],
     *,
     folder: str | Path | None = None,
-    stdin: Stream = NOTHING,
-    stdout: Stream = NOTHING,
-    stderr: Stream = NOTHING,
+    stdin: Stream | None = NOTHING,
+    stdout: Stream | None = NOTHING,
+    stderr: Stream | None = NOTHING,
     pass_fds: Sequence[int] = (),
     bound: bool = True,
     enclose: Enclose | None = None,
@@ -167,7 +167,7 @@ def start(
     if enclose is not None:
         command, environment = enclose(command, environment)
     return subprocess.Popen(
-        bound_command(command) if bound else command,
+        bound_command(command) if bound else list(command),
         cwd=folder or working_folder(),
         env=dict(environment),
         stdin=stdin,
@@ -182,27 +182,30 @@ def finish(
     command: Sequence[str],
     environment: Mapping[str, str],
     *,
+    folder: str | Path | None = None,
     stdin: bytes = b"",
     stderr: Stream = PIPE,
     seconds: float | None = None,
+    bound: bool = True,
     enclose: Enclose | None = None,
 ) -> Completed:
     """Run a process to its end; an interrupt, or that it takes longer, ends all that it started.
 
-    It gets a folder of its own; `enclose` is as in `start`.
+    `folder`, `bound` and `enclose` are as in `start`; without a folder it gets one of its own.
 
     Raises:
         OSError: it cannot be started.
         TimeoutError: it took longer than these seconds.
     """
-    with temporary_folder() as folder:
+    with contextlib.ExitStack() as resources:
         process = start(
             command,
             environment,
-            folder=folder,
+            folder=folder or resources.enter_context(temporary_folder()),
             stdin=PIPE,
             stdout=PIPE,
             stderr=stderr,
+            bound=bound,
             enclose=enclose,
         )
         try:
