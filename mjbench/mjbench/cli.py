@@ -256,7 +256,7 @@ def _measure_scene(
         report = parts.run(f"the sweep {sweep.name}", run, None, share=share)
         sweeps += [] if report is None else [report]
     failures = [*parts.failures, *(f for report in scenarios for f in report.failures)]
-    is_stopped = parts.stopped or any(failure.reason == LATE for failure in failures)
+    is_stopped = parts.stopped or any(failure.reason.startswith(LATE) for failure in failures)
     join = partial(bench.join_parts, compiled_model, scenarios, sweeps, host, quick=quick)
     return join(card=not is_stopped, failures=parts.failures), is_stopped
 

@@ -136,7 +136,7 @@ def close_loop(loop: Loop, model: Any, data: Any) -> None:
 
 
 class TimeLimitError(Exception):
-    """The time of what is measured is over."""
+    """The time of what is measured is over; the text is what is known until then."""
 
 
 _deadlines = [math.inf]

@@ -28,6 +28,7 @@ from msgspec.structs import asdict, replace
 
 from mjbench.detector import Passages, driving_force
 from mjbench.linearization import Theory, find_theory
+from mjbench.loop import TimeLimitError
 from mjbench.parts import Parts
 from mjbench.pilot import (
     MOST_STEPS,
@@ -45,7 +46,7 @@ from mjbench.problem import (
 from mjbench.reports import Reach, reach
 from mjbench.reports.case_report import BoundaryLine
 from mjbench.reports.scene_report import StableRow
-from mjbench.reports.shown_errors import FEWEST_STEPS
+from mjbench.reports.shown_errors import FEWEST_STEPS, seconds_text
 from mjbench.simulation import (
     EngineStates,
     compile_model,
@@ -112,6 +113,15 @@ class Laboratory(Struct, frozen=True, eq=False):
         return sorted(
             step for (start, step), runs in self.trials.items() if not start and 1 in runs
         )
+
+    def findings(self) -> str:
+        """What a search that was cut has seen, in words; empty before its first run."""
+        steps = self.own_steps()
+        lost = [step for step in steps if self.is_lost(0, step)]
+        held = [step for step in steps if step not in lost]
+        clauses = [f"lost at {seconds_text(lost[0], 3)}"] if lost else []
+        clauses += [f"bounded at {seconds_text(held[-1], 3)}"] if held else []
+        return f"so far {' and '.join(clauses)}" if clauses else ""
 
 
 def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
@@ -393,7 +403,10 @@ def stable_rows(
         starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
         laboratory = Laboratory(run, span, starts, questions, shortest)
         while True:
-            row = search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
+            try:
+                row = search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
+            except TimeLimitError:
+                raise TimeLimitError(laboratory.findings()) from None
             if row.largest != "none" or search[0] <= least:
                 return row
             search = max(search[0] / _LOWER, least), search[0]

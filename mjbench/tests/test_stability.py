@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -12,9 +13,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from mjbench import stability
 from mjbench.declarations import Declarations, DeclaredScenario, Place
 from mjbench.detector import RunStatus
 from mjbench.linearization import Theory, find_rest, find_theory
+from mjbench.loop import TimeLimitError
 from mjbench.parts import Parts
 from mjbench.pilot import run_pilot
 from mjbench.problem import STANDARD, Integrator, Scenario, Setup
@@ -248,6 +251,24 @@ def rows_of(mjcf: str, *names: str, **fields: Any) -> dict[str, StableRow]:
     states = simulate(Setup(scenario=scene.scenario), fine).states
     rows = stable_rows(model, run_pilot(model, scene), states, Parts(), quick=True)
     return {row.integrator: row for row in rows}
+
+
+def test_a_search_that_is_cut_says_what_it_has_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    def run_until(setup: Setup, model: Any, *rest: Any, **others: Any) -> StabilityTrial:
+        if model.opt.timestep < 0.01:
+            raise TimeLimitError
+        return run_trial(setup, model, *rest, **others)
+
+    monkeypatch.setattr(stability, "run_trial", run_until)
+    model = mujoco.MjModel.from_xml_string(ARM.format("", SERVO))
+    table = DeclaredScenario("s", table=Place("m.xml"), qpos=(0.1,), duration=2.0, sample=0.02)
+    (scene,) = scenes(model, Declarations("m.xml", (table,)))
+    fine = with_integrator(model, Integrator.RK4, min(scene.timesteps))
+    states, parts = simulate(Setup(scenario=scene.scenario), fine).states, Parts()
+    assert stable_rows(model, run_pilot(model, scene), states, parts, quick=True) == ()
+    reasons = {failure.part.rpartition(" ")[2]: failure.reason for failure in parts.failures}
+    assert reasons["Euler"].startswith("not enough time; so far lost at 1")
+    assert re.fullmatch(r"not enough time; so far lost at .+ and bounded at .+ ms", reasons["RK4"])
 
 
 def test_a_servo_is_stable_as_far_as_the_spring_and_damper_that_it_is() -> None:
