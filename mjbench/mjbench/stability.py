@@ -118,9 +118,9 @@ class Laboratory(Struct, frozen=True, eq=False):
         """What a search that was cut has seen, in words; empty before its first run."""
         steps = self.own_steps()
         lost = [step for step in steps if self.is_lost(0, step)]
-        held = [step for step in steps if step not in lost]
+        stable = [step for step in steps if step not in lost]
         clauses = [f"lost at {seconds_text(lost[0], 3)}"] if lost else []
-        clauses += [f"bounded at {seconds_text(held[-1], 3)}"] if held else []
+        clauses += [f"bounded at {seconds_text(stable[-1], 3)}"] if stable else []
         return f"so far {' and '.join(clauses)}" if clauses else ""
 
 

@@ -254,10 +254,10 @@ def rows_of(mjcf: str, *names: str, **fields: Any) -> dict[str, StableRow]:
 
 
 def test_a_search_that_is_cut_says_what_it_has_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    def run_until(setup: Setup, model: Any, *rest: Any, **others: Any) -> StabilityTrial:
+    def run_until(setup: Setup, model: Any, *rest: Any, **options: Any) -> StabilityTrial:
         if model.opt.timestep < 0.01:
             raise TimeLimitError
-        return run_trial(setup, model, *rest, **others)
+        return run_trial(setup, model, *rest, **options)
 
     monkeypatch.setattr(stability, "run_trial", run_until)
     model = mujoco.MjModel.from_xml_string(ARM.format("", SERVO))
