@@ -98,6 +98,7 @@ def check_links(
                 target = model.resolve(inline.target, course, document.source.path)
                 diagnostics = [*checker.check_target(inline.target_span, target)]
                 yield from diagnostics or checker.check_number(inline, target)
+                yield from checker.check_name(inline)
             elif isinstance(inline, model.Image) and inline.url_span not in recorded_spans:
                 yield from checker.check_media("the image ", inline.url, inline.url_span)
             elif isinstance(inline, model.RawInline):
@@ -197,6 +198,16 @@ class _Checker(Struct, frozen=True):
             message = "this link has no text, so no reader sees it"
             help = "write one in the brackets"
             yield diagnose("link-text", link.span, message, help=help)
+
+    def check_name(self, link: model.Link) -> Iterator[Diagnostic]:
+        """Report a link to a lesson whose text is the name of another one, as `Lesson 1.2`."""
+        target, name, lessons = link.target, link.lesson_in_text, self.targets.lessons
+        if isinstance(target, model.LessonTarget) and {name, target.id} <= lessons.keys():
+            title = next(lesson.title for lesson in self.course.lessons if lesson.id == target.id)
+            if name not in (target.id, *title.split()):
+                message = f"the text names lesson {name}, and the address lesson {target.id}"
+                help = "name the same lesson in both"
+                yield diagnose("link-text", link.span, message, help=help)
 
     def check_url(self, span: Span, url: str) -> Iterator[Diagnostic]:
         parts = urlsplit_or_none(url)

@@ -216,6 +216,8 @@ class Link(Located, frozen=True):
     mention: bool = False
     bare: bool = False
     """Whether its author gave it no text, so that it shows the number of what it leads to."""
+    lesson_in_text: str = ""
+    """The id of the lesson that its text names, as `Lesson 1.2`."""
 
 
 class Image(Located, frozen=True):

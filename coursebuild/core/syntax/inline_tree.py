@@ -28,6 +28,7 @@ from coursebuild.core.syntax.link_targets import (
     classify,
     link_mentions,
     may_mention,
+    named_lesson,
     text_inlines,
 )
 from coursebuild.core.syntax.other_tools import check_marks
@@ -225,9 +226,14 @@ class _TokenReader:
             self.report(diagnostic)
             return None
         title, target = str(opening.attrs.get("title", "")), classify(url)
-        if (diagnostic := check_link_text(target, children, span, self.state.words)) is not None:
+        if (diagnostic := check_link_text(target, children, span)) is not None:
             self.report(diagnostic)
-        return model.Link(span, target, destination, title, children, bare=not children)
+        is_of_lesson = isinstance(target, model.LessonTarget)
+        lesson = named_lesson(children, self.state.words) if is_of_lesson else ""
+        bare = not children
+        return model.Link(
+            span, target, destination, title, children, bare=bare, lesson_in_text=lesson
+        )
 
     def _find_destination(self, start: int, label_end: int, end: int) -> Span:
         """The span of the destination of a link or image: in itself, or in its definition."""

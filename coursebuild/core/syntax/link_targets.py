@@ -22,6 +22,7 @@ from coursebuild.core.model import (
     Link,
     ModelTarget,
     PageTarget,
+    RawInline,
     SoftBreak,
     Target,
     TermTarget,
@@ -91,20 +92,14 @@ def check_raw_scheme(url: str, span: Span) -> Diagnostic | None:
     return check_scheme(url, span, image=True)
 
 
-def check_link_text(
-    target: Target, children: tuple[Inline, ...], span: Span, words: Words
-) -> Diagnostic | None:
-    """The diagnostic of a text or an address that is missing, or names another lesson."""
-    lesson = isinstance(target, LessonTarget) and mentioned_lesson(plain_text(children), words)
+def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> Diagnostic | None:
+    """The diagnostic of a text or an address that is missing."""
     address = getattr(target, "url", None) or f"#{getattr(target, 'anchor', None) or ''}"
     help = "write one in the brackets"
     if target == UrlTarget(""):
         message, help = "this link has no address", f"{help} behind its text"
     elif not children and ":" not in address.partition("#")[2]:  # else it may show a number
         message = "this link has no text, so no reader sees it"
-    elif lesson and isinstance(target, LessonTarget) and lesson != target.id:
-        message = f"the text names lesson {lesson}, and the address lesson {target.id}"
-        help = "name the same lesson in both"
     else:
         return None
     return diagnose("link-text", span, message, help=help)
@@ -150,8 +145,11 @@ def _mentions(words: Words) -> re.Pattern[str]:
     )
 
 
-def mentioned_lesson(text: str, words: Words) -> str:
-    """The lesson that a whole text mentions; empty for other texts and for several lessons."""
+def named_lesson(children: tuple[Inline, ...], words: Words) -> str:
+    """The lesson that a whole text names, as `Lesson 1.2`; empty for any other text."""
+    if any(isinstance(child, RawInline) for child in children):  # a comment that parts the two
+        return ""
+    text = plain_text(children)
     match, numbers = _mentions(words).fullmatch(text), _NUMBER.findall(text)
     return numbers[0] if match and match[1] and len(numbers) == 1 else ""
 

@@ -224,11 +224,19 @@ def _edit_links(
 
 
 def _break_mentions(document: model.Document) -> Iterator[Edit]:
-    """Put an empty comment into what would become a link to a lesson or level."""
+    """Put an empty comment into what would become a link to a lesson or level.
+
+    Also into the text of a link that has the number of its source, and not the one of the course.
+    """
     for link in model.find_inlines(document, model.Link):
         if link.mention:
             at = link.target_span.start
             yield Edit(Span(document.source, at, at), "<!-- -->")
+        elif isinstance(link.target, model.LessonTarget):
+            name = link.lesson_in_text
+            if name not in ("", link.target.id):
+                at = link.span.start + link.span.text.index(name)
+                yield Edit(Span(document.source, at, at), "<!-- -->")
 
 
 def _carry_macros(document: model.Document) -> Iterator[Edit]:

@@ -297,6 +297,7 @@ def test_a_later_cell_imports_nothing_from_the_future(tmp_path: Path) -> None:
         ("[[1]](#b) [B](#b){ data-c }\n\n## B", "[[1]](#b) [B](#b)\n\n## B"),
         ('A `<p class="row">` <i class="row b">B</i>', 'A `<p class="row">` <i>B</i>'),
         ("As [Lesson 1.1](a.md), Level 1 is.", "As [Lesson 1.1](lesson:1.1), Level <!-- -->1 is."),
+        ("On to [Lesson 1.4](a.md).", "On to [Lesson <!-- -->1.4](lesson:1.1)."),
         ("## B {#b}\n\n## C {#b}", "## B {#b}\n\n## C"),
         ("[B](javascript:c())", "B"),
         (
