@@ -62,14 +62,14 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
     myst, quarto, _, mkdocs = settings = [_read_settings(name, files) for name in names]
 
-    def find_words(*keys: str) -> str:
+    def find_setting(*keys: str) -> str:
         places = (
             (mapping, path, key) for mapping in settings for path in _TITLE_PATHS for key in keys
         )
         texts = (value_at(mapping, *path, key) for mapping, path, key in places)
         return next((" ".join(text.split()) for text in texts if isinstance(text, str)), "")
 
-    title = find_words("title", "site_name")
+    title = find_setting("title", "site_name")
     if not title and "_bookdown.yml" in files and "index.Rmd" in files:
         front_matter, _ = read_front_matter(files.read_text("index.Rmd"))
         title = str(front_matter.get("title") or "")
@@ -111,7 +111,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
             levels += (part for part in run if isinstance(part, ImportedLevel))
     return ImportedCourse(
         title=title or title_of_file(files.name),
-        summary=outline.summary or find_words("description", "site_description", "subtitle"),
+        summary=outline.summary or find_setting("description", "site_description", "subtitle"),
         language=outline.language,
         has_own_titles=True,
         substitutions=_read_substitutions(settings, files),
