@@ -190,8 +190,11 @@ def make_archives(
     if scripts:
         folder = re.sub(r"[^a-z0-9]+", "-", library.course.title.lower()).strip("-") or "course"
         yield archive(urls.EXAMPLES_ZIP, folder, scripts)
+    by_document: dict[str, list[Extraction]] = {}
+    for extraction in scripts:
+        by_document.setdefault(extraction.document, []).append(extraction)
     for lesson in library.order:
-        if of_lesson := [script for script in scripts if script.document == lesson.path]:
+        if of_lesson := by_document.get(lesson.path):
             folder = f"{lesson.id}-{lesson.slug}"
             yield archive(urls.lesson_zip_path(lesson), folder, of_lesson)
 

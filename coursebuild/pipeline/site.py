@@ -326,10 +326,8 @@ def text_of(entry: PageEntry, library: Library) -> SourceText | None:
     document = entry.document(library)
     if document is None:
         return None
-    lesson = library.lessons.get(entry.id)
-    is_lesson = lesson is not None and lesson.document is document
-    course = library.course
-    owner = next((owner for owner in course.owners if owner.document is document), None)
+    is_lesson, course = entry.kind == "lesson", library.course
+    owner = library.lessons[entry.id] if is_lesson else library.pages[entry.id]
     return SourceText.of(
         document.source, course.callout_names, lesson=is_lesson, words=course.words_of(owner)
     )

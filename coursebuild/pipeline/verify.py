@@ -40,7 +40,9 @@ from coursebuild.core.scripts.compare import verify as compare_all
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.figures import figure_findings
 from coursebuild.core.scripts.findings import script_findings
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.pipeline.held import HeldDocuments
 from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
 from coursebuild.pipeline.script_downloads import find_downloads, try_downloads
@@ -153,8 +155,6 @@ def verify(
     interpreter = options.interpreter
     engine = engine_version() if interpreter is None else interpreter.engine
     results = Results(runs, verdicts, (), models, engine, trial_results)
-    if static:
-        results = with_downloads(course, results, options, only_known=True)[0]
     labs = _lab_lines(course, trials, trial_results)
     return Verification(results, course_diagnostics, run_diagnostics, lines, labs, addresses)
 
@@ -164,7 +164,7 @@ def with_downloads(
 ) -> tuple[Results, tuple[Diagnostic, ...]]:
     """The results with what is handed over of scripts, after its trial; see `try_downloads`."""
     scripts, runs = extract(course).value, results.runs
-    downloads = results.downloads or find_downloads(course, scripts, runs, results.models, options)
+    downloads = find_downloads(course, scripts, runs, results.models, options)
     downloads, diagnostics = try_downloads(
         course, scripts, runs, results.verdicts, downloads, options, only_known=only_known
     )
@@ -265,18 +265,25 @@ class _ScriptRunner:
         broken_paths: Collection[str],
     ) -> Iterator[Diagnostic]:
         yield from check_recorded_runs(self.scripts, self.options)
-        yield from script_findings(
+        extractions = self.extracted_scripts.extractions
+        outputs = PrintedOutputs(verdicts, runs, (e.path for e in extractions))
+        store, addresses = self.options.store, self.addresses
+        held_documents = HeldDocuments(self.course, store, outputs, other_runs or {}, addresses)
+        others = held_documents.leave_out(documents)
+        findings = script_findings(
             self.course,
-            documents,
+            others,
             self.scripts,
             runs,
             verdicts,
-            self.addresses,
-            self.extracted_scripts.extractions,
+            addresses,
+            extractions,
             other_runs,
             broken_paths,
             functools.partial(find_module, self.options.root),
         )
+        held_documents.keep(others, findings)
+        yield from findings
         yield from repeat_findings(self.course, self.scripts, self.store.differing_runs)
 
 

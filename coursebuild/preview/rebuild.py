@@ -31,7 +31,7 @@ from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.output import FAILURE, fail, show
 from coursebuild.pipeline.options import Progress
 from coursebuild.pipeline.scripts import measure_sensitivity, run
-from coursebuild.pipeline.verify import verify
+from coursebuild.pipeline.verify import verify, with_downloads
 from coursebuild.preview.messages import report_now
 from coursebuild.preview.run_history import script_keys
 from coursebuild.preview.session import Session
@@ -211,6 +211,9 @@ class BackgroundRebuild:
             raise
         finally:
             session.runs.running.clear()
+        options = options.for_course(course)
+        results, _ = with_downloads(course, verification.results, options, only_known=True)
+        verification = replace(verification, results=results)
         self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once
         session.take_results(course, verification, addresses)
         with contextlib.suppress(RunStoppedError):  # they would have to run anew

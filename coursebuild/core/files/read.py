@@ -151,8 +151,11 @@ def read_records(root: Path, documents: Iterable[str]) -> dict[str, LessonRecord
     """The records of the lessons and pages that have one, by the paths of these."""
     records = {}
     for path in documents:
+        record = record_path(path)
+        if not os.path.lexists(f"{root}/{record}"):  # as most; to find that out here takes less
+            continue
         with contextlib.suppress(EffectError):
-            text = read_bytes(root, record_path(path)).decode("utf-8", "replace")
+            text = read_bytes(root, record).decode("utf-8", "replace")
             records[path] = LessonRecord.parse(text)
     return records
 

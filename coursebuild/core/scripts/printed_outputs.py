@@ -39,6 +39,10 @@ class PrintedOutputs:
         """The recorded outputs of a document, in order."""
         return self._by_document.get(document.source.path, ())
 
+    def of_script(self, path: str) -> Sequence[Verdict]:
+        """The recorded outputs of a script, in any document."""
+        return self._by_script.get(path, ())
+
     def of_binding(self, binding: model.NumberBinding) -> list[Verdict]:
         """The recorded outputs that a binding depends on; in a caption, that of the caption."""
         if binding.script is not None:
