@@ -1,6 +1,6 @@
 """Documents whose outputs and bound numbers held are not compared again until something changes.
 
-After an edit of one lesson of many, comparing the others would take longer than the edit's own.
+After an edit of one lesson of many, comparing the others would take longer than all else.
 """
 
 from __future__ import annotations
@@ -63,15 +63,15 @@ class HeldDocuments:
 
     def leave_out(self, documents: Iterable[OwnedDocument]) -> list[OwnedDocument]:
         """The documents that are to be compared; the addresses of the others are taken over."""
-        others = []
+        changed_documents = []
         for id, document in documents:
             key = self._keys[document.source.path] = self._key(id, document)
-            held = self._store.get_value(_KIND, key, _Held)
-            if held is None:
-                others.append((id, document))
+            entry = self._store.get_value(_KIND, key, _Held)
+            if entry is None:
+                changed_documents.append((id, document))
             else:
-                self._addresses |= dict(held.addresses)
-        return others
+                self._addresses |= dict(entry.addresses)
+        return changed_documents
 
     def keep(self, documents: Iterable[OwnedDocument], findings: Iterable[Diagnostic]) -> None:
         """Note that these documents held, except where something was found."""
@@ -79,8 +79,8 @@ class HeldDocuments:
         addresses = self._by_document()
         for path in (document.source.path for _, document in documents):
             if path not in found_paths:
-                held = _Held(tuple(addresses.get(path, ())))
-                self._store.put_value(_KIND, self._keys[path], held)
+                entry = _Held(tuple(addresses.get(path, ())))
+                self._store.put_value(_KIND, self._keys[path], entry)
 
     def _by_document(self) -> dict[str, list[tuple[ShownValue, tuple[Address, ...]]]]:
         by_document: dict[str, list[tuple[ShownValue, tuple[Address, ...]]]] = {}

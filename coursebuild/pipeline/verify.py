@@ -269,10 +269,10 @@ class _ScriptRunner:
         outputs = PrintedOutputs(verdicts, runs, (e.path for e in extractions))
         store, addresses = self.options.store, self.addresses
         held_documents = HeldDocuments(self.course, store, outputs, other_runs or {}, addresses)
-        others = held_documents.leave_out(documents)
+        changed_documents = held_documents.leave_out(documents)
         findings = script_findings(
             self.course,
-            others,
+            changed_documents,
             self.scripts,
             runs,
             verdicts,
@@ -282,7 +282,7 @@ class _ScriptRunner:
             broken_paths,
             functools.partial(find_module, self.options.root),
         )
-        held_documents.keep(others, findings)
+        held_documents.keep(changed_documents, findings)
         yield from findings
         yield from repeat_findings(self.course, self.scripts, self.store.differing_runs)
 

@@ -33,17 +33,17 @@ def diagnostics(folder: Folder) -> str:
     return json.dumps(json.loads(folder.main("check", "--format", "json").out)["diagnostics"])
 
 
-def kept(folder: Folder) -> set[Path]:
+def kept_entries(folder: Folder) -> set[Path]:
     return {*(folder.root / ".coursebuild/held").iterdir()}
 
 
 def test_after_an_edit_that_lesson_alone_is_compared(held_course: Folder) -> None:
-    before = kept(held_course)
+    before = kept_entries(held_course)
     third = held_course.lesson(3)
     held_course.replace(third, "It takes", "In all it takes")
     assert held_course.main("check").status == 0
-    assert len(kept(held_course) - before) == 1
-    assert before < kept(held_course)
+    assert len(kept_entries(held_course) - before) == 1
+    assert before < kept_entries(held_course)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_what_changes_beside_a_lesson_is_seen_in_it(
     held_course: Folder, path: str, old: str, new: str, places: list[str]
 ) -> None:
     held_course.write(path, held_course.text(path).replace(old, new))
-    found = diagnostics(held_course)
+    findings = diagnostics(held_course)
     shutil.rmtree(held_course.root / ".coursebuild/held")
-    assert found == diagnostics(held_course)
-    assert [place for place in places if place not in found] == [], found
+    assert findings == diagnostics(held_course)
+    assert [place for place in places if place not in findings] == [], findings
