@@ -19,6 +19,7 @@ from support.lab_page import (
     press,
     until,
     wait_for_change,
+    wait_for_condition,
     wait_until_still,
     watch_page,
 )
@@ -27,6 +28,16 @@ pytestmark = pytest.mark.browser
 
 HOLDS = "([part, whole]) => document.querySelector(part).getBoundingClientRect().right <= whole"
 ENDLESS = '<option iterations="2000000000" tolerance="0" ls_iterations="9" solver="PGS"/>'
+KEEP_BEATS = """{
+  const set = window.setInterval
+  window.beats = []
+  window.setInterval = (action, ms) => {
+    if (ms === 5000) beats.push(action)
+    return set(action, ms)
+  }
+}"""
+"""Keeps what asks a worker from time to time whether it still answers."""
+BEAT = "() => beats.at(-1)?.()"
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +45,7 @@ def page(browsers: Mapping[str, Browser], base: str) -> Iterator[Page]:
     """A phone's window, in which the lab is near."""
     with browsers["webgl"].new_context(viewport={"width": 390, "height": 800}) as context:
         page, console = watch_page(context)
+        page.add_init_script(KEEP_BEATS)
         page.goto(base + PAGE)
         lab(page, EDITED_LAB)
         yield page
@@ -313,7 +325,8 @@ def test_model_that_never_comes_to_an_end_holds_nothing_up(page: Page) -> None:
     endless = lesson.replace("<worldbody>", f"{ENDLESS}<worldbody>").replace("0 0 0.3", "0 0 0.02")
     text.fill(endless)
     press(lab_element, "Compile and run")
-    expect(lab_element.get_by_role("alert").filter(has_text="too long")).to_be_visible()
+    alert = lab_element.get_by_role("alert").filter(has_text="too long")
+    wait_for_condition(page, lambda: page.evaluate(BEAT) or alert.is_visible())
     expect(lab_element).to_have_attribute("data-state", "ended")
     text.fill(endless.replace("0 0 0.02", "0 0 0.019"))
     press(lab_element, "Compile and run")
