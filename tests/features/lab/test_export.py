@@ -181,6 +181,7 @@ def run(path: Path, *values: object) -> str:
     return process.stdout
 
 
+@pytest.mark.long
 @pytest.mark.site
 def test_scripts_that_the_site_offers_print_what_lesson_4_2_says(
     built_courses: BuiltCourses, tmp_path: Path
