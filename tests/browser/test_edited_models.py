@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
+from support.fixture_cases import fixture_text
 from support.lab_page import (
     EDITED_LAB,
     PAGE,
@@ -95,15 +96,7 @@ def test_mistakes_are_told_at_their_lines_and_a_mended_model_runs(page: Page) ->
     expect(lab_element).to_have_attribute("data-state", "playing")
 
 
-CART = """<mujoco>
-  <worldbody>
-    <camera name="behind" pos="0 -3 0" xyaxes="1 0 0 0 0 1"/>
-    <body><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1"/></body>
-  </worldbody>
-  <actuator><motor name="push" joint="slide" ctrllimited="true" ctrlrange="-4 8"/></actuator>
-  <sensor><jointpos name="place" joint="slide"/></sensor>
-  <keyframe><key name="near" qpos="0"/><key name="far" qpos="3"/></keyframe>
-</mujoco>"""
+CART = fixture_text("documents/cart.xml")
 FLOOR = '<geom name="floor" type="plane" size="2 2 1" pos="0 0 -1"/>'
 OVERFLOWING = (
     "rows => rows.filter(row => row.scrollWidth > row.clientWidth).map(row => row.innerText)"

@@ -14,42 +14,9 @@ from coursebuild.features.arithmetic.evaluate import measure
 from coursebuild.features.arithmetic.identities import check_identity
 from coursebuild.features.arithmetic.real import Real
 from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
+from support.fixture_cases import fixture_tables
 
-HOLDS = r"""
-I_{zz} = \underbrace{0.0069333 + 2\cdot0.0014222}_{\text b} + 0.0070222 = 0.0168\ \mathrm{kg\,m^2}.
-1\,000 + 2{,}500 = 3\,500
-45^\circ = \pi/4
-\left(1 + \tfrac12\right)^2 = 2.25
-0.25 \approx 0.2
-0.25 \approx 0.3
-5\cdot9.81\ \mathrm N = 49\ \mathrm N, \quad 343 = \sqrt{1.4\cdot8.314\cdot293/0.029}
-2^{53} = 9\,007\,199\,254\,740\,992
-10\ \mathrm{mm}/2\ \mathrm{ms} = 5\ \mathrm{m/s}
-\pi/\sqrt{40000\ \mathrm s^{-2}} = \pi/200\ \mathrm s = 15.7\ \mathrm{ms}
-0.5/9.81\ \mathrm m = 5.1\ \mathrm{cm}
-\begin{aligned} a &= 1 + 2 \\ &= 3 \end{aligned}
-\mathrm e^{-2} \approx 0.135, \quad \sin^2 30^\circ = 0.25
--2^2 = -4
-\sqrt[3]{8} = 2
-\lvert -3\rvert = 3 < \pi < 4
-\frac{6!}{2!\,4!} = \binom{6}{2} = \tbinom62 = 15, \quad -3!^2 = -36, \quad 0! = 1
-\sum_{k=1}^{4} k^2 + 1 = 31, \quad \sum\limits_{i=1}^3\sum_{j=1}^i i\,j = 25
-\sum_{n=0}^{10} \frac{1}{n!} \approx 2.7182818, \quad \prod_{i=1}^{5} i = 5!
-2\times10^{-6} = 2\,\mathrm{ppm}, \quad 10^{-9} = 1\,\mathrm{ppb}
-\sum_{i=1}^{3} 2^i\ \mathrm{m} = 14\ \mathrm m, \quad \sum_{i=3}^{2} i = 0
-\qty{2}{\kilo\gram}\cdot\SI{3}{m/s^2} = \qty{6}{\newton}, \quad \num{12}\cdot\num{12} = 144
-26! \approx 10^{26}, \quad 26^{25} \approx 10^{35}
-"""
-SILENT = r"""
-e = 1
-x \in [0, 1]
-\ddot\theta = -\frac g\ell \sin\theta
-\delta(0) = 0
-\exp\tfrac12\boldsymbol\Omega = 1
-\sum_i m_i = 3
-\sum_{i=1}^{3} m_i = 3
-\sum_{i=1}^\infty i^{-2} = \tfrac16\pi^2
-"""
+CHAINS = fixture_tables("chains")
 TOKENS = (
     r"0 1 2.5 , . + - * / ^ _ { } ( ) [ ] | = < & \\ \frac \sqrt \sin \pi \cdot \mathrm{kg} \int"
     r" \ell g m v \dot x t T \approx \omega_0 \mathrm{d}"
@@ -60,7 +27,7 @@ TOKENS = (
 def test_correct_arithmetic_passes_and_symbols_are_not_checked() -> None:
     failures = [
         (tex, comparisons)
-        for texts, is_compared in ((HOLDS, True), (SILENT, False))
+        for texts, is_compared in ((CHAINS["holds"], True), (CHAINS["silent"], False))
         for tex in texts.strip().splitlines()
         for comparisons in (check_arithmetic(tex),)
         if bool(comparisons) is not is_compared or any(c.kind != "holds" for c in comparisons)
@@ -195,22 +162,9 @@ def test_deep_nesting_is_not_understood() -> None:
         assert comparison.message == "it is too long"
 
 
-IDENTITIES = r"""
-\sin 2x = 2\sin x\,\cos x
-\frac{\mathrm d}{\mathrm dx}\,\frac{x}{1 + x^2} = \frac{1 - x^2}{(1 + x^2)^2}
-\frac{\mathrm d\,x^3}{\mathrm dx} = 3x^2
-\int_0^x \cos x\,\mathrm dx = \sin x
-\int x\,\mathrm e^{x}\,\mathrm dx = (x - 1)\,e^x
-\int_{-1}^1 \sqrt{1 - x^2}\,\mathrm dx = \tfrac12\pi
-(x^2)^{1/2} = |x|
-\frac{\mathrm d}{\mathrm dx} \int_0^{x^2} \sin(x)\,\mathrm dx = 2x\,\sin(x^2)
-\sum_{k=0}^{3} \binom{3}{k}\,x^k = (1 + x)^3
-x! = x\,(x - 1)!
-"""
-
-
 def test_identities_hold() -> None:
-    failures = [list(check_identity(tex, {"x": ()})) for tex in IDENTITIES.strip().splitlines()]
+    texts = CHAINS["identities"].strip().splitlines()
+    failures = [list(check_identity(tex, {"x": ()})) for tex in texts]
     assert failures == [[]] * len(failures)
 
 
@@ -248,106 +202,18 @@ KNOWN = symbols(
     ("x", "m", ""),
     ("t", "s", ""),
 )
-COMPUTED = r"""
-T = 2\pi\sqrt{\frac{\ell}{g}} \approx 2.006
-2\pi\sqrt{\ell/g} = 2\pi\sqrt{1/9.81} = 2.006\ \mathrm s
-T = 2\pi\sqrt{\ell/g} \approx 2006\ \mathrm{ms}
-T \approx 2\pi\sqrt{\ell/g} \approx 2
-E = \tfrac12 m v^2 = 19.6\ \mathrm J
-m g \ell = \frac12 m v^2
-\omega_0 = \sqrt{g/\ell}
-\omega_{0}^2\,\ell = 9.8
-\theta = 30^\circ
-\theta = 30
-\sin\theta = 0.5
-h = 2.0 \times 10^{-3}
-h = 2\ \mathrm{ms}
-m_\text{eff}/m = m_{\text{eff}}/m = 25\,\%
-\frac{v^2}{2 g \ell} - 1 \approx 0.02\,\%
-\tfrac12g\,(0.1\ \mathrm s)^2 = 49.05\ \mathrm{mm}
-g\,(0.1\ \mathrm s)^2 = 0.0981\ \mathrm m
-(2 + 1)(0.5) = 1.5
-"""
-WRONG = r"""
-26^{25} \approx 10^{34}
-T = 2\pi\sqrt{\ell/g} \approx 2.060
-2\pi\sqrt{\ell/g} = 2\pi\sqrt{1/9.91}
-T = 2\pi\sqrt{\ell/g} \approx 2.006\ \mathrm m
-m g \ell = \frac12 m v
-\omega_0 = \sqrt{g/\ell} + 0.1\ \mathrm{rad/s}
-m g \ell = m v^2
-h = 2.0 \times 10^{-4}
-\theta = 31
-m_\text{eff}/m = 20\,\%
-E = m v
-x = v\,t + \ell\,t
-\sin t = 1
-\dot x = \ell
-\frac{\mathrm dx}{\mathrm dt} = x
-x < 2\ \mathrm s
-"""
-NOT_JUDGED = r"""
-x = v\,t
-\ddot x = g
-\frac{\mathrm dx}{\mathrm dt} = v
-E \propto v
-m > 3
-x = 1 + t
-E = 9.81\,m
-y = v + x
-x \to 0
-"""
-DOUBTFUL = r"""
-2(3)(0.5) = 3
-9.81(2) = 9.81
-\prod_{k=1}^3 k\cdot 2 = 12
-\prod_{k=1}^3 k\ \mathrm m = 6\ \mathrm m
-200\ \mathrm g + 10\,\% = 220\ \mathrm g
-1\ \mathrm{Hz} = 1\ \mathrm{rad/s}
-3\,\mathrm h(2) = 6
-7 + 8 = 3 \quad(\mathrm{mod}\ 12)
-1 + 1 = 3, \quad \text{which is false}
-"""
 
 
 def test_a_form_with_two_readings_is_not_judged() -> None:
-    for tex in DOUBTFUL.strip().splitlines():
+    for tex in CHAINS["doubtful"].strip().splitlines():
         assert {c.kind for c in check_arithmetic(tex)} <= {"unread"}, tex
     thousands = check_arithmetic("1.250 + 500 = 1.750", comma=True)
     assert {c.kind for c in thousands} <= {"unread"}
     assert {c.kind for c in check_arithmetic("1.250 + 500 = 1.750")} == {"wrong"}
 
 
-ROUNDED = r"""
-\frac{1}{2\pi\cdot 10^4\cdot 10^{-7}} = 159\ \mathrm{Hz}
-230\sqrt2 = 325
-2/3 = 67\,\%
-37\,^\circ\mathrm C = 310\ \mathrm K
-10^5\ \mathrm{Pa} = 750\ \mathrm{mmHg}
-1\ \mathrm{pc} = 206265\ \mathrm{au}
-1\ \mathrm{MB} = 1024\ \mathrm{KB}
-1\ \mathrm{GB} = 1000\ \mathrm{MB}
-"""
-WRONGLY_ROUNDED = r"""
-230\sqrt2 = 326
-2/3 = 76\,\%
-\sqrt{10} = 3
-2^{10} = 1000
-99/2 = 50
-37\,^\circ\mathrm C = 311\ \mathrm K
-1\ \mathrm{in} = 25\ \mathrm{mm}
-2\ \mathrm{MB} = 3000\ \mathrm{KB}
-"""
-COMMAS_OF_TWO_READINGS = r"""
-0,(3) = \frac13
-0{,}1(6) = \frac16
-2.3.5 = 30
-2.3 = 6
-"""
-
-
 def test_what_no_decimal_can_hold_is_rounded_after_an_equals_sign() -> None:
-    for texts, kind in ((ROUNDED, "holds"), (WRONGLY_ROUNDED, "wrong")):
+    for texts, kind in ((CHAINS["rounded"], "holds"), (CHAINS["wrongly_rounded"], "wrong")):
         for tex in texts.strip().splitlines():
             assert {c.kind for c in check_arithmetic(tex)} == {kind}, tex
 
@@ -366,14 +232,18 @@ def test_how_many_one_is_of_a_word_is_said_and_not_computed() -> None:
 
 
 def test_periods_and_points_between_factors_are_not_judged_beside_commas() -> None:
-    for tex in COMMAS_OF_TWO_READINGS.strip().splitlines():
+    for tex in CHAINS["commas_of_two_readings"].strip().splitlines():
         assert {c.kind for c in check_arithmetic(tex, comma=True)} <= {"unread"}, tex
     assert {c.kind for c in check_arithmetic("2,5 + 1 = 3,6", comma=True)} <= {"unread"}
     assert {c.kind for c in check_arithmetic(r"2{,}5 + 1 = 3{,}6", comma=True)} == {"wrong"}
 
 
 def test_symbols_with_values_are_computed_and_units_compared() -> None:
-    for texts, expected in ((COMPUTED, {"holds"}), (WRONG, {"wrong"}), (NOT_JUDGED, set())):
+    for texts, expected in (
+        (CHAINS["computed"], {"holds"}),
+        (CHAINS["wrong"], {"wrong"}),
+        (CHAINS["not_judged"], set()),
+    ):
         for tex in texts.strip().splitlines():
             kinds = {c.kind for c in check_arithmetic(tex, KNOWN)}
             kinds -= {"holds"} if expected == {"wrong"} else set()

@@ -14,6 +14,7 @@ import pytest
 
 from coursebuild.features.importer.convert import ConvertedCourse
 from support.converted_folder import account_of, convert_files
+from support.fixture_cases import fixture_text
 
 Construct = tuple[str, str, str]
 """What the account calls it; the column it is counted in; and how it is written."""
@@ -255,19 +256,7 @@ DOCUSAURUS: list[Construct] = [
     ("component", LEFT, "<Figure src='/p.png' caption=\"It's we13\" />"),
     ("link", CHANGED, "{/* we14 */}\n\n[a](./two.md)"),
 ]
-TARGETS = """(here)=
-## Here
-
-```{figure} p.png
-:name: fig-one
-A figure.
-```
-
-```{math}
-:label: energy
-E
-```
-"""
+TARGETS = fixture_text("documents/targets.md")
 """What roles refer to."""
 MORE: dict[str, dict[str, str]] = {
     "myst": {

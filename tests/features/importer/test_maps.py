@@ -7,6 +7,7 @@ from pathlib import Path
 
 from coursebuild.features.importer.convert import convert
 from coursebuild.features.importer.source_files import SourceFiles
+from support.fixture_cases import fixture_text
 
 Outline = list[tuple[str, list[str]]]
 """The titles of levels, each with those of its lessons; `?` behind one that is only planned."""
@@ -59,25 +60,7 @@ def test_a_book_of_gitbook_says_where_its_summary_is(tmp_path: Path) -> None:
     assert [message[:14] for message in left] == ["not taken for "]
 
 
-SUMMARY = r"""# Summary
-
-[Before](before.md)
-
-- [Zeta \[1\]](zeta.md)
-    - [Below `z`](deep/below.md)
-        - [Further below](deep/further.md)
-- [Alone](alone.md)
-
-# Second part
-
-* [Alpha](<alpha.md>)
-- [To be written]()
-- [Lost](lost.md)
-
----
-
-[After](after.md)
-"""
+SUMMARY = fixture_text("documents/summary.md")
 
 
 def test_summary_of_mdbook_is_the_map(tmp_path: Path) -> None:
@@ -104,22 +87,7 @@ def test_summary_of_gitbook_has_parts_as_headings_of_level_2(tmp_path: Path) -> 
     assert outline == [("Lessons", ["Start"]), ("Part", ["B", "A"])]
 
 
-SIDEBARS = """
-// The order of the docs.
-module.exports = {
-  docs: [
-    'intro', // a comment
-    {
-      type: 'category',
-      label: "The basics",
-      link: {type: 'doc', id: 'basics/start'},
-      items: ['basics/z', {type: 'doc', id: 'basics/a', label: 'A'},],
-    },
-    {Short: ['gone', 'last']},
-    {type: 'link', label: 'Elsewhere', href: 'https://example.org'},
-  ],
-};
-"""
+SIDEBARS = fixture_text("scripts/sidebars.js")
 CONFIG = "module.exports = {\n  title: 'A site',\n}\n"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.features.importer.pandoc_tables import rewrite_tables
+from support.fixture_cases import fixture_text
 
 
 def rewrite(text: str) -> str:
@@ -18,31 +19,8 @@ def rewrite(text: str) -> str:
     return "\n".join(line for line in new.split("\n") if line.strip("> "))
 
 
-GRID = """\
-+--------+------------+
-| Fruit  | Advantages |
-+:======:+===========:+
-| Banana | - wrapped  |
-|        | - bright   |
-+--------+------------+
-| Lemon, | a \\| b     |
-| yellow |            |
-|        | second     |
-+--------+------------+
-"""
-LONG = """\
--------------------------------------------
- Centered   Default           Right Left
-  Header    Aligned         Aligned Aligned
------------ ------- --------------- -------
-   First    row                12.0 Example
-                                    of two
-
-  Second    row                 5.0 Here
--------------------------------------------
-
-Table: Lines of rows.
-"""
+GRID = fixture_text("documents/grid_table.md")
+LONG = fixture_text("documents/long_table.md")
 
 
 def test_a_grid_has_its_sides_items_and_paragraphs() -> None:

@@ -10,26 +10,13 @@ from typing import Any
 import pytest
 
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
+from support.fixture_cases import fixture_text
 from support.lab_lessons import course, fence
 from support.sandboxes import require_sandbox
 
 pytestmark = pytest.mark.engine
 
-SCRIPT = """
-import types
-def load():
-    return types.SimpleNamespace(qpos=None), None
-def start(*state): pass
-def step(model, data, *rest): pass
-def report(*state): pass
-def simulate(model, data, *rest): pass
-def readouts(*state):
-    return [("answer", {value}, "")]
-def main():
-    {code}
-    readings = types.SimpleNamespace(tobytes=lambda: b"")
-    simulate(None, types.SimpleNamespace(qpos=readings, qvel=readings, act=readings))
-"""
+SCRIPT = fixture_text("scripts/lab_in_short.txt")
 """What a script of a lab defines, in short."""
 FORGERY = """import os; os.write(3, b'{"error": "", "start": "forged"}\\n'); os._exit(0)"""
 """Answers in the place of the child."""
