@@ -43,7 +43,7 @@ from coursebuild.features.lab.javascript import UntranslatableError
 from coursebuild.features.lab.trial import Engines
 from coursebuild.pipeline.options import Options
 from support.built_sites import BuiltCourses
-from support.fixture_cases import Case, check_cases, fixture_text
+from support.fixture_cases import Case, check_cases, fixture_tables, fixture_text
 from support.lab_values import Bench, make_lab, try_labs
 from support.made_courses import make_course
 
@@ -331,25 +331,7 @@ def test_values_are_those_of_v8(v8: Isolate, engine: EngineDescription, code: st
     assert math.isclose(ctx.n, theirs, rel_tol=1e-9, abs_tol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        "ctx.n ??= 3; ctx.n ??= 4",
-        "ctx.n = (ctx.k ?? 0.5) + [2, 3].map((a, i) => a * i).reduce((a, b) => a + b, 0)",
-        "const f = (a, b) => a - b; ctx.n = f(data.qpos[0], f(1, 2))",
-        "ctx.n = 0; const add = (a) => { if (a < 0) return 9; ctx.n += a; return 1 }"
-        "; ctx.v = add(4) + add(-1); ctx.n += ctx.v",
-        "let n = 1; const twice = () => { n *= 2 }; twice(); twice(); ctx.n = n",
-        "const [, b, c] = [5, 6, 7, 8]; ctx.n = 10 * b + c",
-        "ctx.n = 0; [4, 5].forEach((x, i) => { ctx.n += x * (i + 1) })",
-        "ctx.n = Math.max(...Array.from({length: 3}, (_, i) => data.qpos[i % 2] * i))",
-        "const m = [[1, 2], [3, 4]]; ctx.n = m.map((row) => row[1]).reduce((a, b) => a * b, 1)",
-        "ctx.n = Math.hypot(...Array.from(data.qpos).map(Math.abs))",
-        "ctx.k = null; ctx.n = ctx.k === null ? 1 : 2",
-        "ctx.k = 0; ctx.n = ctx.k === null ? 1 : 2",
-        "ctx.n = Math.fround(0.1)",
-    ],
-)
+@pytest.mark.parametrize("code", fixture_tables("javascript")["functions"])
 def test_functions_and_arrays_do_what_they_do_in_v8(
     v8: Isolate, engine: EngineDescription, code: str
 ) -> None:
