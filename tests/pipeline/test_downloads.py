@@ -8,8 +8,12 @@ import sys
 import zipfile
 from pathlib import Path
 
+import pytest
+
 from support.fixture_cases import fixture_text
 from support.scratch_course import Make, block
+
+pytestmark = pytest.mark.site
 
 MODEL = '<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>\n'
 HELPED = """\

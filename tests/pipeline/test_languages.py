@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
+
 from support.archives import entries
 from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, Make
+
+pytestmark = pytest.mark.site
 
 FRENCH = fixture_text("documents/french.md")
 
