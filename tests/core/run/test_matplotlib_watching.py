@@ -16,8 +16,6 @@ from matplotlib.figure import Figure
 from coursebuild.core.run.matplotlib_watching import describe_figure
 from coursebuild.core.scripts.figure_data import FigureData, describe_data_difference
 
-pytestmark = pytest.mark.site
-
 T = np.linspace(0.1, 4, 50)
 GRID = np.meshgrid(T, T)
 Draw = Callable[[Figure], Any]
