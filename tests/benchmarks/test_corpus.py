@@ -18,20 +18,9 @@ from benchmarks.corpus import (
 )
 from benchmarks.foreign.courses import examine, import_course, write_plain_course
 from benchmarks.foreign.packages import PackageError, texts_of
+from support.fixture_cases import fixture_text
 
-TEXT = """---
-layout: page
----
-# A falling ball
-
-It falls **fast. See [the rest](missing.md) and [more](missing.md).
-
-<b>Not closed
-
-```python
-print("no words of prose")
-```
-"""
+TEXT = fixture_text("documents/foreign.md")
 PACKAGE = "pypi:ball==1.0"
 
 

@@ -11,6 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
+from support.fixture_cases import fixture_text
 from support.lab_page import (
     EDITED_LAB,
     PAGE,
@@ -19,6 +20,7 @@ from support.lab_page import (
     press,
     until,
     wait_for_change,
+    wait_for_condition,
     wait_until_still,
     watch_page,
 )
@@ -27,6 +29,16 @@ pytestmark = pytest.mark.browser
 
 HOLDS = "([part, whole]) => document.querySelector(part).getBoundingClientRect().right <= whole"
 ENDLESS = '<option iterations="2000000000" tolerance="0" ls_iterations="9" solver="PGS"/>'
+KEEP_BEATS = """{
+  const set = window.setInterval
+  window.beats = []
+  window.setInterval = (action, ms) => {
+    if (ms === 5000) beats.push(action)
+    return set(action, ms)
+  }
+}"""
+"""Keeps what asks a worker from time to time whether it still answers."""
+BEAT = "() => beats.at(-1)?.()"
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +46,7 @@ def page(browsers: Mapping[str, Browser], base: str) -> Iterator[Page]:
     """A phone's window, in which the lab is near."""
     with browsers["webgl"].new_context(viewport={"width": 390, "height": 800}) as context:
         page, console = watch_page(context)
+        page.add_init_script(KEEP_BEATS)
         page.goto(base + PAGE)
         lab(page, EDITED_LAB)
         yield page
@@ -83,15 +96,7 @@ def test_mistakes_are_told_at_their_lines_and_a_mended_model_runs(page: Page) ->
     expect(lab_element).to_have_attribute("data-state", "playing")
 
 
-CART = """<mujoco>
-  <worldbody>
-    <camera name="behind" pos="0 -3 0" xyaxes="1 0 0 0 0 1"/>
-    <body><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1"/></body>
-  </worldbody>
-  <actuator><motor name="push" joint="slide" ctrllimited="true" ctrlrange="-4 8"/></actuator>
-  <sensor><jointpos name="place" joint="slide"/></sensor>
-  <keyframe><key name="near" qpos="0"/><key name="far" qpos="3"/></keyframe>
-</mujoco>"""
+CART = fixture_text("documents/cart.xml")
 FLOOR = '<geom name="floor" type="plane" size="2 2 1" pos="0 0 -1"/>'
 OVERFLOWING = (
     "rows => rows.filter(row => row.scrollWidth > row.clientWidth).map(row => row.innerText)"
@@ -313,7 +318,8 @@ def test_model_that_never_comes_to_an_end_holds_nothing_up(page: Page) -> None:
     endless = lesson.replace("<worldbody>", f"{ENDLESS}<worldbody>").replace("0 0 0.3", "0 0 0.02")
     text.fill(endless)
     press(lab_element, "Compile and run")
-    expect(lab_element.get_by_role("alert").filter(has_text="too long")).to_be_visible()
+    alert = lab_element.get_by_role("alert").filter(has_text="too long")
+    wait_for_condition(page, lambda: page.evaluate(BEAT) or alert.is_visible())
     expect(lab_element).to_have_attribute("data-state", "ended")
     text.fill(endless.replace("0 0 0.02", "0 0 0.019"))
     press(lab_element, "Compile and run")

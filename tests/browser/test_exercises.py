@@ -20,6 +20,19 @@ from support.lab_page import press, until, wait_for_condition, watch_page
 pytestmark = pytest.mark.browser
 
 ADDRESS = "lessons/1.1-one.html"
+HURRY = """() => {
+  const set = window.setTimeout
+  window.setTimeout = (action, ms) => set(action, ms === 10_000 ? 500 : ms)
+  return () => { window.setTimeout = set }
+}"""
+"""Shortens the patience with a trial; gives what makes it long again."""
+REACH = """const errors = []
+for (const read of [
+  () => fetch, () => indexedDB, () => caches, () => navigator, () => XMLHttpRequest, () => WebSocket
+]) {
+  try { read() } catch (error) { errors.push(error.message.replace(" is not defined", "")) }
+}
+throw new Error(errors.join(" ") + " is not defined")"""
 HOLDS = "document.documentElement.scrollWidth <= window.innerWidth"
 
 
@@ -93,7 +106,7 @@ def test_the_start_is_seen_before_anything_runs(
 def pytest_of(path: Path) -> tuple[int, str]:
     """The exit status and the output of `pytest` on a file, as a reader without plugins runs it."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", path.name]
-    plain = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    plain = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "TMPDIR": str(path.parent)}
     process = subprocess.run(command, cwd=path.parent, env=plain, capture_output=True, text=True)
     return process.returncode, process.stdout
 
@@ -151,22 +164,23 @@ def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None
     press(neighbour, "Play")
     expect(neighbour).to_have_attribute("data-state", "playing")
     hold, text = exercise(page, "Hold it")
+    unhurried = page.evaluate_handle(HURRY)
     text.fill("for (;;) {}")
     press(hold, "Check")
     expect(hold.get_by_role("alert").filter(has_text="took too long")).to_be_visible()
+    unhurried.evaluate("end => end()")
     for mistake, message in (
         ("data.qpos[0] = ", "Unexpected token"),
         ("}) => {}, ({", ""),
-        ("return 1 +", "Unexpected token"),
     ):
         text.fill(mistake)
         press(hold, "Check")
         expect(hold.get_by_role("alert").filter(has_text=message)).to_be_visible()
         expect(text).to_have_attribute("aria-invalid", "true")
-    for reach in ("fetch", "indexedDB", "caches", "navigator", "XMLHttpRequest", "WebSocket"):
-        text.fill(f"{reach}.x = 1")
-        press(hold, "Check")
-        expect(verdicts(hold).last).to_contain_text(f"ReferenceError: {reach} is not defined")
+    text.fill(REACH)
+    press(hold, "Check")
+    absent = "fetch indexedDB caches navigator XMLHttpRequest WebSocket is not defined"
+    expect(verdicts(hold).last).to_contain_text(f"Error: {absent}")
     # Of another size of the model the page would die.
     for attempt, message in (("model.nv = 1e9", "only a getter"), ('import("x")', "was seen")):
         text.fill(attempt)

@@ -38,15 +38,7 @@ ServiceWorker.prototype.postMessage = function (...message) {
 }
 """
 SLOW_STORE = fixture_text("scripts/slow_store.js")
-QUIET = """async () => {
-  // The worker answers one after the other: when this is answered, everything before it is done.
-  const { active } = await navigator.serviceWorker.ready
-  const { port1, port2 } = new MessageChannel()
-  const done = new Promise((told) => { port1.onmessage = ({ data }) => data.end && told(data) })
-  const asked = { pages: [location.href], uses: [], keep: 'auto', sparing: false, look: false }
-  active.postMessage({ coursebuild: 'visit', ...asked }, [port2])
-  return done
-}"""
+QUIET = fixture_text("scripts/quiet_worker.js")
 
 
 @pytest.fixture(scope="module")

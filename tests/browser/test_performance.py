@@ -49,22 +49,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 # Put before the worker's script: whoever asks the worker is shown the engine's memory. A large
 # block is put behind all that is in use, so that its address rises with what was not given back.
-REVEAL = """{
-  const { Instance } = WebAssembly
-  WebAssembly.Instance = new Proxy(Instance, {
-    construct(target, rest) {
-      const made = new target(...rest)
-      self.engineMemory = () => {
-        const { malloc, free, memory } = made.exports
-        const block = malloc(1 << 20)
-        free(block)
-        return [memory.buffer.byteLength, block]
-      }
-      return made
-    },
-  })
-}
-"""
+REVEAL = fixture_text("scripts/reveal_memory.js")
 
 # The page's own script does not know the copy, and mounts nothing in it.
 COPY = """(number) => {

@@ -12,6 +12,7 @@ from playwright.sync_api import BrowserContext, Locator, Page, expect
 from support.axe import violations
 from support.built_sites import Site
 from support.chromium import OpenAddress
+from support.fixture_cases import fixture_text
 from support.lab_page import becomes, until, wait_until_settled
 
 pytestmark = pytest.mark.browser
@@ -124,15 +125,7 @@ def test_escape_closes_and_the_focus_goes_back(open_address: OpenAddress, site: 
     expect(page.locator(".search-open")).to_be_focused()
 
 
-SEARCH_AGAIN = """async (query) => {
-  const dialog = document.querySelector('.search-dialog')
-  dialog.close()
-  document.querySelector('.search-open').click()
-  while (!dialog.open) await null
-  const field = document.querySelector('#_search-field')
-  field.value = query
-  field.dispatchEvent(new InputEvent('input'))
-}"""
+SEARCH_AGAIN = fixture_text("scripts/search_again.js")
 """Close, open and type before the browser gets to tell that the dialog was closed."""
 
 

@@ -44,6 +44,7 @@ def page(browsers: Mapping[str, Browser]) -> Iterator[Page]:
         assert len(addresses) == 1
 
 
+@pytest.mark.long
 def test_play_moves_the_body_of_a_lab_in_a_page_from_disk(
     export: Callable[[str], Path], page: Page
 ) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, CDPSession, Page
 
+from support.fixture_cases import fixture_text
 from support.lab_page import MOUNT, PAGE, SWING, until, wait_for_condition, wake, watch_page
 
 pytestmark = pytest.mark.browser
@@ -20,16 +21,7 @@ Phone = tuple[Page, "Fingers", list[str]]
 
 
 PICTURE = "() => new Promise((done) => requestAnimationFrame(() => done()))"
-RESTS = """(n) => new Promise((done) => {
-  let [top, same] = [NaN, 0]
-  const look = () => {
-    same = window.scrollY === top ? same + 1 : 0
-    top = window.scrollY
-    if (same > n) done()
-    else requestAnimationFrame(look)
-  }
-  look()
-})"""
+RESTS = fixture_text("scripts/rests.js")
 """Done when the page has not scrolled for some pictures."""
 
 

@@ -118,6 +118,7 @@ def test_every_mistake_on_the_page_has_its_message() -> None:
     assert [lesson for lesson, _ in MESSAGES] == [x for x in LESSONS if x.value("error")]
 
 
+@pytest.mark.long
 def test_every_right_example_builds(course: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Together, as lessons 1.2, 1.3 and so on of one course, without even a warning."""
     right = [fence for fence in LESSONS if not fence.value("error")]

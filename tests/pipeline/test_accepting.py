@@ -9,6 +9,7 @@ import signal
 import pytest
 
 from coursebuild.core.files.locks import project_lock
+from support.fixture_cases import fixture_text
 from support.preview_process import Events, serve_preview
 from support.scratch_course import GOOD, WAIT_FOR_GO, Make, block
 
@@ -192,19 +193,7 @@ def test_one_click_accepts_an_output_and_all_numbers_at_their_addresses(make: Ma
     assert folder.text(folder.lesson(2)) == again
 
 
-HESITANT = """
-import sys, threading, time
-from coursebuild.cli import main
-from coursebuild.core.scripts import bindings
-check = bindings._check
-def check_late(bound):
-    result = check(bound)
-    if threading.current_thread() is threading.main_thread():
-        time.sleep(0.3)
-    return result
-bindings._check = check_late
-sys.exit(main(sys.argv[1:]))
-"""
+HESITANT = fixture_text("scripts/hesitant.txt")
 """The command with a pause between looking a value up and remembering where it is printed."""
 
 

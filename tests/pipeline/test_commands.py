@@ -12,6 +12,7 @@ import pytest
 
 from coursebuild import __version__
 from coursebuild.cli.commands import known_commands
+from support.fixture_cases import fixture_tables
 from support.run_code import run_code
 from support.scratch_course import (
     DRIFTED_LESSON,
@@ -82,72 +83,12 @@ def test_commands_one_after_the_other_leave_a_process_as_it_was(make: Make) -> N
     assert gc.get_freeze_count() <= frozen  # frozen objects may have been freed
 
 
-WRONG_USAGE = [
-    ("", "usage: coursebuild [-C DIR] COMMAND ...\n\nBuild a course"),
-    ("zip", "coursebuild: there is no command `zip`; `coursebuild help` lists them\n"),
-    ("buidl", "coursebuild: there is no command `buidl`; did you mean `build`?\n"),
-    ("help stabiliti", "coursebuild: there is no command `stabiliti`; did you mean `stability`?\n"),
-    (
-        "-q check",
-        "coursebuild: `-q` is not a command; options come after it, and `-C` takes a folder\n",
-    ),
-    ("check --frob=1", "no option `--frob`; `coursebuild check --help` lists them\n"),
-    ("check --quite", "coursebuild: there is no option `--quite`; did you mean `--quiet`?\n"),
-    ("chek", "there is no command `chek`; did you mean `check`?"),
-    ("check --form json", "there is no option `--form`"),
-    ("check --format yaml", "invalid choice: 'yaml'"),
-    ("build extra", "unrecognized arguments: extra"),
-    ("extract --jobs 2", "there is no option `--jobs`"),
-    ("check --jobs 0", "'0' is not a number of jobs: a whole number from 1"),
-    ("check --jobs -1", "'-1' is not a number of jobs"),
-    ("check --jobs 2.5", "'2.5' is not a number of jobs"),
-    ("check --jobs ²", "'²' is not a number of jobs"),
-    ("check --jobs 1025", "'1025' is not a number of jobs"),
-    ("serve --port 65536", "'65536' is not a port"),
-    ("serve --port http", "'http' is not a port"),
-    (
-        "schema nosuch",
-        "there is no schema 'nosuch': choose from course, exercise, lab, lab-ode, lab-plot, model, "
-        "quiz",
-    ),
-    ("-C", "`-C` takes a folder"),
-    ("check -C", "expected one argument"),
-    ("check -C no/such", "there is no folder no/such"),
-    ("-C no/such check", "there is no folder no/such"),
-    ("-C content/course.toml check", "content/course.toml is not a folder"),
-    ("check 1.2", "no lesson or page is called `1.2`; known: `1.1`"),
-    ("check oen", "no lesson or page is called `oen`; did you mean `one`?"),
-    ("update 1.1 9.9.9", "no lesson or page is called `9.9.9`"),
-    ("check planned", "lesson 1.77 is planned, so there is nothing in it yet"),
-    ("check --sensitivity --against 3.13.0", "--sensitivity"),
-    (
-        "check --shard two",
-        "coursebuild: --shard: 'two' is not a part of the work; write 2/8 for the second of 8\n",
-    ),
-    (
-        "check --timings x",
-        "coursebuild: --timings says how `--shard` divides the work: it needs `--shard`\n",
-    ),
-    (
-        "check --cache-size much",
-        "coursebuild: --cache-size: 'much' is not a size: a whole number, ",
-    ),
-    ("check --cache-size -1", "--cache-size"),
-    ("check --cache gopher://x/y", "gopher"),
-    ("check --cache=", "coursebuild: --cache needs a place\n"),
-    ("build --out .", " is the project itself"),
-    ("build --out ..", " holds the project"),
-    ("build --out content/site", "content/site lies in content/ of the project"),
-    ("build --out content/course.toml", "course.toml"),
-]
-
-
 def test_wrong_usage_gives_2_and_touches_nothing(make: Make) -> None:
     folder = make(GOOD)
     planned = '[[level.lesson]]\nid = "1.77"\nslug = "planned"\ntitle = "P"\nstatus = "planned"\n'
     folder.write(MAP, f"{folder.text(MAP)}\n{planned}")
     before = folder.tree("content")
-    for arguments, says in WRONG_USAGE:
+    for arguments, says in fixture_tables("usage")["wrong"]:
         result = folder.main(*arguments.split())
         assert (result.status, result.out) == (2, ""), arguments
         assert says in result.err, arguments

@@ -8,7 +8,12 @@ import sys
 import zipfile
 from pathlib import Path
 
+import pytest
+
+from support.fixture_cases import fixture_text
 from support.scratch_course import Make, block
+
+pytestmark = pytest.mark.site
 
 MODEL = '<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>\n'
 HELPED = """\
@@ -76,17 +81,7 @@ def test_what_a_page_hands_over_runs_alone_or_has_no_button(make: Make, tmp_path
     assert 'astray.py" download' in folder.text("public/lessons/1.1-one.html")
 
 
-STYLED = """\
-import matplotlib
-import mujoco
-import yaml.nodes
-
-from mjcourse import model_path, spatial
-
-path = (lambda name: model_path(name))("arm")
-model = mujoco.MjModel.from_xml_path(str(path))
-print(model.ngeom, spatial.__name__, matplotlib.rcParams["font.size"])
-"""
+STYLED = fixture_text("scripts/styled.txt")
 ABSENT = "import os.path\nimport torch.nn\n"
 ARM = "<mujoco><include file='part.xml'/></mujoco>\n"
 PART = "<mujocoinclude><worldbody><geom size='.1'/></worldbody></mujocoinclude>\n"

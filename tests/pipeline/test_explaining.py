@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.text.rules import RULES
+from support.fixture_cases import fixture_text
 from support.scratch_course import HELLO, ROOT, Folder, Make, block
 
 pytestmark = pytest.mark.site
@@ -267,21 +268,7 @@ def test_explain_what_cannot_be_explained_gives_2(course: Folder) -> None:
     assert (result.status, result.err) == (2, f"coursebuild: {message}\n")
 
 
-PACKAGE_SCRIPT = """
-import os
-from pathlib import Path
-
-import mjcourse
-from pkg.part import word
-
-try:
-    import torch
-except ImportError:
-    pass
-Path("runs/a").mkdir(parents=True, exist_ok=True)
-Path("runs/a/word.txt").write_text(word)
-print(word, mjcourse.__name__, mjcourse.OWN, os.environ["FAST"])
-"""
+PACKAGE_SCRIPT = fixture_text("scripts/uses_package.txt")
 
 
 def test_scripts_import_from_the_folders_of_the_course(make: Make) -> None:

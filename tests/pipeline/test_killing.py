@@ -100,7 +100,14 @@ def part(tree: dict[str, bytes], top: str) -> dict[str, bytes]:
     return {name: data for name, data in tree.items() if name.startswith(top)}
 
 
-@pytest.mark.parametrize("mortals", [True, False], ids=["exchange", "two renames"], indirect=True)
+@pytest.mark.parametrize(
+    "mortals",
+    [
+        pytest.param(True, id="exchange"),
+        pytest.param(False, id="two renames", marks=pytest.mark.long),
+    ],
+    indirect=True,
+)
 def test_build_killed_at_any_call_leaves_old_or_new_site(
     make: Make, mortals: Mortals, tmp_path: Path
 ) -> None:
@@ -143,6 +150,7 @@ def test_build_killed_at_any_call_leaves_old_or_new_site(
         assert (folder.tree(), trials.leftovers()) == (new, []), moment
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fault", ["files", pytest.param("memory", marks=pytest.mark.slow)])
 def test_build_without_files_or_memory_says_so_and_leaves_old_or_new_site(
     make: Make, mortals: Mortals, tmp_path: Path, fault: str
@@ -233,6 +241,7 @@ def test_adopting_killed_at_any_call_leaves_old_or_new_lesson(
         assert (trials.folder.tree(), trials.leftovers()) == (new, []), place
 
 
+@pytest.mark.long
 def test_import_killed_at_any_call_is_completed_by_the_same_command(
     mortals: Mortals, tmp_path: Path
 ) -> None:

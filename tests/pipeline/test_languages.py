@@ -2,32 +2,15 @@
 
 from __future__ import annotations
 
+import pytest
+
 from support.archives import entries
+from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, Make
 
-FRENCH = """\
-## Chute
+pytestmark = pytest.mark.site
 
-Voir la leçon 1.1, ou les leçons 1.1 à 1.3.
-
-Tableau : Les valeurs. {#tab:values}
-
-| a |
-| - |
-| 1 |
-
-Par [](#thm:euler) et [](lesson:1.1#thm:first), dans [](#tab:values), la note du labo :
-
-> [!theorem] Euler {#thm:euler}
-> Vrai.
-
-```lab ode
-title = "Chute"
-t = {max = 2}
-states = {v = {start = 0, rate = "-9.81"}}
-note = "Comme dans la leçon 1.1."
-```
-"""
+FRENCH = fixture_text("documents/french.md")
 
 
 def test_a_lesson_has_a_language_of_its_own(make: Make) -> None:
@@ -71,27 +54,7 @@ def test_a_lesson_has_a_language_of_its_own(make: Make) -> None:
     assert "Comme dans la leçon 1.5." in renamed
 
 
-QUIZ = """
-```python file=examples/answers.py
-print("period 83.4 min")
-print("share 6.6e-05, mass 1,234,567 kg")
-```
-
-```output
-period 83.4 min
-share 6.6e-05, mass 1,234,567 kg
-```
-
-The mass is `1.234.567 kg`{out}.
-
-```quiz
-{"id": "period", "questions": [
-  {"kind": "numeric", "q": "T?", "answer": "`83,4`{out}", "tol": 0.1, "unit": "min"},
-  {"kind": "numeric", "q": "f?", "answer": "`6,6·10⁻⁵`{out}"},
-  {"kind": "numeric", "q": "m?", "answer": 2.5, "unit": "kg m^2"}
-]}
-```
-"""
+QUIZ = fixture_text("documents/answers.md")
 
 
 def test_numbers_of_a_quiz_are_those_of_its_language(make: Make) -> None:

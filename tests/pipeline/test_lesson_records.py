@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from coursebuild.core.files.resources import template_texts
+from support.fixture_cases import fixture_text
 from support.preview_process import Events, serve_preview
 from support.scratch_course import GOOD, Folder, Make, block
 from support.workflows import git
@@ -23,16 +24,7 @@ OTHER_NUMPY = '["numpy","1.26.4"]'
 PYTHON = f"Python {platform.python_version()}"
 
 ARRAY = "import numpy as np\nprint(np.arange(3.0).sum())"
-DRAWING = """\
-import matplotlib
-import matplotlib.pyplot as plt
-
-matplotlib.rcParams["font.size"] = {font}
-fig, ax = plt.subplots()
-ax.plot([0, 1, 2], [0, {middle}, 4], label="fall")
-ax.set_ylim(0, 5)
-fig.savefig("fall.svg")
-"""
+DRAWING = fixture_text("scripts/drawing.txt")
 
 
 def numpy_lesson(output: str = "3.0") -> str:

@@ -9,49 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder, Make
 
 pytestmark = pytest.mark.site
 HEAD = '[course]\ntitle = "<b>Course</b>"\n\n[[level]]\nid = "1"\ntitle = "One"\n'
 
-FIRST = """## Core
-
-For a body of volume $V${symbol="volume" unit="m³"}, the [inertia tensor]{term} is
-
-$$I = \\int_V \\rho\\,\\mathrm dV$$ {#eq:tensor}
-
-and more. First. A [principal *axes*]{term="Principal axis"} is $x$ & `<b>`, [see](lesson:1.2).
-Last.
-
-- An [item]{term} in a list, `1 < 2`, of [](#tab:sizes) and [](#eq:tensor).
-
-## Law
-
-By [](#eq:tensor) and [it](term:inertia-tensor), $\\dot q${symbol="rate <i>" unit="1/s"} is
-
-$$\\dot q = 1 \\tag{*}$$ {#eq:rate}
-
-> [!note] Rows
-> $$\\begin{align} a &= 1 \\\\ a &= 2 \\end{align}$$
-
-and $$a$$ {#eq:a}. By [](#lst:run) and [](#tab:sizes).
-
-Table: Sizes & *names*. {#tab:sizes}
-
-| a |
-| --- |
-| b |
-
-```bash {#lst:run}
-ls
-```
-
-### Detail of [](#tab:sizes)
-
-#### Its end
-
-A $w${symbol="width"}.
-"""
+FIRST = fixture_text("documents/symbols_first.md")
 SECOND = """## Uses
 
 The [tensor](term:inertia-tensor), the [](lesson:1.1#eq:tensor), the [](lesson:1.1#eq:rate), the
@@ -60,17 +24,7 @@ The [tensor](term:inertia-tensor), the [](lesson:1.1#eq:tensor), the [](lesson:1
 > [!note] Note
 > An [Äther]{term} is no thing; see [here](lesson:1.1).
 """
-THIRD = """The [عزم القصور]{term} عدد. A [慣性]{term} is. An
-[`<b>`&"']{term="<script>alert(1)</script>"} is; a [3-vector]{term} is, an [ⱥ]{term} is,
-[this](term:principal-axis), [ether](<term:a\u0308ther>),
-[that](term:عزم-القصور) and [so](<term:慣性>).
-
-See [one](lesson:1.1).
-
-$$w + w = 2w$$ {#eq:twice check}
-
-$$|w| = w$$ {#eq:size check="w >= 0"}
-"""
+THIRD = fixture_text("documents/symbols_third.md")
 
 
 @pytest.fixture(scope="module")

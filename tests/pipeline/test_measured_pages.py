@@ -22,6 +22,7 @@ from coursebuild.pipeline.load import load_course
 from coursebuild.pipeline.scenes import scene_digest
 from support.bench_reports import file_of
 from support.edited_course import drawn_pages
+from support.fixture_cases import fixture_text
 from support.measured_course import TOML, write
 from support.model_reports import box, case, diet, finding
 from support.preview_process import serve_preview
@@ -34,21 +35,7 @@ pytestmark = pytest.mark.site
 BOX = '<mujoco><include file="arm/part.xml"/></mujoco>\n'
 PART = '<mujoco><worldbody><geom name="g" size="1"/></worldbody></mujoco>\n'
 SCENARIOS = '[[scenario]]\nname = "swing"\n\n[[scenario]]\nname = "awkward"\n'
-LESSON = """## Speed
-
-What it costs, as [the model's page](model:box#measured-awkward) has it.
-
-```bench box
-```
-
-```bench box scenario=awkward show=stable,orders
-```
-
-- in a list
-
-  ```bench box show=table
-  ```
-"""
+LESSON = fixture_text("documents/measured.md")
 PAGE, NUMERICS, SCENARIO_LESSON = "models/box.html", "numerics/case-5.html", "lessons/1.2-two.html"
 
 

@@ -7,6 +7,7 @@ import sys
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder, Make, block
 
 pytestmark = pytest.mark.site
@@ -21,18 +22,7 @@ made = [
 ]
 lisp = [["no-such-lisp", "{{file}}"]]
 """
-SUM = """## Words
-
-```sh file=examples/sum.sh args="2 40"
-echo "the sum is $(($1 + $2))"
-```
-
-```output
-the sum is 42
-```
-
-It is `42`{out}.
-"""
+SUM = fixture_text("documents/shell.md")
 
 
 @pytest.fixture

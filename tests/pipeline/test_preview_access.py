@@ -12,6 +12,7 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from coursebuild.preview.server import open_in_editor
+from support.fixture_cases import fixture_text
 from support.lab_page import wait_for_condition
 from support.live_course import Live
 from support.live_course import live as live
@@ -206,37 +207,8 @@ def browser(browsers: Mapping[str, Browser]) -> Browser:
     return browsers["plain"]
 
 
-ATTACK = """
-<!DOCTYPE html><html lang=en><title>Elsewhere</title><body>
-<form method=post enctype=text/plain action=ADDRESS.coursebuild/accept><button>Go</button></form>
-<a href="LINK">Link</a>
-<script>
-  window.draft = 'nothing'
-  window.coursebuildSearch = { take: (...all) => { window.draft = all } }
-</script>
-<iframe src="ADDRESS"></iframe>
-"""
-STEAL = """async (address) => {
-  const said = {}
-  const add = (name, element, attribute) => new Promise((done) => {
-    element.addEventListener('load', () => done(said[name] = 'loaded'))
-    element.addEventListener('error', () => done(said[name] = 'refused'))
-    element[attribute] = address + name
-    document.body.append(element)
-  })
-  await add('search/index.js', document.createElement('script'), 'src')
-  await add('files/pic.svg', document.createElement('img'), 'src')
-  for (const mode of ['cors', 'no-cors']) {
-    const answer = fetch(address, { mode, credentials: 'include' })
-    said[mode] = await answer.then(() => 'loaded', () => 'refused')
-  }
-  const source = new EventSource(address + '.coursebuild/events?page=index.html')
-  said.events = await new Promise((done) => {
-    source.addEventListener('hello', () => done('loaded'))
-    source.addEventListener('error', () => done('refused'))
-  })
-  return said
-}"""
+ATTACK = fixture_text("documents/attack.html")
+STEAL = fixture_text("scripts/steal.js")
 
 
 @pytest.mark.browser

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.preview_process import Events, serve_preview
 from support.scratch_course import SILENT, Folder, Make, block
 
@@ -14,17 +15,7 @@ pytestmark = pytest.mark.site
 
 NOTE = "import os\nos.makedirs('runs', exist_ok=True)\nopen('runs/log', 'a').write('x')\n"
 """Lines by which a script counts its runs; its fence allows that."""
-FALL = """
-import mujoco
-
-BALL = "<body pos='0 0 10'><freejoint/><geom size='.1'/></body>"
-model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{BALL}</worldbody></mujoco>")
-data = mujoco.MjData(model)
-data.qvel[2] = 4
-while data.time < 0.0999:
-    mujoco.mj_step(model, data)
-print(f"z {data.qpos[2]:.3f} m")
-"""
+FALL = fixture_text("scripts/recorded_fall.txt")
 PLAIN = "print('sum', 45)\n"
 NOT_YET = "not yet repeated"
 

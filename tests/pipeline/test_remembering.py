@@ -6,6 +6,7 @@ import shutil
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder, Make
 
 pytestmark = pytest.mark.site
@@ -189,49 +190,7 @@ def test_what_is_remembered_is_not_published(make: Make) -> None:
     assert [path for path in folder.tree("public") if "recorded" in path] == []
 
 
-EVERYWHERE = """\
-## A period of `2.006`{out=examples/swing.py} s
-
-```python file=examples/swing.py figure=swing.svg
-period = 2.006
-print("period", period, "s")
-with open("swing.svg", "w") as file:
-    file.write('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0 0H9"/></svg>')
-```
-
-Output, with `2.006`{out}:
-
-```text
-period 2.006 s
-```
-
-Figure: ![A swing of `2.006`{out} s](swing.svg) It takes `2.006 s`{out}.
-
-```quiz
-{"id": "q1", "questions": [
-  {"kind": "numeric", "q": "How long?", "answer": "`2.006`{out}", "unit": "s",
-   "explain": "It takes `2.006`{out=examples/swing.py \\"period\\"} s."},
-  {"kind": "mcq", "q": "Which?", "options": ["`2.006`{out} s", "less"], "answer": 0}
-]}
-```
-
-```lab simlab
-{
-  "model": "swing",
-  "title": "A swing of `2.006`{out} s",
-  "plots": [{"traces": [{"label": "t", "expr": "data.time"}],
-             "refLines": [{"y": "`2.006`{out}", "label": "period"}]}]
-}
-```
-
-```lab plot
-title = "Lengths"
-x = {name = "r", max = 3, label = "length"}
-[[plots]]
-traces = [{label = "r", expr = "r"}]
-refLines = [{y = "`2.006`{out}", label = "at `2.006`{out} s"}]
-```
-"""
+EVERYWHERE = fixture_text("documents/bound_everywhere.md")
 PLACES = {
     "heading": "## A period of `{}`{{out=",
     "caption of an output": "Output, with `{}`{{out}}:",

@@ -9,115 +9,16 @@ from typing import Any
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder, Make, block
 
 pytestmark = pytest.mark.long
 
-DOUBLE_PENDULUM = """
-import mujoco
-
-XML = '''
-<mujoco model="double">
-  <option timestep="0.004" integrator="RK4"/>
-  <default><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" contype="0"/></default>
-  <worldbody>
-    <body>
-      <joint axis="0 1 0"/>
-      <geom/>
-      <body pos="0 0 -1">
-        <joint axis="0 1 0"/>
-        <geom/>
-      </body>
-    </body>
-  </worldbody>
-</mujoco>
-'''
-model = mujoco.MjModel.from_xml_string(XML)
-data = mujoco.MjData(model)
-data.qpos[:] = 2.0, 0.5
-turns = 0
-while data.time < 30:
-    before = data.qpos[1]
-    mujoco.mj_step(model, data)
-    turns += abs(data.qpos[1]) // 3.14 > abs(before) // 3.14
-    if round(data.time / 0.004) in (250, 7500):
-        print(f"t {data.time:.1f} {data.qpos[0]:.6f} {data.qpos[1]:.4e}")
-print("turns:", turns)
-print("joints:", model.njnt)
-"""
-FALL = """
-import mujoco
-
-BALL = "<body pos='0 0 10'><freejoint/><geom size='.1'/></body>"
-model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{BALL}</worldbody></mujoco>")
-data = mujoco.MjData(model)
-data.qvel[:3] = 3, 0, 4
-while data.time < 0.9999:
-    mujoco.mj_step(model, data)
-print(f"x {data.qpos[0]:.9f} m, z {data.qpos[2]:.4e} m, bodies {model.nbody}")
-"""
-SWING = """
-import math
-
-import mujoco
-
-XML = '''
-<mujoco>
-  <option timestep="0.05" integrator="INTEGRATOR"/>
-  <worldbody>
-    <body>
-      <joint axis="0 1 0"/>
-      <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
-    </body>
-  </worldbody>
-</mujoco>
-'''
-model = mujoco.MjModel.from_xml_string(XML)
-data = mujoco.MjData(model)
-data.qpos[0] = 1.5
-steps = 0
-while data.time < 1.98:
-    mujoco.mj_step(model, data)
-    steps += 1
-print(f"{data.qpos[0]:.7f} rad after {steps} steps of {1000 * model.opt.timestep:.1f} ms")
-"""
-TIMES = """
-import mujoco
-
-XML = '''
-<mujoco>
-  <option timestep="0.004" integrator="RK4"/>
-  <worldbody>
-    <body>
-      <joint axis="0 1 0"/>
-      <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
-    </body>
-  </worldbody>
-</mujoco>
-'''
-model = mujoco.MjModel.from_xml_string(XML)
-data = mujoco.MjData(model)
-data.qpos[0] = 1.5
-turns = []
-while data.time < 4.9999:
-    before, speed = data.time, data.qvel[0]
-    mujoco.mj_step(model, data)
-    if speed * data.qvel[0] < 0:
-        turns.append(data.time)
-print(f"turns after {turns[0]:.3f} s, again {turns[1] - turns[0]:.4f} s later")
-print(f"at {data.time:.3f} s {data.qpos[0]:.3f} rad, {data.qvel[0]:.3f} rad/s")
-print(f"within 1 step, {1000 * turns[0]:.0f} ms or {turns[0]:.1f} s")
-"""
-LIMIT = """
-import mujoco
-
-BALL = "<body><joint type='slide' axis='1 0 0'/><geom size='.1'/></body>"
-model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{BALL}</worldbody></mujoco>")
-data = mujoco.MjData(model)
-data.qpos[0] = 0.75
-mujoco.mj_forward(model, data)
-print("right" if data.qpos[0] == 0.75 else "left or right")
-"""
+DOUBLE_PENDULUM = fixture_text("scripts/double_pendulum.txt")
+FALL = fixture_text("scripts/fall.txt")
+SWING = fixture_text("scripts/swing.txt")
+TIMES = fixture_text("scripts/times.txt")
+LIMIT = fixture_text("scripts/limit.txt")
 PLAIN = "print('nothing moves', 1.5)\n"
 
 

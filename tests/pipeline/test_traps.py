@@ -62,6 +62,7 @@ def test_a_path_without_absolute_places_counts_as_that_of_the_system(traps: Trap
     assert result.stdout.endswith("everything holds\n"), result.stdout  # `sh` was found
 
 
+@pytest.mark.site
 @pytest.mark.parametrize("words", OF_MJBENCH, ids=" ".join)
 def test_no_trap_runs_as_a_model_is_measured(traps: TrapFolder, words: tuple[str, ...]) -> None:
     result = run(traps, mjbench(*words))

@@ -10,6 +10,7 @@ import subprocess
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.lab_lessons import BALL, RIGHT
 from support.lab_lessons import fence as lab_fence
 from support.scratch_course import GOOD, WAIT_FOR_GO, Make, block, command, kill_at_end
@@ -18,58 +19,7 @@ from support.waiting import wait_until
 pytestmark = pytest.mark.site
 
 
-FULL_LESSON = """## Everything
-
-Text with trailing spaces,  \n	a tab, a no-break space\xa0 and U+2028\u2028.
-
-```python file=examples/plain.py
-print("alpha", 1.5)
-print()
-print("beta   ", -0.25)
-```
-
-Output:
-
-```text
-OLD
-```
-
-> [!note] In a callout
->
-> ```python file=examples/quoted.py
-> print("quoted")
-> print()
-> print("    indented")
-> ```
->
-> Output:
->
-> ```text
-> OLD
-> lines
-> ```
-
-1. In a list
-
-   ```python file=examples/listed.py
-   print("listed")
-   ```
-
-   ~~~output digits
-   ~~~
-
-```python file=examples/clock.py
-import time
-print(time.perf_counter_ns())
-```
-
-Output:
-
-```text volatile
-never
-```
-
-The end, without a final newline: `1.5`{out=examples/plain.py}"""
+FULL_LESSON = fixture_text("documents/updated.md")
 
 UPDATED_LESSON = (
     FULL_LESSON.replace(

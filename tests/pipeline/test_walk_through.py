@@ -9,85 +9,14 @@ import zipfile
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import Make
 
 pytestmark = pytest.mark.site
 
 PATH = "examples/heat.py"
-LESSON = """## Heat
-
-First the rod.
-
-```python file=examples/heat.py
-import ctypes
-
-rod = [0.0, 0.0, 1.0, 0.0, 0.0]
-ctypes.CDLL(None).printf(b"cells: %d\\n", len(rod))
-print("sum", sum(rod))
-```
-
-```output
-```
-
-The maximum of `5`{out} cells is printed later.
-
-> [!note] A function prints nothing
->
-> ```python file=examples/heat.py part folded
-> def step(u):
->     inner = zip(u, u[1:], u[2:])
->     return [u[0], *(b + 0.25 * (a - 2 * b + c) for a, b, c in inner), u[-1]]
->
->
-> ```
-
-1. In the list it runs.
-
-   ```python file=examples/heat.py part
-   for _ in range(3):
-       rod = step(rod)
-   print("max", max(rod))
-   ```
-
-   Output, after three steps:
-
-   ```text
-   ```
-
-After that `max 0.31`{out} is left.
-
-```python file=examples/heat.py part hidden
-print("checked", rod == rod[::-1])
-```
-
-```output
-```
-
-Once more:
-
-```python show=examples/heat.py#step
-```
-
-```python show=examples/heat.py#L16-L17
-```
-"""
-FILE = """import ctypes
-
-rod = [0.0, 0.0, 1.0, 0.0, 0.0]
-ctypes.CDLL(None).printf(b"cells: %d\\n", len(rod))
-print("sum", sum(rod))
-
-def step(u):
-    inner = zip(u, u[1:], u[2:])
-    return [u[0], *(b + 0.25 * (a - 2 * b + c) for a, b, c in inner), u[-1]]
-
-
-for _ in range(3):
-    rod = step(rod)
-print("max", max(rod))
-
-print("checked", rod == rod[::-1])
-"""
+LESSON = fixture_text("documents/heat.md")
+FILE = fixture_text("scripts/heat.txt")
 
 
 def test_outputs_are_those_of_their_parts_and_everything_else_has_the_whole_file(
@@ -152,32 +81,7 @@ def test_a_mistake_in_a_part_stands_at_its_line_of_the_lesson(make: Make) -> Non
         assert f"--> content/lessons/1.1-one.md:{line}:3\n" in result.out, result.out
 
 
-SILENT = """## Parts
-
-```python file=examples/x.py
-print(1)
-```
-
-```output
-1
-```
-
-```python file=examples/x.py part
-y = 2
-```
-
-```output
-2
-```
-
-```python file=examples/x.py part
-print(y)
-```
-
-```output
-3
-```
-"""
+SILENT = fixture_text("documents/heat_parts.md")
 
 
 def test_an_output_is_compared_with_its_own_part(make: Make) -> None:

@@ -17,5 +17,11 @@ def convert_files(folder: Path, files: dict[str, str]) -> ConvertedCourse:
     return convert(SourceFiles(folder / "old"))
 
 
+def first_lesson(course: ConvertedCourse) -> str:
+    return next(
+        data.decode() for path, data in course.files.items() if path.startswith("content/lessons/")
+    )
+
+
 def account_of(course: ConvertedCourse) -> str:
     return course.files["IMPORT.md"].decode()

@@ -8,34 +8,12 @@ from collections.abc import Callable
 from coursebuild.pipeline.publication import make_files
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.site import Site
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder, block
 
-HEAD = """
-[course]
-title = "Tested"
-summary = "A course."
-base_url = "https://example.org/c/"
-
-[[page]]
-id = "about"
-title = "About"
-file = "content/pages/about.md"
-"""
+HEAD = fixture_text("documents/edited_head.toml")
 NORUN = block("s{n}.py", "import s1\nprint({n})\n", info="norun")
-LESSON = """## First
-
-Prose of {n} with $x_{n}$ and [the next](lesson:{next}).[^n]
-
-{script}
-> [!note] Remark
-> ![dot](../images/dot.png) and *more*.
-
-$$
-E = {n}
-$$
-
-[^n]: A note.
-"""
+LESSON = fixture_text("documents/edited_lesson.md")
 
 
 class Course:

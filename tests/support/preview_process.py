@@ -20,7 +20,7 @@ PATIENT = """
 import sys
 from coursebuild.cli import main
 from coursebuild.preview import live_course
-live_course.LONG_QUIET = 3.0
+live_course.LONG_QUIET = 1.0
 live_course.LONGEST = 120.0
 sys.exit(main(sys.argv[1:]))
 """

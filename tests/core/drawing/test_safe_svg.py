@@ -34,6 +34,7 @@ def test_each_reason_has_its_words() -> None:
     assert wordings == WORDINGS
 
 
+@pytest.mark.long
 def test_what_is_left_of_a_drawing_is_one_that_may_be_shown() -> None:
     for _, data in (*HOSTILE, *HARMLESS):
         left, parts = without_refused(data)

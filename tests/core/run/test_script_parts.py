@@ -11,6 +11,7 @@ import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.run.script_server import ScriptServer
+from support.fixture_cases import fixture_text
 from support.runners import Run, both_ways, job
 
 pytestmark = pytest.mark.site
@@ -117,21 +118,7 @@ def test_each_part_has_what_it_printed(run: Run) -> None:
         assert outputs(result) == [text.replace("|", "\n") for text in expected], title
 
 
-SEEN = '''"""Of the module."""
-import inspect, sys, warnings
-x: int = 1
-def f():
-    return 1
-print(__doc__, __file__, __annotations__)
-"no docstring"
-print(inspect.getsource(f), f.__code__.co_firstlineno, sys._getframe().f_code.co_name)
-print(sorted(globals()), sorted(vars(sys.modules["builtins"])))
-print(sys._getframe().f_lineno, inspect.stack()[0].lineno)
-@(lambda function: function)
-class C:
-    y: str
-print(C.__doc__, inspect.getsource(C), sys.modules["__main__"].__dict__ is globals())
-'''
+SEEN = fixture_text("scripts/seen_parts.txt")
 WRONG = "def f(x):\n    return 1 / x\nprint('before')\nf(0)\nprint('after')\n"
 
 

@@ -36,16 +36,7 @@ def test_text_stays_text() -> None:
     assert {text: texts(text) for text in [*CASES["text"], "9" * 1001] if texts(text)} == {}
 
 
-@pytest.mark.parametrize(
-    ("text", "value", "place"),
-    [
-        ("3.9 × 10⁻¹¹", "3.9e-11", -12),
-        ("3.9×10^-11", "3.9e-11", -12),
-        ("1.5 · 10^{6}", "1.5e6", 5),
-        ("\u22122·10\u00b3", "-2e3", 3),
-        ("1e\u22125", "1e-5", -5),
-    ],
-)
+@pytest.mark.parametrize(("text", "value", "place"), CASES["powers"])
 def test_powers_of_ten_in_prose(text: str, value: str, place: int) -> None:
     (number,) = scan_prose(text)
     assert (number.value, number.place, number.is_integer) == (Decimal(value), place, False)
@@ -324,39 +315,19 @@ def test_words_before_a_number_choose_it() -> None:
 
 def test_numbers_with_labels_of_their_own_are_different_quantities() -> None:
     """Those of one label or column, and those that nothing names, are shown together."""
-    for printed, is_ambiguous in (
-        ("measured 2.5 s, formula 2.5 s", True),
-        ("mass = 2.5\nlength = 2.5", True),
-        ("Euler:\nerror 2.5\nRK4:\nerror 2.5", True),
-        ("step  measured  formula\n0.1  2.5  2.5", True),
-        ("step  error\n0.1  2.5\n0.2  2.5", False),
-        ("after 0.1 s tau = 2.5\nafter 0.2 s tau = 2.5", False),
-        ("2.5 2.5", False),
-        ("tau = 2.5\ntau = 2.5", False),
-    ):
+    for printed, is_ambiguous in CASES["labels"]:
         mistake = find_mistake("`2.5`{out}", f"{printed}\n")
         assert (mistake is not None) is is_ambiguous, (printed, mistake)
 
 
-def test_a_title_and_the_beginning_of_a_row_choose_a_number() -> None:
-    printed = "step  measured  formula\n0.1  2.5  2.5\n0.2  3.5  2.5\n"
-    for words, holds in (("measured", True), ("0.1 formula", True), ("0.2 measured", False)):
-        mistake = find_mistake(f'`2.5`{{out="{words}"}}', printed)
-        assert (mistake is None) is holds, words
-
-
-def test_words_above_a_line_are_titles_only_of_columns() -> None:
-    for printed, words, holds in (
-        ("t v w\n0.1 1.5 2.5", "w", True),
-        ("  run     v\nfirst   2.5\nlast   10.5", "v", True),
-        ("lag, added  by formula\n1.5 deg  2.5 deg", "formula", True),
-        ("h      |x|  data.time\n1 ms   1.5  2.5 s", "data.time", True),
-        ("what the balls do\nboth 1.5 and 2.5", "do", False),
-        ("reset: ctrl, mocap_pos\nservo, growth in 10 s 2.5", "mocap_pos", False),
-        ("turned by  difference\nw = 2.5     +90.0", "by", False),
-    ):
+def test_titles_choose_a_number() -> None:
+    """Of a column; what stands above it and the beginning of a row may go with it."""
+    for printed, words, holds in CASES["titles"]:
         mistake = find_mistake(f'`2.5`{{out="{words}"}}', f"{printed}\n")
-        assert (mistake is None) is holds, (printed, mistake)
+        assert (mistake is None) is holds, (printed, words, mistake)
+    mistake = find_mistake("`2.5`{out}", f"{CASES['titles'][-1][0]}\n")
+    assert mistake is not None and mistake.rule == "output-ambiguous"
+    assert all(note.edits for note in mistake.notes)
 
 
 def test_choice_in_a_quiz_is_written_as_json_needs_it() -> None:
@@ -404,21 +375,3 @@ def test_a_number_with_the_right_unit_is_found_beside_a_table_that_leaves_it_out
     text = f"{script()}\nOutput:\n\n{rows}\n\nIt has "
     for binding, holds in (("`2.0 kg`{out}", True), ("`2.0 N`{out}", False)):
         assert (check(text + binding, make_run(printed)) == ()) is holds, binding
-
-
-def test_a_title_chooses_without_its_unit_and_with_what_stands_above_it() -> None:
-    head = "step (s)  Euler (m)  RK4 (m)\n"
-    printed = f"errors\n{head}0.1  2.5  0.2\n0.2  4.5  0.3\norders\n{head}0.1  1.5  2.5\n"
-    for words, holds in (
-        ("errors 0.1 Euler", True),
-        ("errors 0.2 Euler", False),
-        ("orders RK4", True),
-        ("orders 0.1 RK4", True),
-        ("orders 0.1 Euler", False),
-        ("orders 0.1 RK4 (m)", True),
-    ):
-        mistake = find_mistake(f'`2.5`{{out="{words}"}}', printed)
-        assert (mistake is None) is holds, (words, mistake)
-    mistake = find_mistake("`2.5`{out}", printed)
-    assert mistake is not None and mistake.rule == "output-ambiguous"
-    assert all(note.edits for note in mistake.notes)

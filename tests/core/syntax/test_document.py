@@ -24,7 +24,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.quiz.model import Quiz
-from support.fixture_cases import Case, check_cases
+from support.fixture_cases import Case, check_cases, fixture_text
 from support.plain_html import plain_html
 from support.random_lessons import KINDS, markdown
 from support.tree_dump import dump
@@ -50,30 +50,7 @@ def test_documents_are_as_their_fixtures_say(path: Path, rewriting: bool) -> Non
 
 
 SOURCE_KINDS = frozenset({"note", "try"})
-LESSON = """## Title
-
-> [!try] It
-> ```python file=examples/x.py
-> print(1)
->
-> print(2)
-> ```
->
-> Output:
->
-> ```text
-> 1
-> 2
-> ```
-
-$$
-a
-$$
-
-| a | b |
-| - | - |
-| 1 | 2\\|3 |
-"""
+LESSON = fixture_text("documents/nested.md")
 
 
 def document_of(text: str, *rules: str) -> model.Document:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import textwrap
@@ -193,9 +192,8 @@ def test_tests_of_new_features_pass_as_made(make: Make) -> None:
     assert 'features = ["features/advice.py", "features/hint.py"]\n' in folder.text(MAP)
     assert folder.main("check").status == 0
     tests = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     process = subprocess.run(
-        tests, cwd=folder.root, env=environment, capture_output=True, text=True
+        tests, cwd=folder.root, env=folder.environment(), capture_output=True, text=True
     )
     assert "6 passed" in process.stdout, process.stdout
 

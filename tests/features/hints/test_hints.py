@@ -7,21 +7,12 @@ from collections.abc import Callable
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder
 
 MakeCourse = Callable[..., Folder]
 LIKELY = "## Heights\n\nThe box **falls.\n"
-MODEL = """```mjcf
-<mujoco>
-  <worldbody>
-    <body>
-      <joint type="hinge" range="-1.5708 1.5708"/>
-      <geom size="0.1"/>
-    </body>
-  </worldbody>
-</mujoco>
-```
-"""
+MODEL = fixture_text("documents/hinted_model.md")
 
 
 @pytest.fixture

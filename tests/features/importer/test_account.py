@@ -14,260 +14,13 @@ import pytest
 
 from coursebuild.features.importer.convert import ConvertedCourse
 from support.converted_folder import account_of, convert_files
+from support.fixture_cases import fixture_tables, fixture_text
 
-Construct = tuple[str, str, str]
-"""What the account calls it; the column it is counted in; and how it is written."""
 TAKEN, CHANGED, LEFT = "taken", "changed", "left"
 PICTURE = "\x89PNG"
-
-MYST: list[Construct] = [
-    ("heading", TAKEN, "## Heading wa1"),
-    ("table", TAKEN, "| wa2 | b |\n| --- | --- |\n| wa3 | d |"),
-    ("footnote", TAKEN, "Text.[^n]\n\n[^n]: Note wa4."),
-    ("item of a list", TAKEN, "- item wa5\n- item wa6"),
-    ("comment", TAKEN, "Text.\n\n<!-- wa7 -->"),
-    ("comment of MyST", CHANGED, '% a remark wa83\n\n+++ {"note": "wa84"}'),
-    ("directive `{proof}`", CHANGED, "```{proof}\nwa85\n```"),
-    (
-        "directive `{card}`",
-        CHANGED,
-        "```{card} wa86\n:header: wa87\n:footer: wa88\nwa89\n```",
-    ),
-    ("directive `{sidebar}`", CHANGED, "```{sidebar} wa90\n:subtitle: wa91\nwa92\n```"),
-    ("label", CHANGED, "(here)=\n## Labelled wa8"),
-    ("link", TAKEN, "[wa9](https://example.org)"),
-    ("link by reference", CHANGED, "See [wa10][two].\n\n[two]: two.md"),
-    ("picture", CHANGED, "![wa11](p.png)"),
-    ("picture", LEFT, "![wa12](https://example.org/wa13.png)"),
-    ("formula", CHANGED, r"$x_1 $ and \(z\) wa14"),
-    ("formula", TAKEN, "$$\na_{wa15}\n$$"),
-    ("role `{math}`", CHANGED, "{math}`y_{wa16}`"),
-    ("role `{cite:t}`", CHANGED, "{cite:t}`wa17`"),
-    ("role `{cite}`", LEFT, "{cite}`wa18`"),
-    ("role `{index}`", CHANGED, "{index}`wa19`"),
-    ("role `{doc}`", CHANGED, "{doc}`words wa20\n<two>`"),
-    ("role `{ref}`", CHANGED, "{ref}`words wa21 <here>`"),
-    ("role `{any}`", CHANGED, "{any}`words wa99 <here>`"),
-    ("role `{numref}`", CHANGED, "{numref}`fig-one`"),
-    ("role `{eq}`", CHANGED, "{eq}`energy`"),
-    ("role `{term}`", CHANGED, "{term}`wa22`"),
-    ("role `{abbr}`", CHANGED, "{abbr}`wa23 (long wa24)`"),
-    ("role `{sup}`", CHANGED, "{sup}`wa25`"),
-    ("role `{download}`", CHANGED, "{download}`wa26 <data.csv>`"),
-    ("role `{py:func}`", CHANGED, "{py:func}`wa27.run`"),
-    ("role `{glue:text}`", LEFT, "{glue:text}`wa28`"),
-    ("directive `{raw}`", LEFT, "```{raw} latex\n\\wa29\n```"),
-    ("directive `{raw}`", CHANGED, "```{raw} html\n<p>wa30</p>\n```"),
-    ("directive `{index}`", LEFT, "```{index} single: wa31\n```"),
-    ("directive `{exercise}`", CHANGED, "```{exercise} Title wa32\n:label: ex\nDo wa33.\n```"),
-    ("directive `{solution}`", CHANGED, "```{solution} ex\nDone wa34.\n```"),
-    (
-        "directive `{exercise}`",
-        CHANGED,
-        "```{exercise-start}\n:label: ex2\n```\nLong wa35.\n```{exercise-end}\n```",
-    ),
-    ("directive `{note}`", CHANGED, "```{note}\nNote wa36.\n```"),
-    ("directive `{admonition}`", CHANGED, "```{admonition} Title wa37\n:class: tip\nwa38\n```"),
-    (
-        "directive `{tab-item}`",
-        CHANGED,
-        "````{tab-set}\n```{tab-item} wa39\nwa40\n```\n```{tab-item} wa41\nwa42\n```\n````",
-    ),
-    (
-        "directive `{grid-item-card}`",
-        CHANGED,
-        "````{grid} 2\n```{grid-item-card} wa43\n:link: two\nhead wa44\n^^^\nbody wa45\n"
-        "+++\nfoot wa46\n```\n````",
-    ),
-    (
-        "directive `{figure}`",
-        CHANGED,
-        "```{figure} p.png\n:width: 50%\n:name: fig-one\n\nCaption wa47, *long*.\n\nwa48\n```",
-    ),
-    ("directive `{math}`", CHANGED, "```{math}\n:label: energy\nE_{wa49}\n```"),
-    ("directive `{list-table}`", CHANGED, "```{list-table} T wa50\n* - wa51\n  - wa52\n* - c\n```"),
-    ("directive `{csv-table}`", CHANGED, '```{csv-table}\n:header: wa53, b\nwa54,"c, wa55"\n```'),
-    ("directive `{glossary}`", CHANGED, "```{glossary}\nEnergy wa56\n  Is kept wa57.\n```"),
-    ("directive `{literalinclude}`", CHANGED, "```{literalinclude} code.py\n:lines: 2\n```"),
-    ("directive `{include}`", CHANGED, "```{include} part.txt\n```"),
-    ("directive `{versionadded}`", CHANGED, "```{versionadded} 1.2\nNew wa60.\n```"),
-    ("directive `{prf:theorem}`", CHANGED, "```{prf:theorem} Name wa61\n:label: t\nwa62\n```"),
-    ("directive `{eval-rst}`", LEFT, "```{eval-rst}\n.. note:: wa63\n```"),
-    ("directive `{bibliography}`", CHANGED, "```{bibliography}\n```"),
-    ("directive `{dropdown}`", CHANGED, "```{dropdown} Title wa64\nwa65\n```"),
-    ("directive `{code-block}`", CHANGED, "```{code-block} cpp\n:caption: C wa66\nint wa67;\n```"),
-    ("directive `{iframe}`", CHANGED, "```{iframe} https://example.org/wa68\n```"),
-    ("block of `python`", CHANGED, "```Python\nwa69\n```"),
-    ("block of `pycon`", CHANGED, "```python\n>>> wa70\n```"),
-    ("cell", CHANGED, "```{code-cell} python\nwa71 = 1\nprint(wa71)\n```"),
-    ("cell", LEFT, "```{code-cell} python\n:tags: [raises-exception]\nwa72\n```"),
-    ("cell", LEFT, "```{code-cell} python\n---\nother: 1\n---\nnot python wa73\n```"),
-    (
-        "figure of a cell",
-        CHANGED,
-        "```{code-cell} python\nimport matplotlib.pyplot as plt\nplt.plot([1])\n"
-        'plt.title("Title wa74")\nplt.show()\n```',
-    ),
-    ("magic", LEFT, "```{code-cell} python\n%wa75 inline\nx = 1\n```"),
-    ("tag of HTML", CHANGED, '<img src="p.png" alt="wa76">'),
-    ("tag of HTML", LEFT, "<style>\n.x { color: red }\n</style>"),
-    ("directive `{csv-table}`", CHANGED, "```{csv-table} wa77\n:file: data.csv\n```"),
-    (
-        "directive `{exercise}`",
-        CHANGED,
-        "```{exercise-start}\n:label: ex3\n```\n\n```python\nwa78\n```\n\n```{exercise-end}\n```",
-    ),
-    ("cell of `julia`", LEFT, "```{code-cell} julia\nwa79\n```"),
-    (
-        "value that is glued",
-        CHANGED,
-        "```{code-cell} python\nfrom myst_nb import glue\n"
-        "glue('wa93', 2 * 3,\n  display=False)\n```",
-    ),
-    (
-        "figure of a cell",
-        CHANGED,
-        "```{code-cell} python\nimport matplotlib.pyplot as plt\nplt.plot([1])\n"
-        "plt.title('Title wa94')\nplt.savefig('out/wa95.png', dpi=80)\n```",
-    ),
-    ("role `{del}`", CHANGED, "{del}`wa80`"),
-    ("substitution", CHANGED, "The {{ mass }} wa81"),
-    ("link", LEFT, "[wa82](inv:python#print)"),
-]
-QUARTO: list[Construct] = [
-    ("callout", CHANGED, '::: {.callout-tip collapse="true" title="wb1"}\nText wb2\n:::'),
-    ("division", CHANGED, "::: {.column-margin}\nwb3\n:::"),
-    ("division", LEFT, '::: {.content-visible when-format="pdf"}\nwb4\n:::'),
-    ("callout", CHANGED, "::: {#thm-a}\n## Name wb5\nText wb6\n:::"),
-    ("footnote", CHANGED, "Text^[A note wb7\nof two lines wb8.] on."),
-    ("code in a line", LEFT, "It is `{python} wb9`."),
-    ("cross-reference", CHANGED, "## Head wb10 {#sec-s}\n\nSee @sec-s."),
-    (
-        "cross-reference",
-        CHANGED,
-        '![Caption wb11](p.png){#fig-p fig-alt="Alt wb12"}\n\nSee @fig-p.',
-    ),
-    ("cross-reference", LEFT, "See @fig-none."),
-    ("citation", TAKEN, "Says [see @wb24, p. 3]."),
-    ("citation", LEFT, "Says [see @wb25]."),
-    ("substitution", CHANGED, "{{< video wb13.mp4 >}}"),
-    ("substitution", CHANGED, "{{< pagebreak >}}"),
-    ("file that is included", CHANGED, "{{< include _part.qmd >}}"),
-    ("file that is included", LEFT, "{{< include wb15.qmd >}}"),
-    ("cell", CHANGED, "```{python}\n#| echo: false\nprint('wb16')\n```"),
-    ("cell", LEFT, "```{python}\n#| eval: false\nprint('wb17')\n```"),
-    (
-        "figure of a cell",
-        CHANGED,
-        "```{python}\n#| label: fig-cell\n#| fig-cap: Caption wb18\n"
-        "import matplotlib.pyplot as plt\nplt.plot([1])\n```\n\nSee @fig-cell.",
-    ),
-    ("cell of `r`", LEFT, '```{r, echo=FALSE, fig.cap="Two wb18"}\nwb19\n```'),
-    ("cell of `bash`", LEFT, "```{bash}\n#| label: wb60\necho wb61\n```"),
-    ("cell of `r`", CHANGED, "```{r}\nwb62\n```\n\n```{r}\nwb63\n```"),
-    ("cell of `julia`", LEFT, "```{julia}\n#| eval: false\nwb64\n```"),
-    ("caption of a table", CHANGED, "| a |\n| - |\n| wb20 |\n\n: Caption wb21 {#tbl-t}"),
-    ("attributes", CHANGED, "[words wb22]{.smallcaps}"),
-    ("block that is raw", LEFT, "```{=latex}\n\\wb23\n```"),
-    ("definition", CHANGED, "Term wb30\n\n:   One wb31\n:   Two wb32\n\n    More wb33"),
-    ("marked words", CHANGED, "H~wb34~O and x^wb35^"),
-    ("cross-reference", CHANGED, "::: {#nte-a .callout-note}\nwb36\n:::\n\nSee @nte-a."),
-    ("division", CHANGED, '::: {.content-visible unless-format="pdf"}\nwb37\n:::'),
-    ("command of LaTeX", CHANGED, "Text wb38 \\newpage"),
-    ("code in a line", CHANGED, "| a |\n| - |\n| `wb39|b` |"),
-    (
-        "figure of a cell",
-        CHANGED,
-        "```{python}\n#| fig-alt: >\n#|   Two wb40\n#|   lines wb41\n"
-        "import matplotlib.pyplot as plt\nplt.plot([1])\n```",
-    ),
-    ("heading", TAKEN, "# Second title wb42"),
-    (
-        "table or verse of Pandoc",
-        CHANGED,
-        "+------+------+\n| wb43 | wb44 |\n+======+======+\n| wb45 | wb46 |\n+------+------+\n\n"
-        ": Caption wb47 {#tbl-grid}",
-    ),
-    (
-        "table or verse of Pandoc",
-        LEFT,
-        "+---+---+\n| wb48 | wb49 |\n+---+---+",
-    ),
-    (
-        "table or verse of Pandoc",
-        CHANGED,
-        "  wb50   wb51\n------ ------\n  wb52   wb53\n\nTable: Caption wb54",
-    ),
-    ("table or verse of Pandoc", CHANGED, "| The wb55\n|   day wb56"),
-]
-MKDOCS: list[Construct] = [
-    ("callout", CHANGED, '!!! note inline end "Title wc1"\n    Text wc2'),
-    ("callout", CHANGED, '??? tip "Title wc3"\n    Text wc4'),
-    ("tab", CHANGED, '=== "wc5"\n\n    Text wc6\n\n=== "wc7"\n\n    Text wc8'),
-    ("callout", CHANGED, "/// warning | Title wc9\nText wc10\n///"),
-    ("tab", CHANGED, "//// tab | wc11\n```Python\nwc12\n```\n////"),
-    ("block of `py`", CHANGED, '``` py title="wc13.py" hl_lines="1"\nwc14\n```'),
-    ("file that is included", CHANGED, '--8<-- "code.py:part"'),
-    ("attributes", CHANGED, "Text wc15 {: .class }"),
-    ("link", CHANGED, "[wc16](two.md)"),
-    ("tag of HTML", CHANGED, '<div markdown="1">wc17</div>'),
-    ("icon", CHANGED, ":material-check: wc19"),
-    ("keys", CHANGED, "Press ++ctrl+alt+w++ wc20."),
-    ("definition", CHANGED, "Term wc21\n:   Meaning wc22."),
-    ("tag of HTML", LEFT, "<font color=blue>wc23</font>"),
-    ("abbreviation", LEFT, "*[KE]: wc30"),
-    ("suggested change", CHANGED, "{++wc31++}"),
-    ("division", LEFT, "::: package.wc32\n    options:\n\nAfter wc33"),
-    ("picture", CHANGED, "![wc34](p.png#only-light)"),
-    ("tag of HTML", LEFT, '<img alt="wc24"\n  src="https://example.org/a.png">'),
-]
-MDBOOK: list[Construct] = [
-    ("file that is included", CHANGED, "```rust\n{{#include code.rs:2:3}}\n```"),
-    ("file that is included", CHANGED, "```rust\n{{#rustdoc_include code.rs:wd}}\n```"),
-    ("file that is included", CHANGED, "{{#playground code.rs}}"),
-    ("file that is included", LEFT, "{{#include wd6.rs}}"),
-    ("hidden lines of Rust", CHANGED, "```rust\n# fn main() {\nwd7();\n# }\n#[wd8]\n```"),
-    ("block of `rust`", CHANGED, "```rust,ignore,editable\nwd9\n```"),
-    ("callout", CHANGED, '```admonish warning title="wd10"\nText wd11\n```'),
-    ("link", CHANGED, "[wd12](two.html#part)"),
-    ("title of the page", CHANGED, "{{#title Words}}"),
-    ("callout", CHANGED, '{% hint style="info" %}\nwd14\n{% endhint %}'),
-    (
-        "substitution",
-        CHANGED,
-        '{% tabs %}\n{% tab title="wd15" %}\nwd16\n{% endtab %}\n{% endtabs %}',
-    ),
-    ("picture", CHANGED, "![wd17](<p.png>)"),
-    ("link", CHANGED, "[[two|wd18]]"),
-    ("link", CHANGED, "![[p.png|wd19]]"),
-    ("comment of MyST", CHANGED, "Text.\n\n%%\nwd20\n%%"),
-]
-DOCUSAURUS: list[Construct] = [
-    ("callout", CHANGED, ":::tip[Title we1]\nText we2\n:::"),
-    ("callout", CHANGED, ":::caution Title we3\nText we4\n:::"),
-    ("statement of JavaScript", LEFT, "import We5 from '@theme/We5';"),
-    ("component", LEFT, '<TabItem label="we6">\n\nText we7\n\n</TabItem>'),
-    ("link", CHANGED, "[we8](./two.md)"),
-    ("expression of JavaScript", LEFT, "It is {props.we11}."),
-    ("tag of HTML", CHANGED, "<img src={require('./p.png').default} alt='we12' />"),
-    ("file that is included", CHANGED, "import P from './two.md';\n\n<P />"),
-    ("block of `jsx`", CHANGED, '```jsx title="we9.js"\nwe10\n```'),
-    ("component", LEFT, "<Figure src='/p.png' caption=\"It's we13\" />"),
-    ("link", CHANGED, "{/* we14 */}\n\n[a](./two.md)"),
-]
-TARGETS = """(here)=
-## Here
-
-```{figure} p.png
-:name: fig-one
-A figure.
-```
-
-```{math}
-:label: energy
-E
-```
-"""
+CONSTRUCTS = fixture_tables("imported")
+"""By format."""
+TARGETS = fixture_text("documents/targets.md")
 """What roles refer to."""
 MORE: dict[str, dict[str, str]] = {
     "myst": {
@@ -295,11 +48,11 @@ MORE: dict[str, dict[str, str]] = {
     "docusaurus": {"docusaurus.config.js": "module.exports = {\n  title: 'D',\n}\n"},
 }
 FORMATS = {
-    "myst": (MYST, "one.md"),
-    "quarto": (QUARTO, "one.qmd"),
-    "mkdocs": (MKDOCS, "one.md"),
-    "mdbook": (MDBOOK, "one.md"),
-    "docusaurus": (DOCUSAURUS, "docs/one.mdx"),
+    "myst": "one.md",
+    "quarto": "one.qmd",
+    "mkdocs": "one.md",
+    "mdbook": "one.md",
+    "docusaurus": "docs/one.mdx",
 }
 
 
@@ -323,9 +76,9 @@ def texts_of(course: ConvertedCourse) -> str:
 
 @pytest.mark.parametrize("format", FORMATS)
 def test_every_construct_is_taken_changed_or_left(tmp_path: Path, format: str) -> None:
-    constructs, name = FORMATS[format]
+    name = FORMATS[format]
     failures = []
-    for number, (kind, column, text) in enumerate(constructs):
+    for number, (kind, column, text) in enumerate(CONSTRUCTS[format]):
         folder = name.rpartition("/")[0]
         files = {
             name: f"# One\n\n{TARGETS if kind.startswith('role') else ''}\n\n{text}\n\nEnd.\n",

@@ -10,7 +10,9 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from support.converted_folder import account_of, convert_files
+from support.converted_folder import account_of, convert_files, first_lesson
+from support.fixture_cases import FIXTURES, Case, check_cases
+from support.rule_cases import parts
 
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 BASE = '<mujoco><asset><mesh name="m" file="m.obj"/></asset></mujoco>'
@@ -19,6 +21,38 @@ ROBOT = """<mujoco>
   <include file="parts/base.xml"/>
   <worldbody><body><freejoint/><geom type="mesh" mesh="m"/></body></worldbody>
 </mujoco>"""
+
+
+PICTURE = {"p.png": "\x89PNG"}
+FOLDERS = {
+    "plain": PICTURE,
+    "sphinx": {"conf.py": ""},
+    "mkdocs": {
+        **PICTURE,
+        "mkdocs.yml": "site_name: A",
+        "hidden/.b.md": "C\nD\n",
+        "hidden/c.py": "d = 1\n",
+        ".obsidian/app.json": "{}",
+    },
+}
+"""What the folders of `tests/fixtures/imports` hold beside the files of a case."""
+
+
+@pytest.mark.parametrize("kind", FOLDERS)
+def test_the_first_text_of_a_folder_keeps_all_that_readers_see(
+    tmp_path: Path, kind: str, rewriting: bool
+) -> None:
+    def render(case: Case) -> str:
+        files = {path: text for _, path, text in parts(case.input)}
+        course = convert_files(tmp_path / str(case.line), FOLDERS[kind] | files)
+        return first_lesson(course)
+
+    check_cases(FIXTURES / f"imports/{kind}.md", render, rewriting=rewriting)
+
+
+def test_a_tab_loses_the_icon_in_its_title(tmp_path: Path) -> None:
+    text = '# One\n\n=== ":simple-linux: Linux"\n\n    Text.\n'
+    assert first_lesson(convert_files(tmp_path, {"one.md": text})) == "**Linux**\n\nText.\n"
 
 
 @pytest.mark.parametrize("folder", ["robots/arm", "content/models"])
@@ -90,121 +124,6 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
     lesson = course.files["content/lessons/1.1-one.md"].decode()
     saving = f'{name}.savefig("l1-1-one-1.svg")\n{name}.close("all")'
     assert saving in lesson and ".show(" not in lesson
-
-
-@pytest.mark.parametrize(
-    ("source", "lesson"),
-    [
-        (
-            "<script setup>\nimport A from './a.vue'\n</script>\n\nText.\n\n"
-            "```html\n</script>\n```\n",
-            "Text.\n\n```html\n</script>\n```\n",
-        ),
-        (
-            "import {\n  A,\n} from './a'\n\n<A className='b' />\n\nText may\nexport const, too.\n",
-            "Text may\nexport const, too.\n",
-        ),
-        ("## <!-- md:setting config.on -->\n\nText.\n", "## `md:setting config.on`\n\nText.\n"),
-        ("## A {#标题}\n\n[Text](#标题).\n", "## A {#标题}\n\n[Text](#标题).\n"),
-        ("## A {#a-–-b}\n\nText.\n", "## A {#a-b}\n\nText.\n"),
-        ('=== ":simple-linux: Linux"\n\n    Text.\n', "**Linux**\n\nText.\n"),
-        ("```js{1,3}\nf()\n```\n", "```js\nf()\n```\n"),
-        ("- a\n\n  ```js\n  `${x}`\n  }\n  ```\n", "- a\n\n  ```js\n  `${x}`\n  }\n  ```\n"),
-        ("```\n:name: value\n```\n", "```\n:name: value\n```\n"),
-        ("Code `\\a{b}` and\n`c` here.\n", "Code `\\a{b}` and\n`c` here.\n"),
-        ("{% file %}run.sh{% endfile %}\n\nText.\n", "run.sh\n\nText.\n"),
-        ('Text {% cycle "a", "b" %}.\n', 'Text `{% cycle "a", "b" %}`.\n'),
-        (
-            "<!-- ```{note}\nA.\n``` -->\n\nPress {kbd}`a`.\n",
-            "<!-- ```{note}\nA.\n``` -->\n\nPress <kbd>a</kbd>.\n",
-        ),
-        ("A [text](https://example.org/\n) here.\n", "A [text](https://example.org/)\n here.\n"),
-        ("So\n$\na\n=\nb\n$\n\nand $c$.\n", "So\n$$\na\n=\nb\n$$\n\nand $c$.\n"),
-        (
-            "So:<br>\n$$\na\n$$<br />\nand $b$:<br>\n$$\nc\n$$\n",
-            "So:<br>\n$$\na\n$$\nand $b$:<br>\n$$\nc\n$$\n",
-        ),
-        (
-            "- Let $$\n  a\n  $$ and\n- let $$\n  b\n  $$\n- $$\n  c\n  $$\n",
-            "- Let \n  $$\n  a\n  $$\n  and\n- let \n  $$\n  b\n  $$\n- $$\n  c\n  $$\n",
-        ),
-        (
-            "Between `$` or `$$`:\n\n$$\na = 0\n$$\n\nand `$$`.\n",
-            "Between `$` or `$$`:\n\n$$\na = 0\n$$\n\nand `$$`.\n",
-        ),
-        ("$$\n\\text{In}\\text{: }x \\\\\ny\n$$\n", "$$\n\\text{In}\\text{: }x \\\\\ny\n$$\n"),
-        (
-            "$$ $$\\begin{align}\na &= b\n\\end{align}\n$$ $$\n\nText. $$ $$\n",
-            "$$\\begin{align}\na &= b\n\\end{align}$$\n\n\nText. \n",
-        ),
-        (
-            "$$\n\\begin{aligned}\na &= \\text{for $i \\ne j$}\n\\end{aligned}\n$$\n",
-            "$$\n\\begin{aligned}\na &= \\text{for $i \\ne j$}\n\\end{aligned}\n$$\n",
-        ),
-        (
-            "So $a \\text{ for $i$}$, $\\DeclareMathOperator*{\\am}{arg\\,max}\\am_x$.\n",
-            "So $a \\text{ for $i$}$, $\\def\\am{\\operatorname*{arg\\,max}}\\am_x$.\n",
-        ),
-        ("> So\n> $$\na = b\n$$\n>\n> and on.\n", "> So\n> $$\n> a = b\n> $$\n>\n> and on.\n"),
-        ("So \\\\(a =\nb\\\\) and \\\\[c = d\\\\] here.\n", "So $a = b$\n and $$c = d$$ here.\n"),
-        (
-            "$$\n{{numeq}}{eq:a_b}\na = b\n$$\n\n**{{thm}}{thm:c}[Of $c$]** As {{eqref: eq:a_b}}\n"
-            "and {{ref: thm:c}} say.\n",
-            '$$\na = b\n$$ {#eq:a-b}\n\n**<a id="thm-c"></a>Theorem (Of $c$)** As [](#eq:a-b)\n'
-            "and [C](#thm-c) say.\n",
-        ),
-        ("$$\na = b\n$$ (eq:c)\n\nBy [](eq:c).\n", "$$\na = b\n$$ {#eq:c}\n\nBy [](#eq:c).\n"),
-        (
-            "(a)=\n```{prf:Theorem} Of a\n:label: a\n\nText.\n```\n",
-            '<a id="a"></a>\n\n> [!theorem] Of a {#theorem:a}\n> Text.\n',
-        ),
-        ("Text.\n\n#\n\nOn.\n", "Text.\n\n\n\nOn.\n"),
-        (
-            ":::{glossary}\n[A](https://example.org/a)\n: One,\non.\n: Also 1.\n\nB\nC\n\n"
-            ": Two.[^n]\n\n[^n]: Or so.\n\nA\n: Three.\n:::\n",
-            "[A]{term} (<https://example.org/a>): One, on. Also 1.\n\n"
-            "[B]{term}, [C]{term}: Two.[^n]\n\n[^n]: Or so.\n\nA: Three.\n",
-        ),
-        (":::{show-index}\n:::\n\nText.\n", "Text.\n"),
-    ],
-    ids=[
-        "script",
-        "import",
-        "comment",
-        "letters",
-        "id",
-        "icon",
-        "lines",
-        "fence in a list",
-        "block without a kind",
-        "code over lines",
-        "pair of tags",
-        "tag",
-        "fence in a comment",
-        "address over lines",
-        "formula over lines",
-        "break behind a formula",
-        "formula behind a text",
-        "dollars in code",
-        "lines of a formula",
-        "empty formula",
-        "formula in words of a formula",
-        "declared operator",
-        "lazy lines of a formula",
-        "brackets over lines",
-        "numbers of mdBook",
-        "label with the kind of a formula",
-        "label before a directive",
-        "empty heading",
-        "glossary with colons",
-        "index",
-    ],
-)
-def test_a_text_of_another_tool_keeps_all_that_readers_see(
-    tmp_path: Path, source: str, lesson: str
-) -> None:
-    course = convert_files(tmp_path, {"one.md": f"# One\n\n{source}"})
-    assert course.files["content/lessons/1.1-one.md"].decode() == lesson
 
 
 def test_a_long_text_is_within_the_limit_of_its_new_course(tmp_path: Path) -> None:
@@ -358,13 +277,6 @@ def test_macros_of_settings_hold_in_the_formulas_that_use_them(tmp_path: Path) -
     first, second = (course.files[f"content/lessons/1.{n}.md"].decode() for n in ("1-one", "2-two"))
     assert first == "$\\def\\of#1#2{#1(#2)}\\def\\R{R}\\of{f}{x} \\in \\R$\n"
     assert second == "The set $\\def\\R{\\mathbb{R}}\\R$.\n"
-
-
-def test_links_of_a_wiki_lead_to_the_pages_of_their_titles(tmp_path: Path) -> None:
-    texts = {"Home.md": "See [[The first page]] and [[none]].\n", "The-first-page.md": "Text.\n"}
-    course = convert_files(tmp_path, texts)
-    lesson = course.files["content/lessons/1.1-home.md"].decode()
-    assert lesson == "See [The first page](lesson:1.2) and [[none]].\n"
 
 
 def test_a_text_of_headings_alone_is_a_draft(tmp_path: Path) -> None:

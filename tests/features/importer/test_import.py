@@ -258,6 +258,7 @@ def test_single_file_is_imported_with_what_it_names(
     assert message in import_refused(capsys, "model.xml")
 
 
+@pytest.mark.site
 def test_cells_of_strangers_run_in_the_sandbox_or_not_at_all(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -289,6 +290,7 @@ def test_blocks_that_nest_too_deep_are_shown_as_they_were_written(
     assert lesson.read_text().count(opening.split()[0]) > 1000
 
 
+@pytest.mark.site
 @pytest.mark.parametrize(
     ("name", "again"),
     [("book.toml", "{{#include 1-a.md}}\n"), ("refs.bib", "```{include} 1-a.md\n```\n\n")],

@@ -16,6 +16,8 @@ import pytest
 
 from coursebuild.cli import main
 
+pytestmark = pytest.mark.site
+
 ABSENT = "a_package_that_nobody_has"
 PNG = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
@@ -167,7 +169,6 @@ def test_a_picture_that_a_notebook_holds_is_shown_until_its_script_has_drawn_it(
     assert files[1].read_bytes() == PNG
 
 
-@pytest.mark.site
 def test_a_page_says_which_figure_is_not_drawn_yet(folder: Path) -> None:
     write_notebook(folder / "old/a.ipynb", "print(1)", printed="1\n")
     assert main(["import", "old", "--out", "new"]) == 0

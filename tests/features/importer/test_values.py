@@ -8,36 +8,10 @@ from pathlib import Path
 import pytest
 
 from coursebuild.cli import main
+from support.fixture_cases import fixture_text
 
-TEXT = """\
-# One
-
-Before: `{python} x`.
-
-```{python}
-x = 12 / 7
-name = "Euler"
-```
-
-It is `{python} x`, by `{python} name`, or `{python} f"{x:.2f}"`.
-
-```{python}
-x = 3
-```
-
-> Now it is `{python} x` and `{python} gone`.
-"""
-GLUED = """\
-# Two
-
-```{code-cell}
-from myst_nb import glue
-glue("third", 1 / 3)
-y = 2.5
-```
-
-It is {glue:text}`third:.2f`, {eval}`y`, {glue:text}`elsewhere`.
-"""
+TEXT = fixture_text("documents/inline_values.md")
+GLUED = fixture_text("documents/glued_values.md")
 RUNNER = """
 import re, sys
 code = re.sub(r"(\\w+) <- ", r"\\1 = ", open(sys.argv[1]).read()).replace("cat(", "print(")

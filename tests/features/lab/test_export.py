@@ -11,6 +11,7 @@ import math
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from textwrap import indent
@@ -42,7 +43,7 @@ from coursebuild.features.lab.javascript import UntranslatableError
 from coursebuild.features.lab.trial import Engines
 from coursebuild.pipeline.options import Options
 from support.built_sites import BuiltCourses
-from support.fixture_cases import Case, check_cases, fixture_text
+from support.fixture_cases import Case, check_cases, fixture_tables, fixture_text
 from support.lab_values import Bench, make_lab, try_labs
 from support.made_courses import make_course
 
@@ -53,50 +54,7 @@ METADATA = ExportMetadata("lab_1_1_1.py", "a lab of lesson 1.1, “First”", "A
 PENDULUM = fixture_text("documents/pendulum.xml")
 MODEL = {"models/a.xml": PENDULUM.encode()}
 
-RICH: dict[str, Any] = {
-    "title": 'A "lab" with \\ everything',
-    "xml": PENDULUM,
-    "key": "up",
-    "setup": "ctx.count = 0; ctx.start = lib.sitePos('end'); ctx.high = false\n"
-    "const kick = 0.3 - 0.5\ndata.qvel[0] = kick / 4\n"
-    "model.geom_rgba[2] = data.ncon > 0 ? 0.1 : 0.9; model.geom_rgba[5] *= 0.99",
-    "controller": "ctx.count++\n"
-    "const q = lib.qpos('hinge'), v = data.qvel[0]\n"
-    "if (sim.time > 0.1 && !ctx.high) data.ctrl[0] = -ctx.gain * q - ctx.damping * v\n"
-    "else { data.ctrl[0] = 0 }\n"
-    "for (let i = 1; i < model.nv; i++) { data.qfrc_applied[i] -= 0.01 * data.qvel[i] }\n"
-    "data.qfrc_applied.fill(0, 1, 3)\n"
-    "data.mocap_pos.set([1, 0, 1 + data.time / 10], 0)\n"
-    "ctx.high = data.xpos[3 * lib.bodyId('arm') + 2] > 100",
-    "controls": [
-        {"label": "gain", "param": "gain", "min": 0, "max": 4, "value": 2, "unit": "N m"},
-        {"label": "damping", "param": "damping", "min": 0, "max": 1, "value": 0.3, "reset": True},
-        {"label": "gravity", "set": "model.opt.gravity[2]", "min": -20, "max": 0, "value": -9.81},
-        {"label": "lift", "apply": "const up = value * 2; data.qpos[3] += up", "init": True,
-         "min": 0, "max": 0.5, "value": 0.125},
-        {"type": "select", "label": "integrator", "set": "model.opt.integrator", "reset": True,
-         "options": [["RK4", 1], ["Euler", 0]], "value": 1},
-        {"type": "select", "label": "mode", "param": "mode",
-         "options": [["free", "free"], ["held", "held"]]},
-        {"type": "button", "label": "Kick",
-         "run": "if (ctx.mode === 'held') return\ndata.qvel[0] += 1; sim.play()"},
-        {"type": "button", "label": "Again", "run": "sim.reset(); data.qvel[0] = -1"},
-    ],
-    "readouts": [
-        {"label": "energy", "expr": "lib.energy().total"},
-        {"label": "momentum", "expr": "lib.norm(lib.momentum())"},
-        {"label": "spin", "expr": "lib.angmom()[1]", "digits": 5},
-        {"label": "force", "expr": "lib.normalForce('ball') + lib.normalForce()"},
-        {"label": "angle", "expr": "lib.deg(lib.qpos('hinge')) + lib.rad(1)"},
-        {"label": "way", "expr": "Math.abs(lib.sitePos('end')[2] - ctx.start[2])"},
-        {"label": "state", "expr": "data.ncon > 0 ? 'touches' : 'flies'"},
-        {"label": "colour", "expr": "model.geom_rgba[5] * 3 + model.jnt_qposadr[1]"},
-        {"label": "steps", "expr": "ctx.count", "digits": 0},
-        {"label": "told", "expr": "`${data.xpos[2].toFixed(2)} m, ${ctx.count} ${ctx.gain}`"},
-        {"label": "told too", "expr": "(1 / 3).toFixed(3) + 'm'"},
-    ],
-    "verify": {"seconds": 1},
-}  # fmt: skip
+RICH: dict[str, Any] = {"xml": PENDULUM, **tomllib.loads(fixture_text("documents/rich_lab.toml"))}
 
 
 WORD, TRIPLE = "ctx.word = '1'", "ctx.word * 3"
@@ -181,6 +139,7 @@ def run(path: Path, *values: object) -> str:
     return process.stdout
 
 
+@pytest.mark.long
 @pytest.mark.site
 def test_scripts_that_the_site_offers_print_what_lesson_4_2_says(
     built_courses: BuiltCourses, tmp_path: Path
@@ -372,25 +331,7 @@ def test_values_are_those_of_v8(v8: Isolate, engine: EngineDescription, code: st
     assert math.isclose(ctx.n, theirs, rel_tol=1e-9, abs_tol=1e-9)
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        "ctx.n ??= 3; ctx.n ??= 4",
-        "ctx.n = (ctx.k ?? 0.5) + [2, 3].map((a, i) => a * i).reduce((a, b) => a + b, 0)",
-        "const f = (a, b) => a - b; ctx.n = f(data.qpos[0], f(1, 2))",
-        "ctx.n = 0; const add = (a) => { if (a < 0) return 9; ctx.n += a; return 1 }"
-        "; ctx.v = add(4) + add(-1); ctx.n += ctx.v",
-        "let n = 1; const twice = () => { n *= 2 }; twice(); twice(); ctx.n = n",
-        "const [, b, c] = [5, 6, 7, 8]; ctx.n = 10 * b + c",
-        "ctx.n = 0; [4, 5].forEach((x, i) => { ctx.n += x * (i + 1) })",
-        "ctx.n = Math.max(...Array.from({length: 3}, (_, i) => data.qpos[i % 2] * i))",
-        "const m = [[1, 2], [3, 4]]; ctx.n = m.map((row) => row[1]).reduce((a, b) => a * b, 1)",
-        "ctx.n = Math.hypot(...Array.from(data.qpos).map(Math.abs))",
-        "ctx.k = null; ctx.n = ctx.k === null ? 1 : 2",
-        "ctx.k = 0; ctx.n = ctx.k === null ? 1 : 2",
-        "ctx.n = Math.fround(0.1)",
-    ],
-)
+@pytest.mark.parametrize("code", fixture_tables("javascript")["functions"])
 def test_functions_and_arrays_do_what_they_do_in_v8(
     v8: Isolate, engine: EngineDescription, code: str
 ) -> None:

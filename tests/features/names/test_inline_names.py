@@ -9,6 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from coursebuild.core.run.script_environment import engine_version
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder, block
 
 MakeCourse = Callable[..., Folder]
@@ -32,43 +33,13 @@ data = mujoco.MjData(model)
 print(json.dumps({"fall_time": 1}))""",
     '{"fall_time": 1}',
 )
-KNOWN = """
-`mujoco.mj_step(model, data, nstep=…)`, `mj_step`, `mjtJoint`, `mujoco.mjtJoint.mjJNT_HINGE`,
-`MjSpec.from_file`, `data.body("x").xpos[2]`, `data.contact[0].solref`, `data->qpos`,
-`mjModel.nq`, `model.opt.timestep`, `jnt_range`, `flg_local=1`, `spec.worldbody.add_body().pos`,
-`mjData`, `efc_pos`, `while data.time < 1`, `model.body_pos[i] += 1`, `<joint damping="2"/>`,
-`<visual><global>`, `</body>`, `solref="-1 -2"`, `<frame pos="0 0 1">`, `<div class="x">`,
-`measure(2)`, `ball_speed`, `fall_time`, `np.linalg.norm(x)`, `json.dumps`, `time.sleep(1)`,
-`len(x)`, `isinstance(x, int)`, `coursebuild check --strict`, `--quick`, `[verify] rtol`,
-`[[silence]]`, `[de]`, `examples/spin.py`, `models/NAME.toml`, `free_name`{code}, `listed_one`
-"""
+KNOWN = fixture_text("documents/known_names.md")
 NO_CLAIMS = """
 `damping`, `page.blocks`, `reader.add("x_y")`, `pip install --user x`, `x = 1`, `a.b.c`,
 `COURSE_KEY`, `draw(x)`, `i.e.`, `1e-3`, `m/s`, `kg m^2`, `_toc.yml`, `plot.svg`, `3.14.0`, `*`,
 `"a_b"`, `f(`, `<x@y.org>`, `--delay-updates`, `a -> b`
 """
-WRONG = """
-- `data.qpoz`, `data.body("x").xpoz[2]`, `data.contact[0].solreff`, `model.opt.timestp`
-- `mj_stp(model, data)`, `mujoco.mj_frwd(model)`, `mju_dott(a, b)`
-- `<mujoco><worldbody><geon size="1"/><geom sise="1"/></worldbody></mujoco>`
-- [`mesure(2)`](examples/spin.py), `coursebuild chek`, `coursebuild check --strct`
-- `[verify] rtoll` in `content/course.toml`
-
-| `mj_frward()` | **`mj_frward()`** |
-| --- | --- |
-| [`mj_frward()`](#names) | a[^n] |
-
-[^n]: `mj_frward()`
-
-> [!note] `mj_frward()`
-> - `mj_frward()`
-
-```quiz
-{"id": "q", "questions": [{"id": "a", "kind": "mcq", "q": "`mj_frward()`?",
- "options": ["`mj_frward()`", "b"], "answer": 1, "explain": "`mj_frward()`",
- "hints": ["`mj_frward()`"]}]}
-```
-"""
+WRONG = fixture_text("documents/wrong_names.md")
 OF_OTHERS = """
 `mj_data`, `mj_stp`, `mjcb_control`, `viewer.opt.flags`, `modl.nq`, `mjtJoint.mjJNT_FRE`,
 `MjSpec.from_fle`, `<joint dampng="2"/>`, `<geon/>`, `solreff="1"`, `mesure(2)`, `ball_sped`,
