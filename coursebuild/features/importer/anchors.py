@@ -15,7 +15,7 @@ from coursebuild.features.importer.displays import normalize_formulas
 
 TARGET = re.compile(
     r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)\((?P<name>[\w:./|@<>*+-]+)\)=[ \t]*"
-    r"(?:\n+(?P<heading>#{1,6}[ \t].*))?$",
+    r"(?:\n{1,2}(?P<heading>#{1,6}[ \t].*))?$",  # a title that was taken out leaves more
     re.MULTILINE,
 )
 FIGURE = re.compile(

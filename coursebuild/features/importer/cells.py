@@ -29,7 +29,6 @@ _WINDOW = re.compile(
 """What opens a window where there is none."""
 _DISPLAY = re.compile(r"^([ \t]*)display\(", re.MULTILINE)
 """What Jupyter shows without an import."""
-_FIGURE = re.compile(r"\b(?:plt|pyplot|ax|axs|axes)\.(?!close|io|rc|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
 _MAGIC = re.compile(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
@@ -58,11 +57,11 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
         blocks = [marks.fence(language, shown_code)] if shown_code else []
         return "\n\n".join((*blocks, *write_outputs(cell, context)))
     code, figure = _with_new_paths(code, context), ""
+    draws = _find_drawing(code, context.drawing)
     if _SAVED.search(code):
         code, figure = _take_saved_figures(cell, code, context)
-    elif _draws(cell, code):
-        pyplot = next(filter(None, map(_name_of_pyplot, (*context.parts, code))), "")
-        if pyplot:
+    elif draws if cell.picture is None else cell.picture[1]:
+        if pyplot := next(iter(context.drawing.values()), ""):
             code, figure = _save_figure(cell, code, pyplot, context)
         else:
             message = "a figure: save it in the script, and name it by `figure=`"
@@ -95,23 +94,41 @@ def print_values(text: str, context: LessonContext) -> str:
     return re.sub(rf"^(.*){_END} (\d+)\n", lines, text, flags=re.MULTILINE)
 
 
-_PYPLOT = re.compile(
-    r"^[ \t]*(?:import matplotlib\.pyplot as (\w+)|from matplotlib import (pyplot)(?: as (\w+))?"
-    r"|import (matplotlib)(?:\.pyplot)?(?: as (\w+))?[ \t]*(?:[#;]|$))",
-    re.MULTILINE,
+_MAKERS = frozenset(
+    "figure subplots subplot subplot_mosaic subplot2grid axes gca gcf polar matshow axhline axvline "
+    "bar barbs barh boxplot broken_barh contour contourf ecdf errorbar eventplot fill fill_between "
+    "fill_betweenx hexbin hist hist2d hlines imshow loglog pcolor pcolormesh pie plot quiver "
+    "scatter semilogx semilogy specgram spy stackplot stairs stem step streamplot tricontour "
+    "tricontourf tripcolor triplot violinplot vlines".split()
 )
+"""Functions of pyplot that make a figure where there is none."""
 
 
-def _name_of_pyplot(code: str) -> str:
-    """Return what code calls the module that draws; empty where it does not import it."""
-    match = _PYPLOT.search(code)
-    if match is None:
-        return ""
-    alias, name, other_name, package, other_package = match.groups()
-    if package is None:
-        return alias or other_name or name
-    whole = f"{other_package or package}.pyplot"
-    return whole if whole in code else ""
+def _find_drawing(code: str, names: dict[str, str]) -> bool:
+    """Return whether a cell makes a figure; `names` get the functions that do, with their pyplot.
+
+    What an earlier cell drew is closed by now: to go on in it shows nothing there either.
+    """
+    tree = ast.parse(code)
+    for node in ast.walk(tree):
+        match node:
+            case ast.Import(modules) | ast.ImportFrom("matplotlib", modules):
+                found = (a for a in modules if a.name in ("matplotlib.pyplot", "pyplot"))
+                pyplots = [a.asname or a.name for a in found]
+            case ast.Attribute(ast.Name(root), "pyplot"):
+                pyplots = [f"{root}.pyplot"]
+            case _:
+                continue
+        names |= {f"{name}.{maker}": name for name in pyplots for maker in _MAKERS}
+    draws = False
+    for statement in tree.body:
+        calls = [ast.unparse(n.func) for n in ast.walk(statement) if isinstance(n, ast.Call)]
+        pyplot = next((names[call] for call in calls if call in names), "")
+        if isinstance(statement, ast.FunctionDef):
+            names |= {statement.name: pyplot} if pyplot else {}
+        else:
+            draws |= bool(pyplot)
+    return draws
 
 
 _SAVED = re.compile(
@@ -173,17 +190,6 @@ def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = T
 _DRAWN_TITLE = re.compile(
     r"\.(?:set_)?(?:sup)?title\(\s*(?:r|f(?!.*\{))?([\"'])((?:(?!\1).)+)\1"  # none is computed
 )
-
-
-def _draws(cell: Segment, code: str) -> bool:
-    """Whether there is a figure below a cell, as it is recorded, or as its own statements say."""
-    if cell.picture is not None:
-        return bool(cell.picture[1])
-    return any(
-        _FIGURE.search(ast.unparse(statement))
-        for statement in ast.parse(code).body
-        if not isinstance(statement, ast.FunctionDef | ast.ClassDef | ast.AsyncFunctionDef)
-    )
 
 
 def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) -> tuple[str, str]:

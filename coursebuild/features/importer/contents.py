@@ -118,7 +118,6 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         macros="".join(map(read_macros, settings)),
         levels=tuple(levels),
         pages=tuple(pages),
-        has_hidden_lines=outline.has_hidden_lines,
     )
 
 

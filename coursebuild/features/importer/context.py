@@ -76,6 +76,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """The scripts that its cells of other languages are together, by language."""
     single_languages: frozenset[str] = frozenset()
     """The languages of which it has a single cell."""
+    drawing: dict[str, str] = field(default_factory=dict)
+    """The functions by which its cells make figures, each with the name of its pyplot."""
     figures: list[str] = field(default_factory=list)
     """The files that it draws."""
     notebook_outputs: list[tuple[str, str]] = field(default_factory=list)

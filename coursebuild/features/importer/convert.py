@@ -396,6 +396,7 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
         substitutions={**course_context.substitutions, **text.substitutions},
         title=text.title,
         parts=[],
+        drawing={},
         scripts=[],
         joined={},
         prints={},

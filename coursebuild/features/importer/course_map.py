@@ -263,8 +263,9 @@ def _read_file(
             source = number_examples(source)
         if text.file.endswith(".qmd"):  # there a tag need not be apart from a block
             source = _TAG_BESIDE_BLOCK.sub(r"\g<0>\n", source)
-        if course.has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
-            files.account.changed["hidden lines of Rust", "dropped: readers did not see them"] += 1
+        visible_text = without_hidden_lines(source, files.hidden_marks)
+        if visible_text != source:
+            files.account.changed["hidden lines of code", "dropped: readers did not see them"] += 1
             source = visible_text
         read = read_segments(source, text.file, title)
     except RecursionError:

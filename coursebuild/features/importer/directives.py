@@ -17,7 +17,7 @@ from coursebuild.features.importer.context import NUMBERED, LessonContext, label
 from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.roles import words_of_link, write_link
+from coursebuild.features.importer.roles import convert_role, words_of_link, write_link
 from coursebuild.features.importer.source_files import TOO_MUCH, read_yaml
 
 
@@ -147,6 +147,8 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             words = " ".join(f"{argument} {text}".split())
             context.leave(kind, f"{kind} (`{words.replace('`', '')}`), which no page here shows")
             return ""
+        case "embed":
+            return convert_role(name, argument.strip().removeprefix("#"), context)
         case "rubric" | "centered":
             return f"**{rewrite_prose(argument, context)}**\n\n{directive.nested(text)}"
         case "tab-item" | "tabbed" | "grid-item-card" | "card":

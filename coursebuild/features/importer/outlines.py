@@ -41,8 +41,6 @@ class Outline(Struct, frozen=True, kw_only=True):
     language: str = ""
     parts: tuple[ImportedText | ImportedLevel, ...]
     pages: tuple[ImportedText, ...] = ()
-    has_hidden_lines: bool = False
-    """Whether lines of Rust that begin with `# ` are hidden from readers."""
 
 
 def read_outline(files: SourceFiles) -> Outline | None:
@@ -59,7 +57,7 @@ def read_outline(files: SourceFiles) -> Outline | None:
     path = next((path for path in map(posixpath.normpath, places) if path in files), "")
     if path:
         files.account.changed["map", "content/course.toml"] += 1
-        outline = _read_summary(path, str(value_at(settings, "title") or ""), files, is_mdbook)
+        outline = _read_summary(path, str(value_at(settings, "title") or ""), files)
         if not is_mdbook:
             return outline
         for key, value in (settings if isinstance(settings, Mapping) else {}).items():
@@ -139,7 +137,7 @@ class _Entry(Struct, frozen=True):
     text: ImportedText
 
 
-def _read_summary(path: str, title: str, files: SourceFiles, is_mdbook: bool) -> Outline:
+def _read_summary(path: str, title: str, files: SourceFiles) -> Outline:
     groups: list[tuple[str, list[_Entry]]] = [("", [])]
     is_first = True
     for number, line in enumerate(re.sub(r"<!--.*?-->", "", files.read_text(path)).split("\n"), 1):
@@ -170,7 +168,7 @@ def _read_summary(path: str, title: str, files: SourceFiles, is_mdbook: bool) ->
             parts.append(ImportedLevel(title=name, lessons=tuple(e.text for e in lessons)))
         else:
             parts += _group_by_depth(lessons)
-    return Outline(title=title, parts=tuple(parts), pages=tuple(pages), has_hidden_lines=is_mdbook)
+    return Outline(title=title, parts=tuple(parts), pages=tuple(pages))
 
 
 def _group_by_depth(entries: Iterable[_Entry]) -> Iterator[ImportedText | ImportedLevel]:

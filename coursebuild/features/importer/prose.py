@@ -71,6 +71,7 @@ _LINE = re.compile(
     r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
     r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
+    r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
     rf"|(?P<told>(?<![\w@.\\/])@(?P<work>{_KEY})(?:[ ]?\[[, ]*(?P<cited>[^\[\]\n@]+)\](?!\())?)"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
@@ -84,7 +85,6 @@ _LINE = re.compile(
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:(?:\{[^{}\n]*\})?(?:[ ]|&nbsp;)*)"
     r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
-    r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
     r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z])-{2,3}(?=[a-z]))"
@@ -311,6 +311,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             dressing, hover = match["dressing"] or "", match["hover"] or ""
             alt = match["alt"] or "".join(words for _, words in _ALT.findall(dressing))
             source = match["source"].strip("<>")
+            if source.startswith("#"):
+                return convert_role("embed", source[1:], context)
             if source.endswith("#only-dark"):  # a page makes its pictures dark itself
                 return ""
             if re.match("[a-z]+://|//", source):
@@ -355,7 +357,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             formula = whole.replace("&lt;", "<").replace("&gt;", ">")  # as some notebooks hold it
             if _WORD.search(formula):
                 return whole
-            return _TIGHT.sub(lambda m: f"${m[1].strip()}$", formula)
+            return _TIGHT.sub(lambda m: m[1].strip() and f"${m[1].strip()}$", formula)
         case "code":
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)
@@ -423,7 +425,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":
             address = match["named"]
-            return whole.removesuffix(address) + (context.resolve_link(address) or GONE)
+            label = whole.removesuffix(address)
+            label = label.replace("@", r"\@") if _CITED_KEY.search(label) else label
+            return label + (context.resolve_link(address) or GONE)
         case "tag":
             return convert_tag(whole, context)
         case "dashes":

@@ -49,7 +49,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             return write_link(words, context.resolve_formula(target))
         case "doc":
             return write_link(words or title_of_file(target), context.resolve_link(f"{target}.md"))
-        case "ref" | "numref" | "prf:ref" | "any":
+        case "ref" | "numref" | "prf:ref" | "any" | "embed":
             address = address_of_label(target, context)
             if not address:
                 message = f"a link to `{target}`, which no text sets"
@@ -165,8 +165,8 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     address = "".join(arguments[:1])
     if name in ("tab", "code") and title:
         return f"**{title[1]}**"
-    if name == "video" or (name == "embed" and whole[1] == "%"):
-        address = address.removeprefix("url=").strip('"')
+    if name in ("video", "embed"):
+        address = re.sub(r"(?<=\.ipynb)#.*", "", address.removeprefix("url=").strip('"'))
         return write_link(title[1] if title else address, context.resolve_link(address))
     if name.removeprefix("end") in _FRAMES and name != "embed":
         return ""

@@ -118,8 +118,6 @@ class ImportedCourse(Struct, frozen=True, kw_only=True):
     """What names between braces stand for in its texts."""
     macros: str = ""
     """The definitions of macros in its settings."""
-    has_hidden_lines: bool = False
-    """Whether lines of Rust that begin with `# ` are hidden from readers."""
     camera_is_position: bool = False
     """Whether the angles of a lab's camera give its position as seen from its target."""
 
@@ -267,12 +265,31 @@ class SourceFiles:
         pattern = r"\b(?:base_path|include_dir):[ \t]*(?:\[|\n[ \t]*-[ \t]*)?[\"']?([\w./-]+)"
         return re.findall(pattern, self.read_text(settings)) if settings else []
 
+    @cached_property
+    def hidden_marks(self) -> Mapping[str, str]:
+        """What begins lines of code that mdBook hides, by language."""
+        if "book.toml" not in self:
+            return {}
+        settings = read_toml(self.read_text("book.toml"))
+        marks = value_at(settings, "output", "html", "code", "hidelines")
+        return {**(marks if isinstance(marks, dict) else {}), "rust": "#"}
+
+    @cached_property
+    def macro_marks(self) -> Sequence[tuple[str, str]]:
+        """The marks that stand for braces, as settings of MkDocs name them, each with these."""
+        settings = self.find_settings("mkdocs.yml")
+        names = {"variable_start": "{{", "variable_end": "}}", "block_start": "{%", "block_end": "%}"}
+        pattern = rf"\bj2_({'|'.join(names)})_string:[ \t]*[\"']?([^\s\"']+)"
+        found = re.findall(pattern, self.read_text(settings)) if settings else []
+        return [(mark, names[name]) for name, mark in found]
+
     def has_signs(self, path: str) -> bool:
         """Whether the tool of a text draws hyphens in a row as a dash."""
         signs = "smart-punctuation = true"
         return (
             path.endswith((".qmd", ".Rmd"))
             or "conf.py" in self
+            or "_config.yml" in self
             or ("book.toml" in self and signs in self.read_text("book.toml"))
         )
 

@@ -226,7 +226,7 @@ MDBOOK: list[Construct] = [
     ("file that is included", CHANGED, "```rust\n{{#rustdoc_include code.rs:wd}}\n```"),
     ("file that is included", CHANGED, "{{#playground code.rs}}"),
     ("file that is included", LEFT, "{{#include wd6.rs}}"),
-    ("hidden lines of Rust", CHANGED, "```rust\n# fn main() {\nwd7();\n# }\n#[wd8]\n```"),
+    ("hidden lines of code", CHANGED, "```rust\n# fn main() {\nwd7();\n# }\n#[wd8]\n```"),
     ("block of `rust`", CHANGED, "```rust,ignore,editable\nwd9\n```"),
     ("callout", CHANGED, '```admonish warning title="wd10"\nText wd11\n```'),
     ("link", CHANGED, "[wd12](two.html#part)"),

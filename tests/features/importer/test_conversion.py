@@ -92,6 +92,23 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
     assert saving in lesson and ".show(" not in lesson
 
 
+def test_a_cell_draws_where_it_makes_a_figure(tmp_path: Path) -> None:
+    """Not where it asks for colours, or goes on in a figure that is shown above."""
+    cells = (
+        "import matplotlib.pyplot as plt\nplt.style.use('ggplot')",
+        "f, left = plt.subplots()\nleft.plot([1, 2])",
+        "left.plot([3])\nplt.get_cmap('viridis')\nplt.close()",
+        "def draw():\n    plt.plot([1])",
+        "draw()",
+    )
+    text = "".join(f"```{{python}}\n{cell}\n```\n\n" for cell in cells)
+    course = convert_files(tmp_path, {"one.qmd": f"# One\n\n{text}"})
+    lesson = course.files["content/lessons/1.1-one.md"].decode()
+    assert "figure=l1-1-one-1.svg,l1-1-one-2.svg\n" in lesson
+    assert 'left.plot([1, 2])\nplt.savefig("l1-1-one-1.svg")' in lesson
+    assert 'draw()\nplt.savefig("l1-1-one-2.svg")' in lesson
+
+
 @pytest.mark.parametrize(
     ("source", "lesson"),
     [
