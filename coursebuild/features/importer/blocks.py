@@ -57,7 +57,7 @@ _HIGHLIGHT = re.compile(
 _CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
 _QUOTED_KIND = re.compile(
-    r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\])", re.MULTILINE
+    r"^((?:[ \t]*>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\])", re.MULTILINE
 )
 
 

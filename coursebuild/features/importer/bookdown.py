@@ -38,7 +38,7 @@ _FENCE = re.compile(
 _DIVISION = re.compile(
     r"^(:{3,}[ \t]*)\{\.(?P<kind>[a-z]+)[ ]+#(?P<label>[\w-]+)(?P<rest>[^{}\n]*)\}", re.M
 )
-_PICTURE = re.compile(
+PICTURE = re.compile(
     r"\s*(?:knitr::)?include_graphics\(\s*([\"'])(?P<path>[^\"'\n]+)\1[^()]*\)\s*"
 )
 _CAPTION = re.compile(r"fig\.cap\s*=\s*(?:\"(?P<a>(?:[^\"\\]|\\.)*)\"|'(?P<b>(?:[^'\\]|\\.)*)')")
@@ -74,7 +74,7 @@ def _write_fence(match: re.Match[str]) -> str:
     kind, options, body = match["kind"], match["options"], match["body"]
     name = _LABEL.match(options)
     label = name[1] if name else ""
-    if kind == "r" and (picture := _PICTURE.fullmatch(body)):
+    if kind == "r" and (picture := PICTURE.fullmatch(body)):
         caption = _CAPTION.search(options)
         words = (caption["a"] or caption["b"] or "").replace("\\\\", "\\") if caption else ""
         mark = f"{{#fig-{label}}}" if words and label else ""

@@ -250,7 +250,8 @@ def options_of(cell: Segment) -> Mapping[str, str]:
                     pending.append(inner)
                 else:
                     text = " ".join(map(str, inner)) if isinstance(inner, list) else str(inner)
-                    options[str(name)] = text.lower() if isinstance(inner, bool) else text
+                    text = text.lower() if isinstance(inner, bool) else text
+                    options[str(name).replace(".", "-")] = text  # as knitr and Quarto call it
     return options
 
 

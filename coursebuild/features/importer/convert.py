@@ -152,13 +152,19 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
     """Return the new paths of models, and of the files that they are made of, by their paths."""
     models: dict[str, str] = {}
     texts: dict[str, str] = {}
+    homes: dict[str, list[str]] = {}
+    """Files in folders called `models`, by what the folders are in."""
     for path in files:
-        folders = posixpath.dirname(path).split("/")
-        if "models" in folders:
-            inner_folders = folders[folders.index("models") + 1 :]
-            models[path] = "/".join(("models", *inner_folders, posixpath.basename(path)))
+        home, mark, name = f"/{path}".partition("/models/")
+        if mark:
+            homes.setdefault(home, []).append(path)
+            models[path] = f"models/{name}"
         if path.endswith(".xml") and b"<mujoco" in (data := files.read(path)):
             texts[path] = data.decode("utf-8", "replace")
+    for paths in homes.values():
+        if not any(path in texts or path.endswith(".urdf") for path in paths):
+            for path in paths:  # models of another trade
+                del models[path]
     parts = {
         path: [part for part in existing_files(files.folder, path, text) if part in files]
         for path, text in texts.items()

@@ -14,6 +14,7 @@ from collections.abc import Iterable, Iterator
 from msgspec.structs import replace
 
 from coursebuild.api import marks
+from coursebuild.features.importer.bookdown import PICTURE
 from coursebuild.features.importer.cells import (
     caption_of_code,
     code_for_readers,
@@ -23,6 +24,7 @@ from coursebuild.features.importer.cells import (
     write_recorded,
 )
 from coursebuild.features.importer.context import JoinedCells, LessonContext, to_anchor
+from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment
 
 _EXTENSIONS = {
@@ -82,6 +84,10 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
         label = f"fig-{own_label}" if "fig-cap" in options else ""
         label = label or (f"tbl-{own_label}" if "caption" in code else "")
     head = [f'<a id="{to_anchor(label)}"></a>'] if label else []
+    if picture := PICTURE.fullmatch(code):
+        words = options.get("fig-cap", "")
+        mark = f"{{#{label}}}" if words and label.startswith("fig-") else ""
+        return rewrite_prose(f"![{words}]({picture['path']}){mark}", context)
     head += caption_of_code(options, context, ("fig-cap", "lst-cap"))
     if _SETTINGS.fullmatch(code):
         context.leave(kind, f"a {kind} that sets how its tool shows others")

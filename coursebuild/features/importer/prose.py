@@ -70,7 +70,7 @@ _LINE = re.compile(
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
-    r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
+    r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\w*\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
     rf"|(?P<told>(?<![\w@.\\/])@(?P<work>{_KEY})(?:[ ]?\[[, ]*(?P<cited>[^\[\]\n@]+)\](?!\())?)"
@@ -85,7 +85,7 @@ _LINE = re.compile(
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:(?:\{[^{}\n]*\})?(?:[ ]|&nbsp;)*)"
     r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
-    r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
+    r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source|iframe)>)?)"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
     r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z])-{2,3}(?=[a-z]))"
     rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
@@ -151,7 +151,7 @@ _OVER_LINES = re.compile(
     r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
 )
 """A role, a note, a citation, the address of a link or a formula that goes on in the next line."""
-_TAG_OVER_LINES = re.compile(r"<(?i:a|img|source|video)[ \t\n](?=[^<>\n]*\n)[^<>]*>")
+_TAG_OVER_LINES = re.compile(r"<(?i:a|img|source|video|iframe)[ \t\n](?=[^<>\n]*\n)[^<>]*>(?:\s*</iframe>)?")
 _KINDS = {
     "role": ("", "Markdown"),
     "code": ("code in a line", "code without the tool's mark"),
@@ -408,7 +408,11 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             address = context.resolve_link(whole[1:-1])
             return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
         case "latex":
-            return "" if context.has_marks else whole
+            if not context.has_marks:
+                return whole
+            if "{" in whole:
+                context.leave("command of LaTeX", f"`{whole}`, which no page here shows")
+            return ""
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"

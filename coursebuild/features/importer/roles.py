@@ -203,10 +203,10 @@ def convert_wiki_link(whole: str, page: str, part: str, words: str, context: Les
     return write_link(words or page or part.lstrip("#"), address)
 
 
-_ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
+_ATTRIBUTE = re.compile(r"(?<=\s)(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
 
 
-_WITH_FILE = re.compile(r"<(?:a|img|source|video)\b", re.IGNORECASE)
+_WITH_FILE = re.compile(r"<(?:a|(?P<frame>iframe)|img|source|video)\b", re.IGNORECASE)
 _LOOK = re.compile(
     r"[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
 )
@@ -218,7 +218,14 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     A class names a look that its tool gives; here it could be that of another thing.
     """
     tag = _LOOK.sub("", tag)
-    attribute = _ATTRIBUTE.search(tag) if _WITH_FILE.match(tag) else None
+    kind = _WITH_FILE.match(tag)
+    attribute = _ATTRIBUTE.search(tag) if kind else None
+    if attribute and kind and kind["frame"]:
+        title = re.search(r"\stitle=[\"']([^\"']+)", tag)
+        address = context.resolve_link(attribute[3])
+        words = title[1] if title else words_of_link(address, attribute[3])
+        context.leave("tag of HTML", f"a frame that shows `{attribute[3]}`; it is a link now")
+        return f'<a href="{address}">{words}</a>' if address else words
     if attribute is None or re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
         return tag
     address = attribute[3].removeprefix("attachment:")

@@ -36,6 +36,7 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
             "made/task.xml": "<mujoco><include file='made.xml'/><include file='a.xml'/></mujoco>",
             "made/a.xml": "<mujoco><worldbody><geom material='m' size='1'/></worldbody></mujoco>",
             "made/mesh.xml": "<mujoco><asset><mesh file='no.obj'/></asset><worldbody/></mujoco>",
+            "test/models/people.json": "{}",
             "loose/keys.xml": "<mujoco><keyframe><key qpos='1 2'/></keyframe></mujoco>",
         },
     )
@@ -52,7 +53,7 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
     assert "a model that needs `made.xml`, which the folder does not hold" in account
     assert "a model that needs `no.obj`, which the folder does not hold" in account
     assert not any(word in path for path in course.files for word in ("loose", "keys", "made"))
-    assert "used by no text" not in account
+    assert "used by no text\n  - test/models/people.json" in account
 
 
 def test_links_to_places_of_a_planned_lesson_lead_to_the_lesson(tmp_path: Path) -> None:

@@ -415,6 +415,21 @@ def test_a_block_in_a_list_that_nothing_reads_is_text(tmp_path: Path) -> None:
             "> $$\n> a\n> =\n> b\n> =\n> c\n> $$\n>\n> > [!note]\n> > d\n",
             {},
         ),
+        (
+            "a.qmd",
+            "# One\n\nA bar.\\indexf{geom_bar}\n\n```{r}\n#| label: fig-a\n#| fig.cap: A ball.\n"
+            'knitr::include_graphics("p.png", dpi = 300)\n```\n\n'
+            '<iframe title="Film"\nsrc="https://a.org/b"></iframe>\n',
+            "A bar.\n\nFigure: ![A ball.](../files/p.png) A ball. {#fig:a}\n\n"
+            '<a href="https://a.org/b">Film</a>\n',
+            {"p.png": "\x89PNG"},
+        ),
+        (
+            "a.md",
+            "# One\n\n10. A\n\n    > [!EXAMPLE]\n    > B\n",
+            "10. A\n\n    > [!note]\n    > B\n",
+            {},
+        ),
     ],
 )
 def test_marks_and_labels_that_settings_or_a_text_give(
