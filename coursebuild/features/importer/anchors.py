@@ -39,6 +39,7 @@ _PLACES = (
     ("lst:", r"^(?:[`~ \t]*\{#|#\|[ \t]*(?:lst-)?label:[ \t]*)lst-(?P<name>[\w-]+)"),
     ("", r"^[: \t]*\{#(?P<name>(?:fig|tbl)-[\w-]+)"),
     ("fig-", _CHUNK),
+    ("fig:", _CHUNK + r"[^\n]*\bfig\.cap\b[^\n]*\n\s*(?:knitr::)?include_graphics\("),
     ("tbl-", _CHUNK),
     ("tab:", r"\{#tbl-(?P<name>[\w-]+)"),
     ("", r"^\s*:(?:label|name):[ \t]*(?P<name>\S+)"),
@@ -67,9 +68,13 @@ def find_anchors(text: str) -> set[str]:
 def write_figure(match: re.Match[str]) -> str:
     """Return a labelled picture in a paragraph of its own, as Quarto has it, with its caption."""
     alt = match["alternative"] or match["alt"]
-    return (
-        f"Figure: ![{alt}]({match['source']}) {match['alt']} {{#fig:{to_anchor(match['label'])}}}"
-    )
+    return figure_of(match["source"], match["alt"], match["label"], alt)
+
+
+def figure_of(source: str, caption: str, label: str, alt: str) -> str:
+    """Return the paragraph of a figure; without a label it has no number."""
+    mark = f" {{#fig:{label_anchor(label)}}}" if label else ""
+    return f"Figure: ![{alt}]({source}) {caption}{mark}"
 
 
 MARKDOWN_FIGURE = re.compile(

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from coursebuild.api import marks
 from coursebuild.core.scripts.figures import prepare_figure
+from coursebuild.features.importer.anchors import figure_of
 from coursebuild.features.importer.context import LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment, read_yaml
@@ -95,11 +96,11 @@ def print_values(text: str, context: LessonContext) -> str:
 
 
 _MAKERS = frozenset(
-    "figure subplots subplot subplot_mosaic subplot2grid axes gca gcf polar matshow axhline axvline "
-    "bar barbs barh boxplot broken_barh contour contourf ecdf errorbar eventplot fill fill_between "
-    "fill_betweenx hexbin hist hist2d hlines imshow loglog pcolor pcolormesh pie plot quiver "
-    "scatter semilogx semilogy specgram spy stackplot stairs stem step streamplot tricontour "
-    "tricontourf tripcolor triplot violinplot vlines".split()
+    "figure subplots subplot subplot_mosaic subplot2grid axes gca gcf polar matshow axhline "
+    "axvline bar barbs barh boxplot broken_barh contour contourf ecdf errorbar eventplot fill "
+    "fill_between fill_betweenx hexbin hist hist2d hlines imshow loglog pcolor pcolormesh pie "
+    "plot quiver scatter semilogx semilogy specgram spy stackplot stairs stem step streamplot "
+    "tricontour tricontourf tripcolor triplot violinplot vlines".split()
 )
 """Functions of pyplot that make a figure where there is none."""
 
@@ -111,15 +112,10 @@ def _find_drawing(code: str, names: dict[str, str]) -> bool:
     """
     tree = ast.parse(code)
     for node in ast.walk(tree):
-        match node:
-            case ast.Import(modules) | ast.ImportFrom("matplotlib", modules):
-                found = (a for a in modules if a.name in ("matplotlib.pyplot", "pyplot"))
-                pyplots = [a.asname or a.name for a in found]
-            case ast.Attribute(ast.Name(root), "pyplot"):
-                pyplots = [f"{root}.pyplot"]
-            case _:
-                continue
-        names |= {f"{name}.{maker}": name for name in pyplots for maker in _MAKERS}
+        pyplot = imported_names(node).get("matplotlib.pyplot", "")
+        if isinstance(node, ast.Attribute) and node.attr == "pyplot":
+            pyplot = ast.unparse(node)
+        names |= {f"{pyplot}.{maker}": pyplot for maker in _MAKERS if pyplot}
     draws = False
     for statement in tree.body:
         calls = [ast.unparse(n.func) for n in ast.walk(statement) if isinstance(n, ast.Call)]
@@ -129,6 +125,18 @@ def _find_drawing(code: str, names: dict[str, str]) -> bool:
         else:
             draws |= bool(pyplot)
     return draws
+
+
+def imported_names(node: ast.AST) -> Mapping[str, str]:
+    """Return the names that an import gives, by what they stand for: `np` by `numpy`."""
+    match node:
+        case ast.Import(names):
+            start = ""
+        case ast.ImportFrom(module, names):
+            start = f"{module}."
+        case _:
+            return {}
+    return {start + alias.name: alias.asname or alias.name for alias in names}
 
 
 _SAVED = re.compile(
@@ -155,9 +163,7 @@ def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tup
         data = context.files.read(source) if source in context.files else b""
         if cell.picture is not None and cell.picture[0] == f".{extension}":
             data = data or cell.picture[1]
-        picture = prepare_figure(name, data) if data else ""
-        if isinstance(picture, bytes):
-            context.copies[f"{context.folder}/{name}"] = picture
+        _copy_figure(name, data, context)
         context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
     code = _SAVED.sub(lambda match: f'{match["call"]}"{names[match["path"]]}"', code)
     caption = _caption_of(cell, code, context)
@@ -183,8 +189,7 @@ def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = T
     alt = " ".join(options.get("fig-alt", options.get("alt", "")).strip("\"' ").split()) or caption
     alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)
     label = options.get("label", "") if has_label else ""
-    mark = f" {{#fig:{to_anchor(label.removeprefix('fig-'))}}}" if label.startswith("fig-") else ""
-    return f"Figure: ![{alt}]({name}) {caption}{mark}"
+    return figure_of(name, caption, label if label.startswith("fig-") else "", alt)
 
 
 _DRAWN_TITLE = re.compile(
@@ -228,12 +233,15 @@ def _picture_stem(context: LessonContext) -> str:
 def _keep_picture(cell: Segment, context: LessonContext) -> str:
     """Copy the picture that is recorded below a cell, and return its name; empty for none."""
     extension, data = cell.picture or ("", b"")
-    picture = prepare_figure(f"x{extension}", data) if data else ""
-    if isinstance(picture, str):
-        return ""
     name = f"{_picture_stem(context)}{extension}"
-    context.copies[f"{context.folder}/{name}"] = picture
-    return name
+    return name if _copy_figure(name, data, context) else ""
+
+
+def _copy_figure(name: str, data: bytes, context: LessonContext) -> bool:
+    picture = prepare_figure(name, data) if data else ""
+    if isinstance(picture, bytes):
+        context.copies[f"{context.folder}/{name}"] = picture
+    return isinstance(picture, bytes)
 
 
 def options_of(cell: Segment) -> Mapping[str, str]:
@@ -279,21 +287,13 @@ def _without_host(text: str, context: LessonContext) -> str:
     except (SyntaxError, ValueError, RecursionError):
         return text
     lines, names = text.split("\n"), set[str]()
+    needless = ("google.colab", "myst_nb.", *(["__future__."] if context.parts else []))  # too late
     for statement in statements:
         match statement:
-            case ast.ImportFrom(module=str(module)) if (
-                module.partition(".")[0] == "google"
-                and "colab" in f"{module} {[a.name for a in statement.names]}"
+            case ast.Import() | ast.ImportFrom() if any(
+                module.startswith(needless) for module in imported_names(statement)
             ):
-                names |= {alias.asname or alias.name for alias in statement.names}
-            case ast.Import() if any(
-                alias.name.startswith("google.colab") for alias in statement.names
-            ):
-                pass
-            case ast.ImportFrom(module="myst_nb"):
-                pass
-            case ast.ImportFrom(module="__future__") if context.parts:  # it would come too late
-                pass
+                names |= {*imported_names(statement).values()}
             case ast.Expr(ast.Call(ast.Name("glue"), [ast.Constant(str(name)), value, *_])):
                 text_of_value = ast.get_source_segment(text, value)
                 lines[statement.lineno - 1] = f'print("{name}:", {text_of_value})'
@@ -355,7 +355,11 @@ def how_shown(cell: Segment) -> str:
 
 def code_for_readers(cell: Segment) -> str:
     """Return a cell's code without the lines that only its tool understands."""
-    return _drop_magics(_OPTION.sub("", _YAML_HEAD.sub("", cell.text, count=1))).strip("\n")
+    return _drop_magics(_without_options(cell.text)).strip("\n")
+
+
+def _without_options(text: str) -> str:
+    return _OPTION.sub("", _YAML_HEAD.sub("", text, count=1))
 
 
 def _drop_magics(text: str) -> str:
@@ -377,7 +381,7 @@ def _find_fault(text: str) -> str:
 def runnable_code(cell: Segment, context: LessonContext) -> str:
     """Return what the script runs of a cell; empty where that is nothing."""
     options = options_of(cell)
-    text = _OPTION.sub("", _YAML_HEAD.sub("", cell.text, count=1))
+    text = _without_options(cell.text)
     tags = cell.head + options.get("tags", "")
     if "raises-exception" in tags or options.get("error") == "true":
         context.leave("cell", "a cell that is meant to fail is shown, not run")
@@ -412,14 +416,10 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
     if not isinstance(last, ast.Expr) or text.rstrip().endswith(";"):
         return text
     if isinstance(last.value, ast.Call):
-        root: ast.expr = last.value.func
-        while isinstance(root, ast.Attribute | ast.Call):
-            root = root.func if isinstance(root, ast.Call) else root.value
-        drawing_names = ("print", "plt", "ax", "axs", "axes", "fig")
-        if isinstance(root, ast.Name) and root.id in drawing_names:
+        name = ast.unparse(last.value.func)
+        if re.match(r"(?:print|plt|ax|axs|axes|fig)\b", name):
             return text
         if not cell.shows_value:
-            name = ast.unparse(last.value.func)
             context.leave(
                 "value of a cell", f"the value of `{name}(…)` is shown there if it has one"
             )

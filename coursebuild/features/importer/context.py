@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct, field
@@ -135,10 +135,6 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         self.notes.append(words)
         return f"[^note-{len(self.notes)}]"
 
-    def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
-        """Return what a part of the text becomes, which the account notes."""
-        return self.files.account.convert(kind, change, old, convert)
-
     def resolve_link(self, address: str) -> str:
         """Return the new address of a link; empty where nothing in the course has it."""
         route = re.fullmatch(r"#?/lessons?/([^#?/]+)/?(#.*)?", address)
@@ -192,7 +188,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
-        return self.path.endswith((".qmd", ".Rmd")) or self.files.is_mkdocs
+        return self.path.endswith((".qmd", ".Rmd")) or bool(self.files.mkdocs)
 
     def resolve_picture(self, source: str) -> str:
         """Return the new address of a picture or file; empty where none here has it."""

@@ -152,19 +152,15 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
     """Return the new paths of models, and of the files that they are made of, by their paths."""
     models: dict[str, str] = {}
     texts: dict[str, str] = {}
-    homes: dict[str, list[str]] = {}
-    """Files in folders called `models`, by what the folders are in."""
     for path in files:
-        home, mark, name = f"/{path}".partition("/models/")
-        if mark:
-            homes.setdefault(home, []).append(path)
-            models[path] = f"models/{name}"
         if path.endswith(".xml") and b"<mujoco" in (data := files.read(path)):
             texts[path] = data.decode("utf-8", "replace")
-    for paths in homes.values():
-        if not any(path in texts or path.endswith(".urdf") for path in paths):
-            for path in paths:  # models of another trade
-                del models[path]
+    bodies = [*texts, *(path for path in files if path.endswith(".urdf"))]
+    homes = {f"/{path}".partition("/models/")[0] for path in bodies}  # not those of other models
+    for path in files:
+        home, mark, name = f"/{path}".partition("/models/")
+        if mark and home in homes:
+            models[path] = f"models/{name}"
     parts = {
         path: [part for part in existing_files(files.folder, path, text) if part in files]
         for path, text in texts.items()

@@ -289,10 +289,6 @@ def _read_file(
     if used_ids is not None:
         page = _free_id(page, (f"{page}-{n}" for n in itertools.count(2)), used_ids)
     path = f"content/lessons/{id}-{slug}.md" if id else f"content/pages/{page}.md"
-    if id and not any(segment.text.strip() for segment in read.segments):
-        path = ""  # a title alone
-        message = "a text of which nothing is left: a lesson that is planned"
-        files.leave(text.file, message, "text")
     return replace(
         text,
         id=id or page,

@@ -281,8 +281,7 @@ def _write_table(directive: Directive, context: LessonContext) -> str:
     if not width:
         return caption
     cells = [[_cell(cell, context) for cell in (*row, *[""] * (width - len(row)))] for row in rows]
-    lines = [f"| {' | '.join(row)} |" for row in cells]
-    return caption + "\n".join((lines[0], f"|{' --- |' * width}", *lines[1:]))
+    return caption + marks.table(cells[0], cells[1:])
 
 
 def _cell(text: str, context: LessonContext) -> str:

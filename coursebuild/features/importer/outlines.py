@@ -24,7 +24,6 @@ from coursebuild.features.importer.source_files import (
     ImportedLevel,
     ImportedText,
     SourceFiles,
-    read_toml,
     read_yaml,
     stem_of,
     title_of_file,
@@ -45,11 +44,9 @@ class Outline(Struct, frozen=True, kw_only=True):
 
 def read_outline(files: SourceFiles) -> Outline | None:
     """Return the map of a folder; `None` where it has none of these."""
-    is_mdbook, settings = "book.toml" in files, None
-    if is_mdbook:
-        settings = value_at(read_toml(files.read_text("book.toml")), "book")
-    elif "book.json" in files:  # of GitBook; JSON is YAML
-        settings = read_yaml(files.read_text("book.json"))
+    is_mdbook = "book.toml" in files  # else it may be one of GitBook
+    book = value_at(files.settings("book.toml"), "book")
+    settings = book if is_mdbook else files.settings("book.json")
     key, usual = ("src", "src") if is_mdbook else ("root", "")
     folder = str(value_at(settings, key) or usual)
     name = str(value_at(settings, "structure", "summary") or "SUMMARY.md")

@@ -151,7 +151,9 @@ _OVER_LINES = re.compile(
     r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
 )
 """A role, a note, a citation, the address of a link or a formula that goes on in the next line."""
-_TAG_OVER_LINES = re.compile(r"<(?i:a|img|source|video|iframe)[ \t\n](?=[^<>\n]*\n)[^<>]*>(?:\s*</iframe>)?")
+_TAG_OVER_LINES = re.compile(
+    r"<(?i:a|img|source|video|iframe)[ \t\n](?=[^<>\n]*\n)[^<>]*>(?:\s*</iframe>)?"
+)
 _KINDS = {
     "role": ("", "Markdown"),
     "code": ("code in a line", "code without the tool's mark"),
@@ -280,7 +282,9 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
         kind, change = _KINDS[group]
         if group == "role":
             kind = f"role `{{{match['name']}}}`"
-        return context.convert(kind, change, match[0], lambda: _rewrite_match(match, context))
+        return context.files.account.convert(
+            kind, change, match[0], lambda: _rewrite_match(match, context)
+        )
 
     return _LINE.sub(rewrite, line)
 
@@ -343,6 +347,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called
             )
             return _rewrite_line(called, context) if is_path else whole
+        case "math" | "digits" if not context.files.has_dollars and whole[:2] != "$$":
+            return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if not context.files.has_dollars:
             return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":
@@ -352,18 +358,16 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "note":
             return context.add_note(_rewrite_line(match["remark"], context))
         case "math":
-            if not context.files.has_dollars and whole[:2] != "$$":
-                return rf"\${_rewrite_line(whole[1:-1], context)}\$"
             formula = whole.replace("&lt;", "<").replace("&gt;", ">")  # as some notebooks hold it
             if _WORD.search(formula):
                 return whole
+            if context.path.endswith(".ipynb") and match.string.lstrip().startswith("|"):
+                formula = re.sub(r"(?<!\\)\|", r"\\vert ", formula)  # no bar there ends a cell
             return _TIGHT.sub(lambda m: m[1].strip() and f"${m[1].strip()}$", formula)
         case "code":
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)
             return re.sub(r"(?<!\\)\|", r"\\|", code) if is_cell else code
-        case "digits" if not context.files.has_dollars:
-            return whole.replace("$", r"\$")
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":

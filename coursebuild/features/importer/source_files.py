@@ -253,44 +253,51 @@ class SourceFiles:
         """Return the path of settings in YAML, which have two extensions; empty for none."""
         return next((path for path in (name, name.replace(".yml", ".yaml")) if path in self), "")
 
-    @property
-    def is_mkdocs(self) -> bool:
-        """Whether it is a project of MkDocs."""
-        return bool(self.find_settings("mkdocs.yml"))
+    def settings(self, name: str) -> Mapping[str, Any]:
+        """Return the settings in a file; none where it is not there, or cannot be read."""
+        path = self.find_settings(name)
+        read = read_toml if path.endswith(".toml") else read_yaml  # JSON is YAML
+        value = read(self.read_text(path)) if path else None
+        return value if isinstance(value, dict) else {}
+
+    @cached_property
+    def mkdocs(self) -> str:
+        """The settings of MkDocs; empty where it is no project of it."""
+        path = self.find_settings("mkdocs.yml")
+        return path and (self.read_text(path) or "\n")
 
     @cached_property
     def included_folders(self) -> Sequence[str]:
         """The folders in which MkDocs finds what texts include, besides their own."""
-        settings = self.find_settings("mkdocs.yml")
         pattern = r"\b(?:base_path|include_dir):[ \t]*(?:\[|\n[ \t]*-[ \t]*)?[\"']?([\w./-]+)"
-        return re.findall(pattern, self.read_text(settings)) if settings else []
+        return re.findall(pattern, self.mkdocs)
 
     @cached_property
     def hidden_marks(self) -> Mapping[str, str]:
         """What begins lines of code that mdBook hides, by language."""
-        if "book.toml" not in self:
-            return {}
-        settings = read_toml(self.read_text("book.toml"))
-        marks = value_at(settings, "output", "html", "code", "hidelines")
-        return {**(marks if isinstance(marks, dict) else {}), "rust": "#"}
+        marks = value_at(self.settings("book.toml"), "output", "html", "code", "hidelines")
+        own_marks = marks if isinstance(marks, dict) else {}
+        return {**own_marks, "rust": "#"} if "book.toml" in self else {}
 
     @cached_property
     def macro_marks(self) -> Sequence[tuple[str, str]]:
         """The marks that stand for braces, as settings of MkDocs name them, each with these."""
-        settings = self.find_settings("mkdocs.yml")
-        names = {"variable_start": "{{", "variable_end": "}}", "block_start": "{%", "block_end": "%}"}
+        names = {
+            "variable_start": "{{",
+            "variable_end": "}}",
+            "block_start": "{%",
+            "block_end": "%}",
+        }
         pattern = rf"\bj2_({'|'.join(names)})_string:[ \t]*[\"']?([^\s\"']+)"
-        found = re.findall(pattern, self.read_text(settings)) if settings else []
-        return [(mark, names[name]) for name, mark in found]
+        return [(mark, names[name]) for name, mark in re.findall(pattern, self.mkdocs)]
 
     def has_signs(self, path: str) -> bool:
         """Whether the tool of a text draws hyphens in a row as a dash."""
-        signs = "smart-punctuation = true"
         return (
             path.endswith((".qmd", ".Rmd"))
             or "conf.py" in self
             or "_config.yml" in self
-            or ("book.toml" in self and signs in self.read_text("book.toml"))
+            or value_at(self.settings("book.toml"), "output", "html", "smart-punctuation") is True
         )
 
     def find(self, path: str, *, is_hidden: bool = False) -> str:

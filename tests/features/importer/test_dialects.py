@@ -425,6 +425,12 @@ def test_a_block_in_a_list_that_nothing_reads_is_text(tmp_path: Path) -> None:
             {"p.png": "\x89PNG"},
         ),
         (
+            "a.ipynb",
+            '{"cells": [{"cell_type": "markdown", "source": "|a|\\n|---|\\n|$|b|$|"}]}',
+            "|a|\n|---|\n|$\\vert b\\vert$|\n",
+            {},
+        ),
+        (
             "a.md",
             "# One\n\n10. A\n\n    > [!EXAMPLE]\n    > B\n",
             "10. A\n\n    > [!note]\n    > B\n",

@@ -48,7 +48,7 @@ Table: Lines of rows.
 def test_a_grid_has_its_sides_items_and_paragraphs() -> None:
     assert rewrite(GRID) == (
         "| Fruit | Advantages |\n"
-        "| :-: | --: |\n"
+        "| :---: | ---: |\n"
         "| Banana | • wrapped<br>• bright |\n"
         "| Lemon, yellow | a \\| b<br>second |"
     )
@@ -58,7 +58,7 @@ def test_rows_of_several_lines_are_rows() -> None:
     assert rewrite(LONG) == (
         "Table: Lines of rows.\n"
         "| Centered Header | Default Aligned | Right Aligned | Left Aligned |\n"
-        "| :-: | --- | --: | :-- |\n"
+        "| :---: | --- | ---: | :--- |\n"
         "| First | row | 12.0 | Example of two |\n"
         "| Second | row | 5.0 | Here |"
     )
@@ -80,7 +80,7 @@ def test_a_cell_over_columns_and_rows_keeps_its_words() -> None:
 def test_a_table_without_a_heading_and_one_in_a_quotation() -> None:
     simple = "> a\n>\n> --- ---\n> b   c\n> d   e\n> --- ---\n>\n> : Its caption {#tbl-q}\n"
     assert rewrite(simple) == (
-        "> a\n> Table: Its caption {#tab:q}\n> |  |  |\n> | :-- | :-- |\n> | b | c |\n> | d | e |"
+        "> a\n> Table: Its caption {#tab:q}\n> |  |  |\n> | :--- | :--- |\n> | b | c |\n> | d | e |"
     )
 
 

@@ -259,7 +259,7 @@ def test_item_of_an_exercise_has_its_task_start_and_trials(make_course: Make) ->
     [item] = items(package(make_course(EXERCISE)))
     assert item.get("title") == "Write it yourself: Exercise"
     body = "".join(item.find(f"{{{QTI}}}itemBody").itertext())
-    for words in ("Make it weigh", "as MJCF", "mass='1'/>", "it weighs 2 kg: at least 2\xa0kg"):
+    for words in ("Make it weigh", "as MJCF", "mass='1'/>", "it weighs 2\xa0kg: at least 2\xa0kg"):
         assert words in body
     assert "mass='2'/>" in shape(item, "//q:rubricBlock[@view='scorer']/q:pre")[0]
     assert shape(item, "//q:modalFeedback")[0].endswith("Its mass is that of its geom.")
