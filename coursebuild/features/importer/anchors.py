@@ -35,6 +35,7 @@ _CHUNK = r"^(?:`{3,})?\{r[ \t]+(?P<name>[\w.-]+)[ \t]*(?=[,}])"
 _PLACES = (
     ("", TARGET.pattern),
     ("sec-", r"\{#sec-(?P<name>[\w-]+)"),
+    ("", r"^#{1,6}[ \t].*\{#(?P<name>[\w-]+)[^{}\n]*\}[ \t]*$"),
     ("", r"\{\{[a-z]+\}\}\{(?P<name>[^{}\n]+)\}"),
     ("lst:", r"^(?:[`~ \t]*\{#|#\|[ \t]*(?:lst-)?label:[ \t]*)lst-(?P<name>[\w-]+)"),
     ("", r"^[: \t]*\{#(?P<name>(?:fig|tbl)-[\w-]+)"),
@@ -75,6 +76,27 @@ def figure_of(source: str, caption: str, label: str, alt: str) -> str:
     """Return the paragraph of a figure; without a label it has no number."""
     mark = f" {{#fig:{label_anchor(label)}}}" if label else ""
     return f"Figure: ![{alt}]({source}) {caption}{mark}"
+
+
+TABLE_CAPTION = re.compile(
+    r"^(?P<table>(?:\|.*\n)+)\n?:[ ]+(?P<caption>.*?)[ ]*(?:\{#tbl-(?P<label>[\w-]+)[^{}]*\})?$",
+    re.MULTILINE,
+)
+"""A caption of Quarto, below its table."""
+
+
+def move_caption(match: re.Match[str]) -> str:
+    """Return a table below its caption."""
+    label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
+    return f"Table: {match['caption']}{label}\n\n{match['table']}"
+
+
+def write_target(match: re.Match[str]) -> str:
+    """Return an anchor, which a heading below it takes."""
+    anchor = to_anchor(match["name"])
+    if match["heading"] is None:
+        return f'{match["lead"]}<a id="{anchor}"></a>'
+    return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
 
 MARKDOWN_FIGURE = re.compile(

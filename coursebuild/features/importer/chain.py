@@ -125,8 +125,8 @@ class Chain:
         for number, code in enumerate(self.codes) if self.modules else ():
             lines = code.split("\n")
             for statement in ast.parse(code).body:
-                given = imported_names(statement)
-                if any(f"{name}.".startswith(f"{m}.") for name in given for m in self.modules):
+                modules = imported_names(statement)
+                if any(f"{name}.".startswith(f"{m}.") for name in modules for m in self.modules):
                     names |= _bound_names(statement)
                     first, last = statement.lineno - 1, statement.end_lineno or statement.lineno
                     lines[first:last] = [""] * (last - first)

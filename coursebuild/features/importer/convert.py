@@ -99,11 +99,8 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     lines = map_lines(course, ids, context.callouts, ("src",) if packages else (), longest)
     out["content/course.toml"] = _encode("".join(f"{line}\n" for line in lines))
     out[".gitignore"] = _GITIGNORE
-    for kind, paths in (
-        ("model", models),
-        ("file of the scripts", packages),
-        ("file", context.copies),
-    ):
+    copies = {"model": models, "file of the scripts": packages, "file": context.copies}
+    for kind, paths in copies.items():
         files.account.taken[kind] += len(paths)
     _leave_unused(files, (path for path in files if path in unused))
     account = files.account.text(files.name)
@@ -155,7 +152,7 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
     for path in files:
         if path.endswith(".xml") and b"<mujoco" in (data := files.read(path)):
             texts[path] = data.decode("utf-8", "replace")
-    bodies = [*texts, *(path for path in files if path.endswith(".urdf"))]
+    bodies = (path for path in files if path in texts or path.endswith(".urdf"))
     homes = {f"/{path}".partition("/models/")[0] for path in bodies}  # not those of other models
     for path in files:
         home, mark, name = f"/{path}".partition("/models/")

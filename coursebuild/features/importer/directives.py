@@ -194,7 +194,8 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
         case _:
             message = f"the directive `{{{name}}}`, whose text is shown as it was written"
             context.leave(kind, message)
-            return marks.fence("text", f"{argument}\n{text}".strip("\n"))
+            words = f"{argument}\n{text}".strip("\n")
+            return marks.fence("text", words) if words else ""
 
 
 def _write_figure(directive: Directive, context: LessonContext) -> str:

@@ -71,9 +71,7 @@ def read_outline(files: SourceFiles) -> Outline | None:
             parts=tuple(_read_toctrees("index.md", files, {"index.md"})),
             pages=(ImportedText(file="index.md"),),
         )
-    configs = (p for p in files if re.fullmatch(r"(?:\w+/)?docusaurus\.config\.[cm]?[jt]s", p))
-    config = min(configs, key=len, default="")
-    if not config:
+    if not (config := files.docusaurus):
         return None
     pattern = r"(?:^|[{,])\s*(title|tagline):\s*([\"'`])(.+?)\2"
     fields = re.findall(pattern, files.read_text(config), re.MULTILINE)

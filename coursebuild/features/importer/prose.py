@@ -12,9 +12,12 @@ import textwrap
 from coursebuild.features.importer.anchors import (
     FIGURE,
     MARKDOWN_FIGURE,
+    TABLE_CAPTION,
     TARGET,
+    move_caption,
     write_captioned,
     write_figure,
+    write_target,
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.displays import WORDS, normalize_formulas
@@ -92,11 +95,6 @@ _LINE = re.compile(
 )
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
-_CAPTION = re.compile(
-    r"^(?P<table>(?:\|.*\n)+)\n?:[ ]+(?P<caption>.*?)[ ]*(?:\{#tbl-(?P<label>[\w-]+)[^{}]*\})?$",
-    re.MULTILINE,
-)
-"""A caption of Quarto, below its table."""
 _MEANING = re.compile(
     r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
     r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
@@ -195,13 +193,6 @@ _KINDS = {
 
 def rewrite_prose(text: str, context: LessonContext) -> str:
     """Return prose of any dialect as Markdown of coursebuild."""
-
-    def write_target(match: re.Match[str]) -> str:
-        anchor = to_anchor(match["name"])
-        if match["heading"] is None:
-            return f'{match["lead"]}<a id="{anchor}"></a>'
-        return f"{match['heading'].rstrip()} {{#{anchor}}}"
-
     account = context.files.account
 
     def leave_grid(line: int) -> None:
@@ -223,6 +214,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         account.taken[kind] += len(pattern.findall(text))
     change = "a comment of HTML"
     text = account.replace(_COMMENT, _write_comment, text, "comment of MyST", change)
+    if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
+        text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
     text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
     text = account.replace(TARGET, write_target, text, "label", "an anchor")
@@ -235,13 +228,14 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = account.replace(_FIELDS, _write_fields, text, "list of fields", change)
     change = "behind its term, which is bold"
     text = account.replace(_MEANING, _write_meanings, text, "definition", change)
-    text = account.replace(_CAPTION, _move_caption, text, "caption of a table", "stands above it")
+    text = account.replace(
+        TABLE_CAPTION, move_caption, text, "caption of a table", "stands above it"
+    )
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         edge = _EDGE.match(line)
         if edge is None and not mark:
-            line = _EMPTY_HEADING.sub("", line)
-            line = _rewrite_line(line, context.line_below(number))
+            line = _rewrite_line(_EMPTY_HEADING.sub("", line), context.line_below(number))
         elif mark in _ENDS:
             mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
         elif edge is not None and edge[1].startswith(mark):
@@ -299,11 +293,6 @@ def _write_proof(match: re.Match[str], context: LessonContext) -> str:
     title = _rewrite_line(match["name_of"] or "", context)
     words = f"{kind.capitalize()} ({title})" if kind and title else kind.capitalize() or title
     return (f'<a id="{to_anchor(match["key"])}"></a>' if match["key"] else "") + words
-
-
-def _move_caption(match: re.Match[str]) -> str:
-    label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
-    return f"Table: {match['caption']}{label}\n\n{match['table']}"
 
 
 def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
@@ -412,11 +401,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             address = context.resolve_link(whole[1:-1])
             return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
         case "latex":
-            if not context.has_marks:
-                return whole
-            if "{" in whole:
+            if "{" in whole and context.has_marks:
                 context.leave("command of LaTeX", f"`{whole}`, which no page here shows")
-            return ""
+            return "" if context.has_marks else whole
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"

@@ -184,7 +184,7 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
 
 def tell_emoji(name: str, context: LessonContext) -> str:
     """Return the name of a sign between colons as it is, and note it where its tool draws signs."""
-    if context.files.mkdocs or "docusaurus.config.js" in context.files:
+    if context.files.mkdocs or context.files.docusaurus:
         context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
     return name
 

@@ -245,9 +245,14 @@ class SourceFiles:
 
         Else it is a dollar, and `\\(` a bracket.
         """
-        settings = [path for path in self if re.search(r"(^|/)docusaurus\.config\.\w+$", path)]
-        has_none = bool(settings) and "math" not in "".join(map(self.read_text, settings))
+        has_none = self.docusaurus and "math" not in self.read_text(self.docusaurus)
         return not has_none and not (self.folder / ".gitbook.yaml").is_file()
+
+    @cached_property
+    def docusaurus(self) -> str:
+        """The path of the settings of Docusaurus; empty where it is no site of it."""
+        paths = (p for p in self if re.fullmatch(r"(?:\w+/)?docusaurus\.config\.[cm]?[jt]s", p))
+        return min(paths, key=len, default="")
 
     def find_settings(self, name: str) -> str:
         """Return the path of settings in YAML, which have two extensions; empty for none."""

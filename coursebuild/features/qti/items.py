@@ -256,9 +256,10 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
             continue
         page = context.page(summary)
         for block in document_blocks(page.document):
-            if not isinstance(block, kinds):
+            if isinstance(block, Exercise):
+                block = _as_quiz(page, block)
+            if not isinstance(block, model.Quiz):
                 continue
-            block = block if isinstance(block, model.Quiz) else _as_quiz(page, block)
             quiz = quiz_items(page, block, context.course)
             yield from quiz.losses
             if quiz.items:

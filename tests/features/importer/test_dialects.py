@@ -426,8 +426,8 @@ def test_a_block_in_a_list_that_nothing_reads_is_text(tmp_path: Path) -> None:
         ),
         (
             "a.ipynb",
-            '{"cells": [{"cell_type": "markdown", "source": "|a|\\n|---|\\n|$|b|$|"}]}',
-            "|a|\n|---|\n|$\\vert b\\vert$|\n",
+            '{"cells": [{"cell_type": "markdown", "source": "|a|\\n|-|\\n|$|b|$ \\\\\\\\$1|"}]}',
+            "|a|\n|-|\n|$\\vert b\\vert$ \\$1|\n",
             {},
         ),
         (
