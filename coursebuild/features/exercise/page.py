@@ -93,13 +93,12 @@ def plain_task(words: Strings, block: Exercise) -> tuple[Block, ...]:
     def line(text: str) -> model.Paragraph:
         return model.Paragraph(span, (model.Text(span, text),))
 
-    trials = (line(f"{trial.name}: {_bounds(words, trial)}") for trial in block.trials)
     return (
         *block.task,
         line(_subject(words, block)),
         code_block(block, block.start),
         line(words("exercise.trials")),
-        *trials,
+        *(line(f"{trial.name}: {_bounds(words, trial)}") for trial in block.trials),
     )
 
 

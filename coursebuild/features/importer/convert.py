@@ -420,16 +420,15 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
     code = "\n".join(segment.text for text in texts for segment in text.segments)
     imported = set(re.findall(r"^[ \t]*(?:from|import)[ \t]+(\w+)", code, re.MULTILINE))
     roots = [posixpath.dirname(path) for path in files if path.endswith("/__init__.py")]
-    for root in roots:
-        name = posixpath.basename(root)
-        if name in imported and posixpath.dirname(root) not in roots:
-            for path in files:
-                if path.startswith(f"{root}/"):
-                    yield f"src/{name}/{path.removeprefix(f'{root}/')}", files.read(path)
+    packages = [r for r in roots if posixpath.basename(r) in imported]
+    packages = [root for root in packages if posixpath.dirname(root) not in roots]
     for path in files:
+        root = next((root for root in packages if path.startswith(f"{root}/")), "")
         module, _, end = posixpath.basename(path).rpartition(".")
-        if end == "py" and module in imported and posixpath.dirname(path) not in roots:
-            yield f"src/{module}.py", files.read(path)
+        is_module = end == "py" and module in imported and posixpath.dirname(path) not in roots
+        if root or is_module:
+            folder = posixpath.dirname(root or path)
+            yield f"src/{path.removeprefix(folder).lstrip('/')}", files.read(path)
 
 
 _OTHER_TEXTS = tuple(".adoc .docx .htm .html .org .pdf .rst .tex .txt".split())
