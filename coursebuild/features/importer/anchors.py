@@ -7,7 +7,6 @@ import re
 from coursebuild.features.importer.context import (
     NUMBERED,
     PROOF_LABELS,
-    formula_anchor,
     label_anchor,
     to_anchor,
 )
@@ -44,6 +43,7 @@ _PLACES = (
     ("tbl-", _CHUNK),
     ("tab:", r"\{#tbl-(?P<name>[\w-]+)"),
     ("", r"^\s*:(?:label|name):[ \t]*(?P<name>\S+)"),
+    ("eq:", r"^\s*:(?:label|name):[ \t]*(?:eq[-:._])?(?P<name>\S+)"),
     ("fig:", r"^(?:#\|[ \t]*label:[ \t]*|!\[[^\n]*\{#)fig-(?P<name>[\w-]+)"),
 )
 """What sets an anchor, by what stands before its name here."""
@@ -56,8 +56,6 @@ def find_anchors(text: str) -> set[str]:
     proofs = re.findall(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", text)
     anchors |= {f"{kind}:{to_anchor(name)}" for kind, name in proofs}
     anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", normalize_formulas(text)))
-    labels = re.findall(r"^\s*:(?:label|name):[ \t]*(\S+)", text, re.MULTILINE)
-    anchors |= {f"eq:{formula_anchor(label)}" for label in labels}
     for match in _LABELLED.finditer(text):
         kind = match["kind"] if match["kind"] in NUMBERED else _KINDS.get(match["kind"], "lst")
         anchor = to_anchor(match["name"])

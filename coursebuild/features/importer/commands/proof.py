@@ -159,7 +159,6 @@ def _run_again(
     edits = defaultdict[Source, list[Edit]](list)
     for extraction, script_run in zip(again, runs, strict=True):
         script, changes = extraction.script, edits[extraction.script.span.source]
-        varying = []
         if script_run.outcome is Outcome.OK and script.path not in changed_paths:
             first = first_runs[script.path]
             varying = [*_mark_varying(recordings[script.path], course, first, script_run)]
@@ -167,8 +166,9 @@ def _run_again(
                 changes += varying
                 message = f"{script.path}: two runs differ, so an output is `volatile`"
                 findings.add(Rank.CHANGED, message)
+                continue
         keys = [*_missing_keys(script, script_run, math.inf)]
-        _settle(script, script_run, course, keys, options, findings, edits, records=not varying)
+        _settle(script, script_run, course, keys, options, findings, edits)
     findings.write(edits)
     record_runs(again, runs, options)
     _draw(course, runs, options, findings)
@@ -188,8 +188,6 @@ def _settle(
     options: Options,
     findings: Findings,
     edits: Mapping[Source, list[Edit]],
-    *,
-    records: bool = True,
 ) -> Chain:
     """Make the edits that a run asks for: keys, cells that are only shown, what was printed."""
     recordings = recorded_outputs(course) if script_run.outcome is Outcome.FAILED else []
@@ -203,7 +201,7 @@ def _settle(
         if cells.modules and not script.requires:
             keys.insert(0, f"requires={','.join(cells.modules)}")
         changes += _add_keys(script, keys, findings)
-    if records and (cells.is_changed or script_run.outcome is Outcome.OK):
+    if cells.is_changed or script_run.outcome is Outcome.OK:
         failing_parts = {*cells.failures, *cells.reasons} if cells.is_changed else ()
         changes += _record_outputs(script, script_run, course, options, findings, failing_parts)
         changes += _write_values(script, script_run, failing_parts)
