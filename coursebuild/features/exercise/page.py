@@ -9,7 +9,7 @@ import json
 
 from markupsafe import Markup
 
-from coursebuild.api import IndexReader, MarkdownWriter, PageContext
+from coursebuild.api import Block, Excerpt, IndexReader, MarkdownWriter, PageContext, model
 from coursebuild.core.pages.marks import escape_line, escape_marks, fence, link, table
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.text.quantities import with_unit
@@ -84,6 +84,28 @@ def _bounds(words: Strings, trial: HiddenTrial) -> str:
         bounds = words("exercise.between", min=trial.min, max=trial.max)
     bounds = with_unit(bounds, trial.unit)
     return words("exercise.at", bounds=bounds, t=trial.t) if trial.t else bounds
+
+
+def plain_task(words: Strings, block: Exercise) -> tuple[Block, ...]:
+    """The task with the start and the trials, for a place where nothing tries an attempt."""
+    span = block.span
+
+    def line(text: str) -> model.Paragraph:
+        return model.Paragraph(span, (model.Text(span, text),))
+
+    return (
+        *block.task,
+        line(_subject(words, block)),
+        code_block(block, block.start),
+        line(words("exercise.trials")),
+        *(line(f"{trial.name}: {_bounds(words, trial)}") for trial in block.trials),
+    )
+
+
+def code_block(block: Exercise, code: Excerpt) -> model.CodeBlock:
+    """What the reader of an exercise could write, as code."""
+    language = LANGUAGES[block.subject]
+    return model.CodeBlock(block.span, language, language, code)
 
 
 def exercise_markdown(writer: MarkdownWriter, block: Exercise) -> str:

@@ -7,7 +7,6 @@ import re
 from coursebuild.features.importer.context import (
     NUMBERED,
     PROOF_LABELS,
-    formula_anchor,
     label_anchor,
     to_anchor,
 )
@@ -15,7 +14,7 @@ from coursebuild.features.importer.displays import normalize_formulas
 
 TARGET = re.compile(
     r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)\((?P<name>[\w:./|@<>*+-]+)\)=[ \t]*"
-    r"(?:\n+(?P<heading>#{1,6}[ \t].*))?$",
+    r"(?:\n{1,2}(?P<heading>#{1,6}[ \t].*))?$",  # a title that was taken out leaves more
     re.MULTILINE,
 )
 FIGURE = re.compile(
@@ -35,13 +34,16 @@ _CHUNK = r"^(?:`{3,})?\{r[ \t]+(?P<name>[\w.-]+)[ \t]*(?=[,}])"
 _PLACES = (
     ("", TARGET.pattern),
     ("sec-", r"\{#sec-(?P<name>[\w-]+)"),
+    ("", r"^#{1,6}[ \t].*\{#(?P<name>[\w-]+)[^{}\n]*\}[ \t]*$"),
     ("", r"\{\{[a-z]+\}\}\{(?P<name>[^{}\n]+)\}"),
     ("lst:", r"^(?:[`~ \t]*\{#|#\|[ \t]*(?:lst-)?label:[ \t]*)lst-(?P<name>[\w-]+)"),
     ("", r"^[: \t]*\{#(?P<name>(?:fig|tbl)-[\w-]+)"),
     ("fig-", _CHUNK),
+    ("fig:", _CHUNK + r"[^\n]*\bfig\.cap\b[^\n]*\n\s*(?:knitr::)?include_graphics\("),
     ("tbl-", _CHUNK),
     ("tab:", r"\{#tbl-(?P<name>[\w-]+)"),
     ("", r"^\s*:(?:label|name):[ \t]*(?P<name>\S+)"),
+    ("eq:", r"^\s*:(?:label|name):[ \t]*(?:eq[-:._])?(?P<name>\S+)"),
     ("fig:", r"^(?:#\|[ \t]*label:[ \t]*|!\[[^\n]*\{#)fig-(?P<name>[\w-]+)"),
 )
 """What sets an anchor, by what stands before its name here."""
@@ -54,8 +56,6 @@ def find_anchors(text: str) -> set[str]:
     proofs = re.findall(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", text)
     anchors |= {f"{kind}:{to_anchor(name)}" for kind, name in proofs}
     anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", normalize_formulas(text)))
-    labels = re.findall(r"^\s*:(?:label|name):[ \t]*(\S+)", text, re.MULTILINE)
-    anchors |= {f"eq:{formula_anchor(label)}" for label in labels}
     for match in _LABELLED.finditer(text):
         kind = match["kind"] if match["kind"] in NUMBERED else _KINDS.get(match["kind"], "lst")
         anchor = to_anchor(match["name"])
@@ -67,9 +67,34 @@ def find_anchors(text: str) -> set[str]:
 def write_figure(match: re.Match[str]) -> str:
     """Return a labelled picture in a paragraph of its own, as Quarto has it, with its caption."""
     alt = match["alternative"] or match["alt"]
-    return (
-        f"Figure: ![{alt}]({match['source']}) {match['alt']} {{#fig:{to_anchor(match['label'])}}}"
-    )
+    return figure_of(match["source"], match["alt"], match["label"], alt)
+
+
+def figure_of(source: str, caption: str, label: str, alt: str) -> str:
+    """Return the paragraph of a figure; without a label it has no number."""
+    mark = f" {{#fig:{label_anchor(label)}}}" if label else ""
+    return f"Figure: ![{alt}]({source}) {caption}{mark}"
+
+
+TABLE_CAPTION = re.compile(
+    r"^(?P<table>(?:\|.*\n)+)\n?:[ ]+(?P<caption>.*?)[ ]*(?:\{#tbl-(?P<label>[\w-]+)[^{}]*\})?$",
+    re.MULTILINE,
+)
+"""A caption of Quarto, below its table."""
+
+
+def move_caption(match: re.Match[str]) -> str:
+    """Return a table below its caption."""
+    label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
+    return f"Table: {match['caption']}{label}\n\n{match['table']}"
+
+
+def write_target(match: re.Match[str]) -> str:
+    """Return an anchor, which a heading below it takes."""
+    anchor = to_anchor(match["name"])
+    if match["heading"] is None:
+        return f'{match["lead"]}<a id="{anchor}"></a>'
+    return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
 
 MARKDOWN_FIGURE = re.compile(

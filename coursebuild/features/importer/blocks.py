@@ -57,7 +57,7 @@ _HIGHLIGHT = re.compile(
 _CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
 _QUOTED_KIND = re.compile(
-    r"^((?: {0,3}>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\])", re.MULTILINE
+    r"^((?:[ \t]*>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\])", re.MULTILINE
 )
 
 
@@ -233,7 +233,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     listing = re.search(r"#lst-([\w-]+)", head)
     label = f" {{#lst:{to_anchor(listing[1])}}}" if listing else ""
     new = marks.fence(f"{language or 'text' * bool(label)}{label}", text)
-    context.convert(kind, "without what its tool adds", head, lambda: language)
+    context.files.account.convert(kind, "without what its tool adds", head, lambda: language)
     return (f"**{words}**\n\n" if words else "") + new
 
 
@@ -285,7 +285,7 @@ def _convert_directive(name: str, argument: str, text: str, context: LessonConte
             kind, title, text, context, is_folded
         ),
     )
-    return context.convert(
+    return context.files.account.convert(
         f"directive `{{{name}}}`",
         "Markdown",
         f"{{{name}}} {argument}\n{text}",

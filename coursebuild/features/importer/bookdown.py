@@ -1,8 +1,7 @@
 r"""Bookdown's own syntax in R Markdown, as that of Quarto, which the rest of the importer reads.
 
 It is references (`\@ref(fig:a)`), labels of formulas (`(\#eq:a)`), theorems and other blocks as
-fences, captions that stand elsewhere (`(ref:a)`), parts of the book, and pictures that a cell of R
-includes.
+fences, captions that stand elsewhere (`(ref:a)`), and parts of the book.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from coursebuild.features.importer.source_files import (
     ImportedLevel,
     ImportedText,
     SourceFiles,
-    read_yaml,
     value_at,
 )
 
@@ -38,10 +36,6 @@ _FENCE = re.compile(
 _DIVISION = re.compile(
     r"^(:{3,}[ \t]*)\{\.(?P<kind>[a-z]+)[ ]+#(?P<label>[\w-]+)(?P<rest>[^{}\n]*)\}", re.M
 )
-_PICTURE = re.compile(
-    r"\s*(?:knitr::)?include_graphics\(\s*([\"'])(?P<path>[^\"'\n]+)\1[^()]*\)\s*"
-)
-_CAPTION = re.compile(r"fig\.cap\s*=\s*(?:\"(?P<a>(?:[^\"\\]|\\.)*)\"|'(?P<b>(?:[^'\\]|\\.)*)')")
 _LABEL = re.compile(r"[ ,]*(?:label\s*=\s*)?[\"']?([A-Za-z][\w-]*)[\"']?\s*(?:,|\Z)")
 
 
@@ -74,12 +68,7 @@ def _write_fence(match: re.Match[str]) -> str:
     kind, options, body = match["kind"], match["options"], match["body"]
     name = _LABEL.match(options)
     label = name[1] if name else ""
-    if kind == "r" and (picture := _PICTURE.fullmatch(body)):
-        caption = _CAPTION.search(options)
-        words = (caption["a"] or caption["b"] or "").replace("\\\\", "\\") if caption else ""
-        mark = f"{{#fig-{label}}}" if words and label else ""
-        new = f"![{words}]({picture['path']}){mark}"
-    elif kind in _LABELS or kind in ("proof", "remark", "solution", "block", "block2"):
+    if kind in _LABELS or kind in ("proof", "remark", "solution", "block", "block2"):
         title = re.search(r"\bname\s*=\s*(?:\"([^\"]*)\"|'([^']*)')", options)
         style = re.search(r"\btype\s*=\s*[\"']([\w-]+)", options)
         head = f".{style[1] if style else kind}"
@@ -97,7 +86,7 @@ def read_book(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
     name = "_bookdown.yml"
     if name not in files:
         return
-    settings = read_yaml(files.read_text(name))
+    settings = files.settings(name)
     files.account.changed["map", "content/course.toml"] += 1
     choice = value_at(settings, "rmd_files")
     if isinstance(choice, Mapping):  # by the form of the book

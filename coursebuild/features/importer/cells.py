@@ -12,6 +12,7 @@ from msgspec.structs import replace
 
 from coursebuild.api import marks
 from coursebuild.core.scripts.figures import prepare_figure
+from coursebuild.features.importer.anchors import figure_of
 from coursebuild.features.importer.context import LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment, read_yaml
@@ -29,7 +30,6 @@ _WINDOW = re.compile(
 """What opens a window where there is none."""
 _DISPLAY = re.compile(r"^([ \t]*)display\(", re.MULTILINE)
 """What Jupyter shows without an import."""
-_FIGURE = re.compile(r"\b(?:plt|pyplot|ax|axs|axes)\.(?!close|io|rc|switch_backend)[a-z]\w*\(")
 _ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
 _MAGIC = re.compile(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
@@ -58,11 +58,11 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
         blocks = [marks.fence(language, shown_code)] if shown_code else []
         return "\n\n".join((*blocks, *write_outputs(cell, context)))
     code, figure = _with_new_paths(code, context), ""
+    draws = _find_drawing(code, context.drawing)
     if _SAVED.search(code):
         code, figure = _take_saved_figures(cell, code, context)
-    elif _draws(cell, code):
-        pyplot = next(filter(None, map(_name_of_pyplot, (*context.parts, code))), "")
-        if pyplot:
+    elif draws if cell.picture is None else cell.picture[1]:
+        if pyplot := next(iter(context.drawing.values()), ""):
             code, figure = _save_figure(cell, code, pyplot, context)
         else:
             message = "a figure: save it in the script, and name it by `figure=`"
@@ -95,23 +95,48 @@ def print_values(text: str, context: LessonContext) -> str:
     return re.sub(rf"^(.*){_END} (\d+)\n", lines, text, flags=re.MULTILINE)
 
 
-_PYPLOT = re.compile(
-    r"^[ \t]*(?:import matplotlib\.pyplot as (\w+)|from matplotlib import (pyplot)(?: as (\w+))?"
-    r"|import (matplotlib)(?:\.pyplot)?(?: as (\w+))?[ \t]*(?:[#;]|$))",
-    re.MULTILINE,
+_MAKERS = frozenset(
+    "figure subplots subplot subplot_mosaic subplot2grid axes gca gcf polar matshow axhline "
+    "axvline bar barbs barh boxplot broken_barh contour contourf ecdf errorbar eventplot fill "
+    "fill_between fill_betweenx hexbin hist hist2d hlines imshow loglog pcolor pcolormesh pie "
+    "plot quiver scatter semilogx semilogy specgram spy stackplot stairs stem step streamplot "
+    "tricontour tricontourf tripcolor triplot violinplot vlines".split()
 )
+"""Functions of pyplot that make a figure where there is none."""
 
 
-def _name_of_pyplot(code: str) -> str:
-    """Return what code calls the module that draws; empty where it does not import it."""
-    match = _PYPLOT.search(code)
-    if match is None:
-        return ""
-    alias, name, other_name, package, other_package = match.groups()
-    if package is None:
-        return alias or other_name or name
-    whole = f"{other_package or package}.pyplot"
-    return whole if whole in code else ""
+def _find_drawing(code: str, names: dict[str, str]) -> bool:
+    """Return whether a cell makes a figure; `names` get the functions that do, with their pyplot.
+
+    What an earlier cell drew is closed by now: to go on in it shows nothing there either.
+    """
+    tree = ast.parse(code)
+    for node in ast.walk(tree):
+        pyplot = imported_names(node).get("matplotlib.pyplot", "")
+        if isinstance(node, ast.Attribute) and node.attr == "pyplot":
+            pyplot = ast.unparse(node)
+        names |= {f"{pyplot}.{maker}": pyplot for maker in _MAKERS if pyplot}
+    draws = False
+    for statement in tree.body:
+        calls = [ast.unparse(n.func) for n in ast.walk(statement) if isinstance(n, ast.Call)]
+        pyplot = next((names[call] for call in calls if call in names), "")
+        if isinstance(statement, ast.FunctionDef):
+            names |= {statement.name: pyplot} if pyplot else {}
+        else:
+            draws |= bool(pyplot)
+    return draws
+
+
+def imported_names(node: ast.AST) -> Mapping[str, str]:
+    """Return the names that an import gives, by what they stand for: `np` by `numpy`."""
+    match node:
+        case ast.Import(names):
+            start = ""
+        case ast.ImportFrom(module, names):
+            start = f"{module}."
+        case _:
+            return {}
+    return {start + alias.name: alias.asname or alias.name for alias in names}
 
 
 _SAVED = re.compile(
@@ -138,9 +163,7 @@ def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tup
         data = context.files.read(source) if source in context.files else b""
         if cell.picture is not None and cell.picture[0] == f".{extension}":
             data = data or cell.picture[1]
-        picture = prepare_figure(name, data) if data else ""
-        if isinstance(picture, bytes):
-            context.copies[f"{context.folder}/{name}"] = picture
+        _copy_figure(name, data, context)
         context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
     code = _SAVED.sub(lambda match: f'{match["call"]}"{names[match["path"]]}"', code)
     caption = _caption_of(cell, code, context)
@@ -166,24 +189,12 @@ def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = T
     alt = " ".join(options.get("fig-alt", options.get("alt", "")).strip("\"' ").split()) or caption
     alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)
     label = options.get("label", "") if has_label else ""
-    mark = f" {{#fig:{to_anchor(label.removeprefix('fig-'))}}}" if label.startswith("fig-") else ""
-    return f"Figure: ![{alt}]({name}) {caption}{mark}"
+    return figure_of(name, caption, label if label.startswith("fig-") else "", alt)
 
 
 _DRAWN_TITLE = re.compile(
     r"\.(?:set_)?(?:sup)?title\(\s*(?:r|f(?!.*\{))?([\"'])((?:(?!\1).)+)\1"  # none is computed
 )
-
-
-def _draws(cell: Segment, code: str) -> bool:
-    """Whether there is a figure below a cell, as it is recorded, or as its own statements say."""
-    if cell.picture is not None:
-        return bool(cell.picture[1])
-    return any(
-        _FIGURE.search(ast.unparse(statement))
-        for statement in ast.parse(code).body
-        if not isinstance(statement, ast.FunctionDef | ast.ClassDef | ast.AsyncFunctionDef)
-    )
 
 
 def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) -> tuple[str, str]:
@@ -222,12 +233,15 @@ def _picture_stem(context: LessonContext) -> str:
 def _keep_picture(cell: Segment, context: LessonContext) -> str:
     """Copy the picture that is recorded below a cell, and return its name; empty for none."""
     extension, data = cell.picture or ("", b"")
-    picture = prepare_figure(f"x{extension}", data) if data else ""
-    if isinstance(picture, str):
-        return ""
     name = f"{_picture_stem(context)}{extension}"
-    context.copies[f"{context.folder}/{name}"] = picture
-    return name
+    return name if _copy_figure(name, data, context) else ""
+
+
+def _copy_figure(name: str, data: bytes, context: LessonContext) -> bool:
+    picture = prepare_figure(name, data) if data else ""
+    if isinstance(picture, bytes):
+        context.copies[f"{context.folder}/{name}"] = picture
+    return isinstance(picture, bytes)
 
 
 def options_of(cell: Segment) -> Mapping[str, str]:
@@ -244,7 +258,8 @@ def options_of(cell: Segment) -> Mapping[str, str]:
                     pending.append(inner)
                 else:
                     text = " ".join(map(str, inner)) if isinstance(inner, list) else str(inner)
-                    options[str(name)] = text.lower() if isinstance(inner, bool) else text
+                    text = text.lower() if isinstance(inner, bool) else text
+                    options[str(name).replace(".", "-")] = text  # as knitr and Quarto call it
     return options
 
 
@@ -272,21 +287,13 @@ def _without_host(text: str, context: LessonContext) -> str:
     except (SyntaxError, ValueError, RecursionError):
         return text
     lines, names = text.split("\n"), set[str]()
+    needless = ("google.colab", "myst_nb.", *(["__future__."] if context.parts else []))  # too late
     for statement in statements:
         match statement:
-            case ast.ImportFrom(module=str(module)) if (
-                module.partition(".")[0] == "google"
-                and "colab" in f"{module} {[a.name for a in statement.names]}"
+            case ast.Import() | ast.ImportFrom() if any(
+                module.startswith(needless) for module in imported_names(statement)
             ):
-                names |= {alias.asname or alias.name for alias in statement.names}
-            case ast.Import() if any(
-                alias.name.startswith("google.colab") for alias in statement.names
-            ):
-                pass
-            case ast.ImportFrom(module="myst_nb"):
-                pass
-            case ast.ImportFrom(module="__future__") if context.parts:  # it would come too late
-                pass
+                names |= {*imported_names(statement).values()}
             case ast.Expr(ast.Call(ast.Name("glue"), [ast.Constant(str(name)), value, *_])):
                 text_of_value = ast.get_source_segment(text, value)
                 lines[statement.lineno - 1] = f'print("{name}:", {text_of_value})'
@@ -348,7 +355,11 @@ def how_shown(cell: Segment) -> str:
 
 def code_for_readers(cell: Segment) -> str:
     """Return a cell's code without the lines that only its tool understands."""
-    return _drop_magics(_OPTION.sub("", _YAML_HEAD.sub("", cell.text, count=1))).strip("\n")
+    return _drop_magics(_without_options(cell.text)).strip("\n")
+
+
+def _without_options(text: str) -> str:
+    return _OPTION.sub("", _YAML_HEAD.sub("", text, count=1))
 
 
 def _drop_magics(text: str) -> str:
@@ -370,7 +381,7 @@ def _find_fault(text: str) -> str:
 def runnable_code(cell: Segment, context: LessonContext) -> str:
     """Return what the script runs of a cell; empty where that is nothing."""
     options = options_of(cell)
-    text = _OPTION.sub("", _YAML_HEAD.sub("", cell.text, count=1))
+    text = _without_options(cell.text)
     tags = cell.head + options.get("tags", "")
     if "raises-exception" in tags or options.get("error") == "true":
         context.leave("cell", "a cell that is meant to fail is shown, not run")
@@ -405,14 +416,10 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
     if not isinstance(last, ast.Expr) or text.rstrip().endswith(";"):
         return text
     if isinstance(last.value, ast.Call):
-        root: ast.expr = last.value.func
-        while isinstance(root, ast.Attribute | ast.Call):
-            root = root.func if isinstance(root, ast.Call) else root.value
-        drawing_names = ("print", "plt", "ax", "axs", "axes", "fig")
-        if isinstance(root, ast.Name) and root.id in drawing_names:
+        name = ast.unparse(last.value.func)
+        if re.match(r"(?:print|plt|ax|axs|axes|fig)\b", name):
             return text
         if not cell.shows_value:
-            name = ast.unparse(last.value.func)
             context.leave(
                 "value of a cell", f"the value of `{name}(…)` is shown there if it has one"
             )

@@ -12,6 +12,7 @@ from textwrap import shorten
 from coursebuild.api import Edit, Options, Recording, ScriptRun, Span, marks, model
 from coursebuild.core.run.part_marks import FAILURE
 from coursebuild.core.run.script_environment import distributions
+from coursebuild.features.importer.cells import imported_names
 from coursebuild.features.importer.commands.findings import Rank
 from coursebuild.features.importer.context import script_path_of
 from coursebuild.report.values import plural
@@ -64,6 +65,8 @@ class Chain:
         """The errors of each cell that failed."""
         self.reasons: dict[int, str] = {}
         """Why cells are shown that cannot run, once the edits are made."""
+        self.is_changed = False
+        """Whether edits are made."""
         stderr = script_run.stderr
         notes = re.findall(rf"^{FAILURE} (\d+)\n(.*)$", stderr, re.MULTILINE)
         self._has_gone_on = bool(notes)
@@ -107,6 +110,7 @@ class Chain:
         rest = (imports.get(n, c) for n, c in enumerate(self.codes) if n not in reasons)
         if self.modules and not any(rest):
             return  # nothing would be left of it: a key says what it requires
+        self.is_changed = True
         yield from self._edits(reasons, imports, keys)
         count = plural(len(reasons), "cell") if reasons else "an import"
         errors = [e for e in dict.fromkeys(chain(*self.failures.values())) if missing_modules(e)]
@@ -121,13 +125,7 @@ class Chain:
         for number, code in enumerate(self.codes) if self.modules else ():
             lines = code.split("\n")
             for statement in ast.parse(code).body:
-                match statement:
-                    case ast.Import():
-                        modules = [alias.name for alias in statement.names]
-                    case ast.ImportFrom(module=str(module)):
-                        modules = [module]
-                    case _:
-                        continue
+                modules = imported_names(statement)
                 if any(f"{name}.".startswith(f"{m}.") for name in modules for m in self.modules):
                     names |= _bound_names(statement)
                     first, last = statement.lineno - 1, statement.end_lineno or statement.lineno
@@ -225,8 +223,6 @@ def _bound_names(tree: ast.AST) -> set[str]:
                 names.add(name)
             case ast.FunctionDef() | ast.ClassDef() | ast.AsyncFunctionDef():
                 names.add(node.name)
-            case ast.Import() | ast.ImportFrom():
-                names |= {a.asname or a.name.partition(".")[0] for a in node.names}
             case _:
-                continue
+                names |= {name.partition(".")[0] for name in imported_names(node).values()}
     return names

@@ -81,7 +81,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         *_read_parts(value_at(quarto, "book", "appendices"), files),
         *read_book(files),
     ]
-    if files.is_mkdocs:
+    if files.mkdocs:
         folder = posixpath.normpath(str(value_at(mkdocs, "docs_dir") or "docs"))
         nav = value_at(mkdocs, "nav")
         parts += read_nav(nav, folder, files, "mkdocs.yml") if nav else read_folder(folder, files)
@@ -118,7 +118,6 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         macros="".join(map(read_macros, settings)),
         levels=tuple(levels),
         pages=tuple(pages),
-        has_hidden_lines=outline.has_hidden_lines,
     )
 
 
@@ -129,8 +128,7 @@ def _read_substitutions(
     places = (("parse", "myst_substitutions"), ("extra",), ("project", "substitutions"), ("book",))
     values = [value_at(mapping, *path) for mapping in settings for path in places]
     values.append({"config": settings[-1]})  # as macros of MkDocs call its settings
-    if (name := "_variables.yml") in files:
-        values.append(read_yaml(files.read_text(name)))
+    values.append(files.settings("_variables.yml"))
     if (name := "conf.py") in files:
         text = re.search(r"(?ms)^myst_substitutions\s*=\s*(\{.*?\})$", files.read_text(name))
         values.append(read_yaml(text[1]) if text else None)  # a literal is a value of YAML

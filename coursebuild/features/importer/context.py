@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct, field
@@ -76,6 +76,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """The scripts that its cells of other languages are together, by language."""
     single_languages: frozenset[str] = frozenset()
     """The languages of which it has a single cell."""
+    drawing: dict[str, str] = field(default_factory=dict)
+    """The functions by which its cells make figures, each with the name of its pyplot."""
     figures: list[str] = field(default_factory=list)
     """The files that it draws."""
     notebook_outputs: list[tuple[str, str]] = field(default_factory=list)
@@ -133,10 +135,6 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         self.notes.append(words)
         return f"[^note-{len(self.notes)}]"
 
-    def convert(self, kind: str, change: str, old: str, convert: Callable[[], str]) -> str:
-        """Return what a part of the text becomes, which the account notes."""
-        return self.files.account.convert(kind, change, old, convert)
-
     def resolve_link(self, address: str) -> str:
         """Return the new address of a link; empty where nothing in the course has it."""
         route = re.fullmatch(r"#?/lessons?/([^#?/]+)/?(#.*)?", address)
@@ -190,7 +188,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
-        return self.path.endswith((".qmd", ".Rmd")) or self.files.is_mkdocs
+        return self.path.endswith((".qmd", ".Rmd")) or bool(self.files.mkdocs)
 
     def resolve_picture(self, source: str) -> str:
         """Return the new address of a picture or file; empty where none here has it."""

@@ -99,11 +99,8 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     lines = map_lines(course, ids, context.callouts, ("src",) if packages else (), longest)
     out["content/course.toml"] = _encode("".join(f"{line}\n" for line in lines))
     out[".gitignore"] = _GITIGNORE
-    for kind, paths in (
-        ("model", models),
-        ("file of the scripts", packages),
-        ("file", context.copies),
-    ):
+    copies = {"model": models, "file of the scripts": packages, "file": context.copies}
+    for kind, paths in copies.items():
         files.account.taken[kind] += len(paths)
     _leave_unused(files, (path for path in files if path in unused))
     account = files.account.text(files.name)
@@ -153,12 +150,14 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
     models: dict[str, str] = {}
     texts: dict[str, str] = {}
     for path in files:
-        folders = posixpath.dirname(path).split("/")
-        if "models" in folders:
-            inner_folders = folders[folders.index("models") + 1 :]
-            models[path] = "/".join(("models", *inner_folders, posixpath.basename(path)))
         if path.endswith(".xml") and b"<mujoco" in (data := files.read(path)):
             texts[path] = data.decode("utf-8", "replace")
+    bodies = (path for path in files if path in texts or path.endswith(".urdf"))
+    homes = {f"/{path}".partition("/models/")[0] for path in bodies}  # not those of other models
+    for path in files:
+        home, mark, name = f"/{path}".partition("/models/")
+        if mark and home in homes:
+            models[path] = f"models/{name}"
     parts = {
         path: [part for part in existing_files(files.folder, path, text) if part in files]
         for path, text in texts.items()
@@ -396,6 +395,7 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
         substitutions={**course_context.substitutions, **text.substitutions},
         title=text.title,
         parts=[],
+        drawing={},
         scripts=[],
         joined={},
         prints={},
@@ -420,16 +420,15 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
     code = "\n".join(segment.text for text in texts for segment in text.segments)
     imported = set(re.findall(r"^[ \t]*(?:from|import)[ \t]+(\w+)", code, re.MULTILINE))
     roots = [posixpath.dirname(path) for path in files if path.endswith("/__init__.py")]
-    for root in roots:
-        name = posixpath.basename(root)
-        if name in imported and posixpath.dirname(root) not in roots:
-            for path in files:
-                if path.startswith(f"{root}/"):
-                    yield f"src/{name}/{path.removeprefix(f'{root}/')}", files.read(path)
+    packages = [r for r in roots if posixpath.basename(r) in imported]
+    packages = [root for root in packages if posixpath.dirname(root) not in roots]
     for path in files:
+        root = next((root for root in packages if path.startswith(f"{root}/")), "")
         module, _, end = posixpath.basename(path).rpartition(".")
-        if end == "py" and module in imported and posixpath.dirname(path) not in roots:
-            yield f"src/{module}.py", files.read(path)
+        is_module = end == "py" and module in imported and posixpath.dirname(path) not in roots
+        if root or is_module:
+            folder = posixpath.dirname(root or path)
+            yield f"src/{path.removeprefix(folder).lstrip('/')}", files.read(path)
 
 
 _OTHER_TEXTS = tuple(".adoc .docx .htm .html .org .pdf .rst .tex .txt".split())

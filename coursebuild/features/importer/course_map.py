@@ -263,8 +263,9 @@ def _read_file(
             source = number_examples(source)
         if text.file.endswith(".qmd"):  # there a tag need not be apart from a block
             source = _TAG_BESIDE_BLOCK.sub(r"\g<0>\n", source)
-        if course.has_hidden_lines and (visible_text := without_hidden_lines(source)) != source:
-            files.account.changed["hidden lines of Rust", "dropped: readers did not see them"] += 1
+        visible_text = without_hidden_lines(source, files.hidden_marks)
+        if visible_text != source:
+            files.account.changed["hidden lines of code", "dropped: readers did not see them"] += 1
             source = visible_text
         read = read_segments(source, text.file, title)
     except RecursionError:
@@ -288,10 +289,6 @@ def _read_file(
     if used_ids is not None:
         page = _free_id(page, (f"{page}-{n}" for n in itertools.count(2)), used_ids)
     path = f"content/lessons/{id}-{slug}.md" if id else f"content/pages/{page}.md"
-    if id and not any(segment.text.strip() for segment in read.segments):
-        path = ""  # a title alone
-        message = "a text of which nothing is left: a lesson that is planned"
-        files.leave(text.file, message, "text")
     return replace(
         text,
         id=id or page,

@@ -17,7 +17,7 @@ from coursebuild.features.importer.context import NUMBERED, LessonContext, label
 from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.roles import words_of_link, write_link
+from coursebuild.features.importer.roles import convert_role, words_of_link, write_link
 from coursebuild.features.importer.source_files import TOO_MUCH, read_yaml
 
 
@@ -147,6 +147,8 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             words = " ".join(f"{argument} {text}".split())
             context.leave(kind, f"{kind} (`{words.replace('`', '')}`), which no page here shows")
             return ""
+        case "embed" | "eval":
+            return convert_role(name, argument.strip().removeprefix("#"), context)
         case "rubric" | "centered":
             return f"**{rewrite_prose(argument, context)}**\n\n{directive.nested(text)}"
         case "tab-item" | "tabbed" | "grid-item-card" | "card":
@@ -192,7 +194,8 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
         case _:
             message = f"the directive `{{{name}}}`, whose text is shown as it was written"
             context.leave(kind, message)
-            return marks.fence("text", f"{argument}\n{text}".strip("\n"))
+            words = f"{argument}\n{text}".strip("\n")
+            return marks.fence("text", words) if words else ""
 
 
 def _write_figure(directive: Directive, context: LessonContext) -> str:
@@ -279,8 +282,7 @@ def _write_table(directive: Directive, context: LessonContext) -> str:
     if not width:
         return caption
     cells = [[_cell(cell, context) for cell in (*row, *[""] * (width - len(row)))] for row in rows]
-    lines = [f"| {' | '.join(row)} |" for row in cells]
-    return caption + "\n".join((lines[0], f"|{' --- |' * width}", *lines[1:]))
+    return caption + marks.table(cells[0], cells[1:])
 
 
 def _cell(text: str, context: LessonContext) -> str:

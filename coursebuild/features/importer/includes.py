@@ -73,6 +73,8 @@ def expand_includes(
 
     `lesson` is the file that includes this one, where another does.
     """
+    for mark, braces in files.macro_marks:
+        text = text.replace(mark, braces)
 
     def expand(mark: re.Match[str]) -> str:
         if mark["escape"]:
@@ -182,19 +184,25 @@ def lines_of(text: str, options: Mapping[str, str]) -> str:
     return textwrap.dedent(text) if "dedent" in options else text
 
 
-def without_hidden_lines(text: str) -> str:
-    """Return the text of an mdBook without the lines of its Rust that readers do not see."""
+def without_hidden_lines(text: str, marks: Mapping[str, str]) -> str:
+    """Return a text without the lines of code that readers do not see, by what begins these."""
 
     def show(block: re.Match[str]) -> str:
-        body = re.sub(r"^[ \t]*#(?:[ ].*)?\n", "", block["body"], flags=re.MULTILINE)
-        return (
-            block["head"] + re.sub(r"^([ \t]*)##", r"\1#", body, flags=re.MULTILINE) + block["end"]
-        )
+        mark = block["own"] or marks.get(block["language"])
+        if not mark:
+            return block[0]
+        is_rust = block["language"] == "rust"  # there an attribute begins with `#`, too
+        line = rf"^[ \t]*{re.escape(mark)}{'(?:[ ].*)?' if is_rust else '.*'}\n"
+        body = re.sub(line, "", block["body"], flags=re.MULTILINE)
+        if is_rust:
+            body = re.sub(r"^([ \t]*)##", r"\1#", body, flags=re.MULTILINE)
+        return block["head"] + body + block["end"]
 
-    return _RUST.sub(show, text)
+    return _CODE.sub(show, text) if marks else text
 
 
-_RUST = re.compile(
-    r"^(?P<head>(?P<mark>[ \t]*`{3,})rust\b[^\n]*\n)(?P<body>.*?)(?P<end>^(?P=mark)[ \t]*$)",
+_CODE = re.compile(
+    r"^(?P<head>(?P<mark>[ \t]*`{3,})(?P<language>\w+)\b"
+    r"(?:[^\n]*\bhidelines=(?P<own>[^\s,]+))?[^\n]*\n)(?P<body>.*?)(?P<end>^(?P=mark)[ \t]*$)",
     re.MULTILINE | re.DOTALL,
 )

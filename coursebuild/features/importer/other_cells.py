@@ -23,6 +23,7 @@ from coursebuild.features.importer.cells import (
     write_recorded,
 )
 from coursebuild.features.importer.context import JoinedCells, LessonContext, to_anchor
+from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment
 
 _EXTENSIONS = {
@@ -38,7 +39,10 @@ _HEAD = re.compile(
 )
 _MAGIC = re.compile(r"\s*%%(\w+)[^\n]*\n")
 _SETTINGS = re.compile(r"(?:library\(knitr\)\s*)?(?:knitr::)?opts_chunk\$set\([^()]*\)\s*")
-_KNITR = re.compile(r"([\w.]+)\s*=\s*(\"[^\"]*\"|'[^']*'|[^,\s]+)")
+_PICTURE = re.compile(
+    r"\s*(?:knitr::)?include_graphics\(\s*([\"'])(?P<path>[^\"'\n]+)\1[^()]*\)\s*"
+)
+_KNITR = re.compile(r"([\w.]+)\s*=\s*(\"(?:[^\"\\]|\\.)*\"|'(?:[^'\\]|\\.)*'|[^,\s]+)")
 """An option of a cell as knitr has it, in the head."""
 
 
@@ -61,6 +65,7 @@ def languages_of_single_cells(segments: Iterable[Segment]) -> frozenset[str]:
         language_of(segment)
         for segment in segments
         if _options_of(segment).get("eval", "").lower() != "false"
+        and not _PICTURE.fullmatch(code_for_readers(segment))
     ]
     return frozenset(language for language in languages if languages.count(language) == 1)
 
@@ -68,7 +73,9 @@ def languages_of_single_cells(segments: Iterable[Segment]) -> frozenset[str]:
 def _options_of(segment: Segment) -> dict[str, str]:
     head = _HEAD.fullmatch(segment.head)
     words = _KNITR.findall(head["options"] or "") if head is not None else ()
-    options = {name.replace(".", "-"): value.strip("\"'") for name, value in words}
+    options = {
+        name.replace(".", "-"): value.strip("\"'").replace("\\\\", "\\") for name, value in words
+    }
     booleans = {"T": "true", "TRUE": "true", "F": "false", "FALSE": "false"}
     return {**{n: booleans.get(v, v) for n, v in options.items()}, **options_of(segment)}
 
@@ -82,6 +89,10 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
         label = f"fig-{own_label}" if "fig-cap" in options else ""
         label = label or (f"tbl-{own_label}" if "caption" in code else "")
     head = [f'<a id="{to_anchor(label)}"></a>'] if label else []
+    if picture := _PICTURE.fullmatch(code):
+        words = options.get("fig-cap", "")
+        mark = f"{{#{label}}}" if words and label.startswith("fig-") else ""
+        return rewrite_prose(f"![{words}]({picture['path']}){mark}", context)
     head += caption_of_code(options, context, ("fig-cap", "lst-cap"))
     if _SETTINGS.fullmatch(code):
         context.leave(kind, f"a {kind} that sets how its tool shows others")

@@ -24,7 +24,6 @@ from coursebuild.features.importer.source_files import (
     ImportedLevel,
     ImportedText,
     SourceFiles,
-    read_toml,
     read_yaml,
     stem_of,
     title_of_file,
@@ -41,17 +40,13 @@ class Outline(Struct, frozen=True, kw_only=True):
     language: str = ""
     parts: tuple[ImportedText | ImportedLevel, ...]
     pages: tuple[ImportedText, ...] = ()
-    has_hidden_lines: bool = False
-    """Whether lines of Rust that begin with `# ` are hidden from readers."""
 
 
 def read_outline(files: SourceFiles) -> Outline | None:
     """Return the map of a folder; `None` where it has none of these."""
-    is_mdbook, settings = "book.toml" in files, None
-    if is_mdbook:
-        settings = value_at(read_toml(files.read_text("book.toml")), "book")
-    elif "book.json" in files:  # of GitBook; JSON is YAML
-        settings = read_yaml(files.read_text("book.json"))
+    is_mdbook = "book.toml" in files  # else it may be one of GitBook
+    book = value_at(files.settings("book.toml"), "book")
+    settings = book if is_mdbook else files.settings("book.json")
     key, usual = ("src", "src") if is_mdbook else ("root", "")
     folder = str(value_at(settings, key) or usual)
     name = str(value_at(settings, "structure", "summary") or "SUMMARY.md")
@@ -59,7 +54,7 @@ def read_outline(files: SourceFiles) -> Outline | None:
     path = next((path for path in map(posixpath.normpath, places) if path in files), "")
     if path:
         files.account.changed["map", "content/course.toml"] += 1
-        outline = _read_summary(path, str(value_at(settings, "title") or ""), files, is_mdbook)
+        outline = _read_summary(path, str(value_at(settings, "title") or ""), files)
         if not is_mdbook:
             return outline
         for key, value in (settings if isinstance(settings, Mapping) else {}).items():
@@ -76,9 +71,7 @@ def read_outline(files: SourceFiles) -> Outline | None:
             parts=tuple(_read_toctrees("index.md", files, {"index.md"})),
             pages=(ImportedText(file="index.md"),),
         )
-    configs = (p for p in files if re.fullmatch(r"(?:\w+/)?docusaurus\.config\.[cm]?[jt]s", p))
-    config = min(configs, key=len, default="")
-    if not config:
+    if not (config := files.docusaurus):
         return None
     pattern = r"(?:^|[{,])\s*(title|tagline):\s*([\"'`])(.+?)\2"
     fields = re.findall(pattern, files.read_text(config), re.MULTILINE)
@@ -139,7 +132,7 @@ class _Entry(Struct, frozen=True):
     text: ImportedText
 
 
-def _read_summary(path: str, title: str, files: SourceFiles, is_mdbook: bool) -> Outline:
+def _read_summary(path: str, title: str, files: SourceFiles) -> Outline:
     groups: list[tuple[str, list[_Entry]]] = [("", [])]
     is_first = True
     for number, line in enumerate(re.sub(r"<!--.*?-->", "", files.read_text(path)).split("\n"), 1):
@@ -170,7 +163,7 @@ def _read_summary(path: str, title: str, files: SourceFiles, is_mdbook: bool) ->
             parts.append(ImportedLevel(title=name, lessons=tuple(e.text for e in lessons)))
         else:
             parts += _group_by_depth(lessons)
-    return Outline(title=title, parts=tuple(parts), pages=tuple(pages), has_hidden_lines=is_mdbook)
+    return Outline(title=title, parts=tuple(parts), pages=tuple(pages))
 
 
 def _group_by_depth(entries: Iterable[_Entry]) -> Iterator[ImportedText | ImportedLevel]:

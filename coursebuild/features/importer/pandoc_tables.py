@@ -15,6 +15,7 @@ from unicodedata import east_asian_width
 
 from msgspec import Struct
 
+from coursebuild.api import marks
 from coursebuild.features.importer.context import to_anchor
 
 _QUOTE = re.compile(r"(?:[ ]{0,3}>[ ]?)*")
@@ -29,7 +30,6 @@ _DELIMITERS = re.compile(r"\|?[ \t]*:?-+:?[ \t]*(?:\|[ \t]*:?-+:?[ \t]*)*\|?[ \t
 _WIDE = "\0"
 """What stands behind a character that takes two columns."""
 _ITEM = re.compile(r"[-+*][ ]+|(?=\d+[.)][ ])")
-_SIDES = {"": "---", "l": ":--", "r": "--:", "c": ":-:"}
 
 Cells = Sequence[Sequence[str]]
 """The cells of a row, each with its lines."""
@@ -41,7 +41,7 @@ class _Table(Struct, frozen=True):
     head: Cells
     rows: Sequence[Cells]
     sides: Sequence[str]
-    """For each column: `l`, `r`, `c`, or nothing."""
+    """For each column: `left`, `right`, `center`, or nothing."""
 
 
 def rewrite_tables(text: str, leave: Callable[[int], None]) -> tuple[str, int]:
@@ -83,7 +83,9 @@ def _read_block(
         below = _below(lines, at, lead, regions)
         if table := read(below):
             caption, caption_size = _read_caption(below[table.size :])
-            new, size = [*caption, *_write(table)], table.size + caption_size
+            rows = (map(_join, cells) for cells in table.rows)
+            new = marks.table(map(_join, table.head), rows, table.sides).split("\n")
+            new, size = [*caption, *new], table.size + caption_size
             return size, [(lead + line).rstrip() for line in (*new, *[""] * (size - len(new)))]
     lead = (_INDENT.match(lines[at]) or [""])[0]
     below = _below(lines, at, lead, regions)
@@ -127,12 +129,6 @@ def _read_caption(lines: Sequence[str]) -> tuple[list[str], int]:
         return [], 0
     label = f" {{#tab:{to_anchor(caption['label'])}}}" if caption["label"] else ""
     return [f"Table: {caption['words']}{label}", ""], end
-
-
-def _write(table: _Table) -> Iterator[str]:
-    for cells in (table.head, None, *table.rows):
-        texts = [_SIDES[side] for side in table.sides] if cells is None else map(_join, cells)
-        yield f"| {' | '.join(texts)} |"
 
 
 def _join(lines: Sequence[str]) -> str:
@@ -184,7 +180,9 @@ def _read_grid(lines: Sequence[str]) -> _Table | None:
     count = sum(rule < double for rule in rules)
     head = [[*chain.from_iterable(cells)] for cells in zip(*rows[:count], strict=True)]
     sides = [
-        {(":", ":"): "c", (":", "-"): "l", ("-", ":"): "r"}.get((part[:1], part[-1:]), "")
+        {(":", ":"): "center", (":", "-"): "left", ("-", ":"): "right"}.get(
+            (part[:1], part[-1:]), ""
+        )
         for part in re.split(r"\+", grid[double].replace("=", "-"))[1:-1]
     ]
     sides += [""] * (len(bounds) - 1 - len(sides))
@@ -259,7 +257,9 @@ def _side(text: str, edge: int, start: int, end: int) -> str:
         return ""
     is_left = edge + len(text) - len(text.lstrip()) <= start
     is_right = edge + len(text.rstrip()) >= end
-    return "" if is_left and is_right else "l" if is_left else "r" if is_right else "c"
+    if is_left or is_right:
+        return "" if is_left and is_right else "left" if is_left else "right"
+    return "center"
 
 
 # --- verses

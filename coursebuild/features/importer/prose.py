@@ -12,9 +12,12 @@ import textwrap
 from coursebuild.features.importer.anchors import (
     FIGURE,
     MARKDOWN_FIGURE,
+    TABLE_CAPTION,
     TARGET,
+    move_caption,
     write_captioned,
     write_figure,
+    write_target,
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.displays import WORDS, normalize_formulas
@@ -70,7 +73,8 @@ _LINE = re.compile(
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
-    r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
+    r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\w*\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
+    r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
     rf"|(?P<told>(?<![\w@.\\/])@(?P<work>{_KEY})(?:[ ]?\[[, ]*(?P<cited>[^\[\]\n@]+)\](?!\())?)"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
@@ -84,19 +88,13 @@ _LINE = re.compile(
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:(?:\{[^{}\n]*\})?(?:[ ]|&nbsp;)*)"
     r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
-    r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
-    r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source)>)?)"
+    r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source|iframe)>)?)"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
     r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z])-{2,3}(?=[a-z]))"
     rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
-_CAPTION = re.compile(
-    r"^(?P<table>(?:\|.*\n)+)\n?:[ ]+(?P<caption>.*?)[ ]*(?:\{#tbl-(?P<label>[\w-]+)[^{}]*\})?$",
-    re.MULTILINE,
-)
-"""A caption of Quarto, below its table."""
 _MEANING = re.compile(
     r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
     r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
@@ -151,7 +149,9 @@ _OVER_LINES = re.compile(
     r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
 )
 """A role, a note, a citation, the address of a link or a formula that goes on in the next line."""
-_TAG_OVER_LINES = re.compile(r"<(?i:a|img|source|video)[ \t\n](?=[^<>\n]*\n)[^<>]*>")
+_TAG_OVER_LINES = re.compile(
+    r"<(?i:a|img|source|video|iframe)[ \t\n](?=[^<>\n]*\n)[^<>]*>(?:\s*</iframe>)?"
+)
 _KINDS = {
     "role": ("", "Markdown"),
     "code": ("code in a line", "code without the tool's mark"),
@@ -193,13 +193,6 @@ _KINDS = {
 
 def rewrite_prose(text: str, context: LessonContext) -> str:
     """Return prose of any dialect as Markdown of coursebuild."""
-
-    def write_target(match: re.Match[str]) -> str:
-        anchor = to_anchor(match["name"])
-        if match["heading"] is None:
-            return f'{match["lead"]}<a id="{anchor}"></a>'
-        return f"{match['heading'].rstrip()} {{#{anchor}}}"
-
     account = context.files.account
 
     def leave_grid(line: int) -> None:
@@ -221,6 +214,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         account.taken[kind] += len(pattern.findall(text))
     change = "a comment of HTML"
     text = account.replace(_COMMENT, _write_comment, text, "comment of MyST", change)
+    if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
+        text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
     text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
     text = account.replace(TARGET, write_target, text, "label", "an anchor")
@@ -233,13 +228,14 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = account.replace(_FIELDS, _write_fields, text, "list of fields", change)
     change = "behind its term, which is bold"
     text = account.replace(_MEANING, _write_meanings, text, "definition", change)
-    text = account.replace(_CAPTION, _move_caption, text, "caption of a table", "stands above it")
+    text = account.replace(
+        TABLE_CAPTION, move_caption, text, "caption of a table", "stands above it"
+    )
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         edge = _EDGE.match(line)
         if edge is None and not mark:
-            line = _EMPTY_HEADING.sub("", line)
-            line = _rewrite_line(line, context.line_below(number))
+            line = _rewrite_line(_EMPTY_HEADING.sub("", line), context.line_below(number))
         elif mark in _ENDS:
             mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
         elif edge is not None and edge[1].startswith(mark):
@@ -280,7 +276,9 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
         kind, change = _KINDS[group]
         if group == "role":
             kind = f"role `{{{match['name']}}}`"
-        return context.convert(kind, change, match[0], lambda: _rewrite_match(match, context))
+        return context.files.account.convert(
+            kind, change, match[0], lambda: _rewrite_match(match, context)
+        )
 
     return _LINE.sub(rewrite, line)
 
@@ -297,11 +295,6 @@ def _write_proof(match: re.Match[str], context: LessonContext) -> str:
     return (f'<a id="{to_anchor(match["key"])}"></a>' if match["key"] else "") + words
 
 
-def _move_caption(match: re.Match[str]) -> str:
-    label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
-    return f"Table: {match['caption']}{label}\n\n{match['table']}"
-
-
 def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
     whole = match[0]
     match match.lastgroup:
@@ -311,6 +304,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             dressing, hover = match["dressing"] or "", match["hover"] or ""
             alt = match["alt"] or "".join(words for _, words in _ALT.findall(dressing))
             source = match["source"].strip("<>")
+            if source.startswith("#"):
+                return convert_role("embed", source[1:], context)
             if source.endswith("#only-dark"):  # a page makes its pictures dark itself
                 return ""
             if re.match("[a-z]+://|//", source):
@@ -341,6 +336,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called
             )
             return _rewrite_line(called, context) if is_path else whole
+        case "math" | "digits" if not context.files.has_dollars and whole[:2] != "$$":
+            return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if not context.files.has_dollars:
             return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":
@@ -350,18 +347,16 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "note":
             return context.add_note(_rewrite_line(match["remark"], context))
         case "math":
-            if not context.files.has_dollars and whole[:2] != "$$":
-                return rf"\${_rewrite_line(whole[1:-1], context)}\$"
             formula = whole.replace("&lt;", "<").replace("&gt;", ">")  # as some notebooks hold it
             if _WORD.search(formula):
                 return whole
-            return _TIGHT.sub(lambda m: f"${m[1].strip()}$", formula)
+            if context.path.endswith(".ipynb") and match.string.lstrip().startswith("|"):
+                formula = re.sub(r"(?<!\\)\|", r"\\vert ", formula)  # no bar there ends a cell
+            return _TIGHT.sub(lambda m: m[1].strip() and f"${m[1].strip()}$", formula)
         case "code":
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)
             return re.sub(r"(?<!\\)\|", r"\\|", code) if is_cell else code
-        case "digits" if not context.files.has_dollars:
-            return whole.replace("$", r"\$")
         case "digits":  # no digit may follow the closing dollar sign
             return f"${match['tex']}{match['number']}$"
         case "cross":
@@ -406,6 +401,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             address = context.resolve_link(whole[1:-1])
             return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
         case "latex":
+            if "{" in whole and context.has_marks:
+                context.leave("command of LaTeX", f"`{whole}`, which no page here shows")
             return "" if context.has_marks else whole
         case "mention":
             lesson_id = context.ids.get(match["level"])
@@ -423,7 +420,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":
             address = match["named"]
-            return whole.removesuffix(address) + (context.resolve_link(address) or GONE)
+            label = whole.removesuffix(address)
+            label = label.replace("@", r"\@") if _CITED_KEY.search(label) else label
+            return label + (context.resolve_link(address) or GONE)
         case "tag":
             return convert_tag(whole, context)
         case "dashes":

@@ -49,7 +49,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             return write_link(words, context.resolve_formula(target))
         case "doc":
             return write_link(words or title_of_file(target), context.resolve_link(f"{target}.md"))
-        case "ref" | "numref" | "prf:ref" | "any":
+        case "ref" | "numref" | "prf:ref" | "any" | "embed":
             address = address_of_label(target, context)
             if not address:
                 message = f"a link to `{target}`, which no text sets"
@@ -165,8 +165,8 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     address = "".join(arguments[:1])
     if name in ("tab", "code") and title:
         return f"**{title[1]}**"
-    if name == "video" or (name == "embed" and whole[1] == "%"):
-        address = address.removeprefix("url=").strip('"')
+    if name in ("video", "embed"):
+        address = re.sub(r"(?<=\.ipynb)#.*", "", address.removeprefix("url=").strip('"'))
         return write_link(title[1] if title else address, context.resolve_link(address))
     if name.removeprefix("end") in _FRAMES and name != "embed":
         return ""
@@ -184,7 +184,7 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
 
 def tell_emoji(name: str, context: LessonContext) -> str:
     """Return the name of a sign between colons as it is, and note it where its tool draws signs."""
-    if context.files.is_mkdocs or "docusaurus.config.js" in context.files:
+    if context.files.mkdocs or context.files.docusaurus:
         context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
     return name
 
@@ -203,10 +203,10 @@ def convert_wiki_link(whole: str, page: str, part: str, words: str, context: Les
     return write_link(words or page or part.lstrip("#"), address)
 
 
-_ATTRIBUTE = re.compile(r"(?<=[ \t])(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
+_ATTRIBUTE = re.compile(r"(?<=\s)(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
 
 
-_WITH_FILE = re.compile(r"<(?:a|img|source|video)\b", re.IGNORECASE)
+_WITH_FILE = re.compile(r"<(?:a|(?P<frame>iframe)|img|source|video)\b", re.IGNORECASE)
 _LOOK = re.compile(
     r"[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
 )
@@ -218,7 +218,14 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     A class names a look that its tool gives; here it could be that of another thing.
     """
     tag = _LOOK.sub("", tag)
-    attribute = _ATTRIBUTE.search(tag) if _WITH_FILE.match(tag) else None
+    kind = _WITH_FILE.match(tag)
+    attribute = _ATTRIBUTE.search(tag) if kind else None
+    if attribute and kind and kind["frame"]:
+        title = re.search(r"\stitle=[\"']([^\"']+)", tag)
+        address = context.resolve_link(attribute[3])
+        words = title[1] if title else words_of_link(address, attribute[3])
+        context.leave("tag of HTML", f"a frame that shows `{attribute[3]}`; it is a link now")
+        return f'<a href="{address}">{words}</a>' if address else words
     if attribute is None or re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
         return tag
     address = attribute[3].removeprefix("attachment:")

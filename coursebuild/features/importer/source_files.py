@@ -118,8 +118,6 @@ class ImportedCourse(Struct, frozen=True, kw_only=True):
     """What names between braces stand for in its texts."""
     macros: str = ""
     """The definitions of macros in its settings."""
-    has_hidden_lines: bool = False
-    """Whether lines of Rust that begin with `# ` are hidden from readers."""
     camera_is_position: bool = False
     """Whether the angles of a lab's camera give its position as seen from its target."""
 
@@ -247,33 +245,64 @@ class SourceFiles:
 
         Else it is a dollar, and `\\(` a bracket.
         """
-        settings = [path for path in self if re.search(r"(^|/)docusaurus\.config\.\w+$", path)]
-        has_none = bool(settings) and "math" not in "".join(map(self.read_text, settings))
+        has_none = self.docusaurus and "math" not in self.read_text(self.docusaurus)
         return not has_none and not (self.folder / ".gitbook.yaml").is_file()
+
+    @cached_property
+    def docusaurus(self) -> str:
+        """The path of the settings of Docusaurus; empty where it is no site of it."""
+        paths = (p for p in self if re.fullmatch(r"(?:\w+/)?docusaurus\.config\.[cm]?[jt]s", p))
+        return min(paths, key=len, default="")
 
     def find_settings(self, name: str) -> str:
         """Return the path of settings in YAML, which have two extensions; empty for none."""
         return next((path for path in (name, name.replace(".yml", ".yaml")) if path in self), "")
 
-    @property
-    def is_mkdocs(self) -> bool:
-        """Whether it is a project of MkDocs."""
-        return bool(self.find_settings("mkdocs.yml"))
+    def settings(self, name: str) -> Mapping[str, Any]:
+        """Return the settings in a file; none where it is not there, or cannot be read."""
+        path = self.find_settings(name)
+        read = read_toml if path.endswith(".toml") else read_yaml  # JSON is YAML
+        value = read(self.read_text(path)) if path else None
+        return value if isinstance(value, dict) else {}
+
+    @cached_property
+    def mkdocs(self) -> str:
+        """The settings of MkDocs; empty where it is no project of it."""
+        path = self.find_settings("mkdocs.yml")
+        return path and (self.read_text(path) or "\n")
 
     @cached_property
     def included_folders(self) -> Sequence[str]:
         """The folders in which MkDocs finds what texts include, besides their own."""
-        settings = self.find_settings("mkdocs.yml")
         pattern = r"\b(?:base_path|include_dir):[ \t]*(?:\[|\n[ \t]*-[ \t]*)?[\"']?([\w./-]+)"
-        return re.findall(pattern, self.read_text(settings)) if settings else []
+        return re.findall(pattern, self.mkdocs)
+
+    @cached_property
+    def hidden_marks(self) -> Mapping[str, str]:
+        """What begins lines of code that mdBook hides, by language."""
+        marks = value_at(self.settings("book.toml"), "output", "html", "code", "hidelines")
+        own_marks = marks if isinstance(marks, dict) else {}
+        return {**own_marks, "rust": "#"} if "book.toml" in self else {}
+
+    @cached_property
+    def macro_marks(self) -> Sequence[tuple[str, str]]:
+        """The marks that stand for braces, as settings of MkDocs name them, each with these."""
+        names = {
+            "variable_start": "{{",
+            "variable_end": "}}",
+            "block_start": "{%",
+            "block_end": "%}",
+        }
+        pattern = rf"\bj2_({'|'.join(names)})_string:[ \t]*[\"']?([^\s\"']+)"
+        return [(mark, names[name]) for name, mark in re.findall(pattern, self.mkdocs)]
 
     def has_signs(self, path: str) -> bool:
         """Whether the tool of a text draws hyphens in a row as a dash."""
-        signs = "smart-punctuation = true"
         return (
             path.endswith((".qmd", ".Rmd"))
             or "conf.py" in self
-            or ("book.toml" in self and signs in self.read_text("book.toml"))
+            or "_config.yml" in self
+            or value_at(self.settings("book.toml"), "output", "html", "smart-punctuation") is True
         )
 
     def find(self, path: str, *, is_hidden: bool = False) -> str:

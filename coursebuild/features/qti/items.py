@@ -27,11 +27,12 @@ from coursebuild.api import (
     PageContext,
     SiteFile,
     diagnose,
-    find_blocks,
+    document_blocks,
     urls,
 )
 from coursebuild.core.pages.html_xml import element, identifier, markup, render_xml
 from coursebuild.features.exercise.model import Exercise
+from coursebuild.features.exercise.page import code_block, plain_task
 from coursebuild.features.qti.flow import STRIKE_CLASS, Flow
 from coursebuild.features.quiz import model
 from coursebuild.features.quiz.page import letter, output_line, shuffle, unit_html
@@ -221,6 +222,22 @@ def _double(value: float) -> str:
     return repr(float(value) + 0.0)
 
 
+def _as_quiz(page: PageContext, block: Exercise) -> model.Quiz:
+    """An exercise as a quiz with an open question: a person judges what a platform cannot run."""
+    words = page.renderer.words
+    question = model.OpenQuestion(
+        block.span,
+        "task",
+        words("exercise.label"),
+        plain_task(words, block),
+        block.explain,
+        (),
+        (code_block(block, block.solution),),
+    )
+    title = block.title or words("exercise.untitled")
+    return model.Quiz(block.span, block.id, block.id_span, title, (question,), (question.key,))
+
+
 _FOLDER = Path(__file__).parent
 _STYLE_SHEET = f"""\
 .{STRIKE_CLASS} {{ text-decoration: line-through; }}
@@ -234,13 +251,15 @@ def package_files(context: ExportContext) -> Iterator[SiteFile | Diagnostic]:
     quizzes: list[QuizItems] = []
     for owner in context.course.owners:
         summary = owner.document
-        for exercise in find_blocks(summary, Exercise) if summary else ():
-            message = "the QTI package has no place for an exercise, which its page alone can judge"
-            yield diagnose("package-reduced", exercise.span.first_line(), message)
-        if not summary or not any(find_blocks(summary, model.Quiz)):
+        kinds = (model.Quiz, Exercise)
+        if not summary or not any(isinstance(b, kinds) for b in document_blocks(summary)):
             continue
         page = context.page(summary)
-        for block in find_blocks(page.document, model.Quiz):
+        for block in document_blocks(page.document):
+            if isinstance(block, Exercise):
+                block = _as_quiz(page, block)
+            if not isinstance(block, model.Quiz):
+                continue
             quiz = quiz_items(page, block, context.course)
             yield from quiz.losses
             if quiz.items:

@@ -70,6 +70,7 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
             "made/task.xml": "<mujoco><include file='made.xml'/><include file='a.xml'/></mujoco>",
             "made/a.xml": "<mujoco><worldbody><geom material='m' size='1'/></worldbody></mujoco>",
             "made/mesh.xml": "<mujoco><asset><mesh file='no.obj'/></asset><worldbody/></mujoco>",
+            "test/models/people.json": "{}",
             "loose/keys.xml": "<mujoco><keyframe><key qpos='1 2'/></keyframe></mujoco>",
         },
     )
@@ -86,7 +87,7 @@ def test_a_model_brings_the_files_that_it_is_made_of(tmp_path: Path, folder: str
     assert "a model that needs `made.xml`, which the folder does not hold" in account
     assert "a model that needs `no.obj`, which the folder does not hold" in account
     assert not any(word in path for path in course.files for word in ("loose", "keys", "made"))
-    assert "used by no text" not in account
+    assert "used by no text\n  - test/models/people.json" in account
 
 
 def test_links_to_places_of_a_planned_lesson_lead_to_the_lesson(tmp_path: Path) -> None:
@@ -124,6 +125,23 @@ def test_a_figure_is_saved_whatever_its_library_is_called(
     lesson = course.files["content/lessons/1.1-one.md"].decode()
     saving = f'{name}.savefig("l1-1-one-1.svg")\n{name}.close("all")'
     assert saving in lesson and ".show(" not in lesson
+
+
+def test_a_cell_draws_where_it_makes_a_figure(tmp_path: Path) -> None:
+    """Not where it asks for colours, or goes on in a figure that is shown above."""
+    cells = (
+        "import matplotlib.pyplot as plt\nplt.style.use('ggplot')",
+        "f, left = plt.subplots()\nleft.plot([1, 2])",
+        "left.plot([3])\nplt.get_cmap('viridis')\nplt.close()",
+        "def draw():\n    plt.plot([1])",
+        "draw()",
+    )
+    text = "".join(f"```{{python}}\n{cell}\n```\n\n" for cell in cells)
+    course = convert_files(tmp_path, {"one.qmd": f"# One\n\n{text}"})
+    lesson = course.files["content/lessons/1.1-one.md"].decode()
+    assert "figure=l1-1-one-1.svg,l1-1-one-2.svg\n" in lesson
+    assert 'left.plot([1, 2])\nplt.savefig("l1-1-one-1.svg")' in lesson
+    assert 'draw()\nplt.savefig("l1-1-one-2.svg")' in lesson
 
 
 def test_a_long_text_is_within_the_limit_of_its_new_course(tmp_path: Path) -> None:

@@ -17,7 +17,10 @@ def lesson(folder: Path, name: str, text: str, **files: str) -> str:
 
 @pytest.mark.parametrize(
     ("head", "reference"),
-    [("(here)=\n# Head", "{ref}`here`"), ("# Head {#sec-here}", "[](a.md#sec-here)")],
+    [
+        ("(here)=\n# Head\n\n## Part", "{ref}`here`"),
+        ("# Head {#sec-here}\n\n## Part", "[](a.md#sec-here)"),
+    ],
 )
 def test_a_reference_to_the_title_of_a_text_has_its_words(
     tmp_path: Path, head: str, reference: str
@@ -123,3 +126,73 @@ def test_a_drawing_loses_only_what_none_may_hold(tmp_path: Path) -> None:
 def test_a_block_in_a_list_that_nothing_reads_is_text(tmp_path: Path) -> None:
     text = "# One\n\n- It goes\n\n  ```ipywidget\n  A\n  ```\n\n  ```mermaid\n  A --> B\n  ```\n"
     assert "  ```text\n  A --> B\n  ```" in lesson(tmp_path, "a.md", text)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "expected", "files"),
+    [
+        (
+            "src/a.md",
+            "# One\n\n```python\n~a()\nb()\n```\n\n```sh,hidelines=!!\nc\n  !!d\n```\n",
+            "```python\nb()\n```\n\n```sh\nc\n```\n",
+            {
+                "src/SUMMARY.md": "- [A](a.md)\n",
+                "book.toml": '[output.html.code.hidelines]\npython = "~"\n',
+            },
+        ),
+        (
+            "docs/a.md",
+            "# One\n\nThe [[ name ]].\n\n[% if name %]\nText.\n[% endif %]\n",
+            "The Ball.\n\n\nText.\n",
+            {
+                "mkdocs.yml": "plugins:\n  - macros:\n      j2_variable_start_string: '[['\n"
+                "      j2_variable_end_string: ']]'\n      j2_block_start_string: '[%'\n"
+                "      j2_block_end_string: '%]'\nextra: {name: Ball}\n"
+            },
+        ),
+        (
+            "a.md",
+            "# One\n\n```{list-table} T\n:name: tab-a\n* - b\n```\n\n```{embed} #tab-a\n```\n\n"
+            "![](#tab-a)\n",
+            "Table: T {#tab:a}\n\n| b |\n| --- |\n\n[](#tab:a)\n\n[](#tab:a)\n",
+            {},
+        ),
+        (
+            "a.md",
+            "# One\n\n[@a/b]: https://a.org\n\nSee [@a/b]. $x$ $\\ \\ $(y)\n",
+            "[\\@a/b]: https://a.org\n\nSee [\\@a/b]. $x$ (y)\n",
+            {},
+        ),
+        (
+            "a.md",
+            "# One\n\n> $$\n> a\n> =\n> b\n> =\n> c\n> $$\n>\n> ```{note}\n> d\n> ```\n",
+            "> $$\n> a\n> =\n> b\n> =\n> c\n> $$\n>\n> > [!note]\n> > d\n",
+            {},
+        ),
+        (
+            "a.qmd",
+            "# One\n\nA bar.\\indexf{geom_bar}\n\n```{r}\n#| label: fig-a\n#| fig.cap: A ball.\n"
+            'knitr::include_graphics("p.png", dpi = 300)\n```\n\n'
+            '<iframe title="Film"\nsrc="https://a.org/b"></iframe>\n',
+            "A bar.\n\nFigure: ![A ball.](../files/p.png) A ball. {#fig:a}\n\n"
+            '<a href="https://a.org/b">Film</a>\n',
+            {"p.png": "\x89PNG"},
+        ),
+        (
+            "a.ipynb",
+            '{"cells": [{"cell_type": "markdown", "source": "|a|\\n|-|\\n|$|b|$ \\\\\\\\$1|"}]}',
+            "|a|\n|-|\n|$\\vert b\\vert$ \\$1|\n",
+            {},
+        ),
+        (
+            "a.md",
+            "# One\n\n10. A\n\n    > [!EXAMPLE]\n    > B\n",
+            "10. A\n\n    > [!note]\n    > B\n",
+            {},
+        ),
+    ],
+)
+def test_marks_and_labels_that_settings_or_a_text_give(
+    tmp_path: Path, name: str, text: str, expected: str, files: dict[str, str]
+) -> None:
+    assert lesson(tmp_path, name, text, **files) == expected

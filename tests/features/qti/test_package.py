@@ -237,6 +237,34 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course:
 # --- edits
 
 
+EXERCISE = """\
+```exercise model
+id = "1.1-heavy"
+text = "Make it weigh $2$ kg."
+start = "<mujoco><worldbody><body><geom size='1' mass='1'/></body></worldbody></mujoco>"
+solution = "<mujoco><worldbody><body><geom size='1' mass='2'/></body></worldbody></mujoco>"
+explain = "Its mass is that of its geom."
+
+[[trials]]
+name = "it weighs 2 kg"
+expr = "model.body_mass[1]"
+min = 2
+unit = "kg"
+```
+"""
+
+
+@pytest.mark.site
+def test_item_of_an_exercise_has_its_task_start_and_trials(make_course: Make) -> None:
+    [item] = items(package(make_course(EXERCISE)))
+    assert item.get("title") == "Write it yourself: Exercise"
+    body = "".join(item.find(f"{{{QTI}}}itemBody").itertext())
+    for words in ("Make it weigh", "as MJCF", "mass='1'/>", "it weighs 2\xa0kg: at least 2\xa0kg"):
+        assert words in body
+    assert "mass='2'/>" in shape(item, "//q:rubricBlock[@view='scorer']/q:pre")[0]
+    assert shape(item, "//q:modalFeedback")[0].endswith("Its mass is that of its geom.")
+
+
 @pytest.mark.site
 def test_package_follows_edits_and_names_of_other_items_stay(make_course: Make) -> None:
     folder = make_course("## One\n\n" + quiz("a", ANY["zero"], ANY["several"]))

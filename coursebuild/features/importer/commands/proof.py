@@ -88,23 +88,11 @@ def prove(options: Options, most_seconds: float) -> Findings:
             else:
                 edits[script.span.source] += _add_keys(script, keys, findings)
             continue
-        cells, cell_edits = _show_failing_cells(script, script_run, course, keys, findings)
-        if cell_edits:
+        cells = _settle(script, script_run, course, keys, options, findings, edits)
+        if cells.is_changed:
             changed_paths.add(script.path)
-            edits[script.span.source] += cell_edits
-        else:
-            keys += _divergence_keys(script, script_run)
-            if cells.modules and not script.requires:
-                keys.insert(0, f"requires={','.join(cells.modules)}")
-            edits[script.span.source] += _add_keys(script, keys, findings)
         for module in cells.modules:
             findings.add(Rank.MISSING, f"{script.path}: {name_package(module, options)}")
-        if cell_edits or script_run.outcome is Outcome.OK:
-            failing_parts = {*cells.failures, *cells.reasons} if cell_edits else ()
-            edits[script.span.source] += _record_outputs(
-                script, script_run, course, options, findings, failing_parts
-            )
-            edits[script.span.source] += _write_values(script, script_run, failing_parts)
     findings.write(edits)
     _run_again(first_runs, changed_paths, options, findings)
     return findings
@@ -171,7 +159,6 @@ def _run_again(
     edits = defaultdict[Source, list[Edit]](list)
     for extraction, script_run in zip(again, runs, strict=True):
         script, changes = extraction.script, edits[extraction.script.span.source]
-        varying = []
         if script_run.outcome is Outcome.OK and script.path not in changed_paths:
             first = first_runs[script.path]
             varying = [*_mark_varying(recordings[script.path], course, first, script_run)]
@@ -179,17 +166,9 @@ def _run_again(
                 changes += varying
                 message = f"{script.path}: two runs differ, so an output is `volatile`"
                 findings.add(Rank.CHANGED, message)
-        cells, cell_edits = _show_failing_cells(script, script_run, course, [], findings)
-        changes += cell_edits
-        if not cell_edits:
-            keys = [*_missing_keys(script, script_run, math.inf)]
-            keys += _divergence_keys(script, script_run)
-            changes += _add_keys(script, keys, findings)
-        if (cell_edits or script_run.outcome is Outcome.OK) and not varying:
-            end = min(cells.failures, default=None)
-            later = range(end, len(cells.parts)) if end is not None else ()
-            changes += _record_outputs(script, script_run, course, options, findings, later)
-            changes += _write_values(script, script_run, later)
+                continue
+        keys = [*_missing_keys(script, script_run, math.inf)]
+        _settle(script, script_run, course, keys, options, findings, edits)
     findings.write(edits)
     record_runs(again, runs, options)
     _draw(course, runs, options, findings)
@@ -201,20 +180,32 @@ def _draw(course: Course, runs: Sequence[ScriptRun], options: Options, findings:
         findings.add(Rank.DRAWN, remark)
 
 
-def _show_failing_cells(
+def _settle(
     script: model.Script,
     script_run: ScriptRun,
     course: Course,
-    keys: Sequence[str],
+    keys: list[str],
+    options: Options,
     findings: Findings,
-) -> tuple[Chain, list[Edit]]:
-    """Return the cells of a script, and the edits that show those that cannot run."""
+    edits: Mapping[Source, list[Edit]],
+) -> Chain:
+    """Make the edits that a run asks for: keys, cells that are only shown, what was printed."""
     recordings = recorded_outputs(course) if script_run.outcome is Outcome.FAILED else []
-    cells = Chain(script, script_run, recordings)
-    edits = [*cells.edits(keys)] if script_run.outcome is Outcome.FAILED else []
+    cells, changes = Chain(script, script_run, recordings), edits[script.span.source]
+    if script_run.outcome is Outcome.FAILED:
+        changes += cells.edits(keys)
     for rank, message, place in cells.findings:
         findings.add(rank, message, place)
-    return cells, edits
+    if not cells.is_changed:
+        keys += _divergence_keys(script, script_run)
+        if cells.modules and not script.requires:
+            keys.insert(0, f"requires={','.join(cells.modules)}")
+        changes += _add_keys(script, keys, findings)
+    if cells.is_changed or script_run.outcome is Outcome.OK:
+        failing_parts = {*cells.failures, *cells.reasons} if cells.is_changed else ()
+        changes += _record_outputs(script, script_run, course, options, findings, failing_parts)
+        changes += _write_values(script, script_run, failing_parts)
+    return cells
 
 
 def _add_keys(script: model.Script, keys: Sequence[str], findings: Findings) -> Iterator[Edit]:
