@@ -12,9 +12,8 @@ from coursebuild.core.scripts.lines import plain_text, replace_ranges
 from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText
 from coursebuild.core.text.numbers import (
     Number,
-    comma_groups,
+    as_printed,
     group_space,
-    point_decimals,
     round_like,
     scan_prose,
     within_half_unit,
@@ -59,7 +58,7 @@ class BoundText(Struct, frozen=True):
     @classmethod
     def of(cls, text: str, comma: bool = False) -> BoundText:
         """The numbers and the plain text of a binding, in a language that may have the comma."""
-        pointed = point_decimals(text) if comma else comma_groups(text)
+        pointed = as_printed(text, comma)
         if pointed != text:
             return replace(cls.of(pointed), comma=comma, space=group_space(text))
         numbers = numbers_of_quantities(text, scan_prose(text))
@@ -87,11 +86,13 @@ class BoundText(Struct, frozen=True):
             rounded = round_like(number, printed.value) if printed.is_finite else None
             if rounded is None or (printed.value and not any(n.value for n in scan_prose(rounded))):
                 return ""
-            rounded = write_comma(rounded) if self.comma else rounded
-            if self.space:
-                rounded = rounded.replace("." if self.comma else ",", self.space)
-            places.append((number.start, number.end, rounded))
+            places.append((number.start, number.end, self.as_written(rounded)))
         return replace_ranges(self.text, places)
+
+    def as_written(self, number: str) -> str:
+        """A printed number with the decimal comma, and the spaces of thousands, that it has."""
+        number = write_comma(number) if self.comma else number
+        return number.replace("." if self.comma else ",", self.space) if self.space else number
 
     def is_in(self, outputs: Iterable[PrintedText]) -> bool:
         """Whether printed numbers that may be meant, rounded, are those of the binding."""

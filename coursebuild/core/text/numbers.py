@@ -170,6 +170,14 @@ def comma_groups(text: str) -> str:
     return _WITH_SPACES.sub(lambda match: re.sub(r"\s", ",", match[0]), text)
 
 
+def as_printed(text: str, comma: bool) -> str:
+    """A text of the same length in which numbers are as programs print them.
+
+    `comma`: its language may have a comma before decimals.
+    """
+    return point_decimals(text) if comma else comma_groups(text)
+
+
 def write_comma(text: str) -> str:
     """A number as a program prints it, with a comma before its decimals."""
     return text.translate(_SWAPPED)

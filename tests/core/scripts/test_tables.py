@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -122,6 +123,11 @@ def test_the_numbers_of_a_table_are_replaced_in_place() -> None:
     assert table_after("| a | −1.5e-03 | 1.5e−03 |", "a -2.5e-03 -3.5e-03\n") == (
         "| a | −2.5e-03 | -3.5e−03 |"
     )
+    rows, printed = "| a | 1,234 | 1\u202f234 |", "a  1234567  3456.5\n"
+    assert table_after(rows, printed) == "| a | 1,234,567 | 3\u202f456.5 |"
+    assert table_after("| a | 3 m | 5% |", "a 4 m 6 %\n") == "| a | 4 m | 6% |"
+    with pytest.raises(AssertionError, match="`mm` is not what is printed here"):
+        table_after("| a | 3 mm | |", "a 4 m\n")
 
 
 def test_a_table_under_digits_keeps_its_decimals() -> None:
