@@ -9,6 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from pygments.lexers import find_lexer_class_by_name, find_lexer_class_for_filename
+from pygments.util import ClassNotFound
+
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.fence import (
     Fence,
@@ -67,6 +70,23 @@ def check_marks(content: Excerpt, start: int, text: str) -> Iterator[Diagnostic]
 def is_known_kind(kind: str) -> bool:
     """Whether a block of a kind is more than code to be shown."""
     return kind in CORE_FENCES or kind in fence_names()
+
+
+XML_KINDS = frozenset({"mjcf", "urdf"})
+"""Kinds of code that are XML by another name."""
+
+
+def check_language(fence: Fence, path: str) -> Iterator[Diagnostic]:
+    """Report a kind that is no language, where the file that is shown says which one is meant."""
+    lexer = find_lexer_class_for_filename(path)
+    try:
+        find_lexer_class_by_name("xml" if fence.kind in XML_KINDS else fence.kind)
+    except ClassNotFound:
+        if lexer is not None:
+            kind, (language, *_) = kind_of(fence.info), lexer.aliases
+            message = f"`{kind.text}` is not known as a language, and `{path}` is {lexer.name}"
+            fix = Fix(f"write `{language}`", language)
+            yield diagnose("script-kind", kind.span(), message, help=fix)
 
 
 def check_kind(fence: Fence) -> Iterator[Diagnostic]:

@@ -153,7 +153,7 @@ GROUPS: dict[str, dict[str, str]] = {
     },
     "Scripts": {
         "script-path": "A script cannot have this path.",
-        "script-kind": "A block with `file=` is not `python`, so it is not run.",
+        "script-kind": "The kind of a block is not the language of the file that it names.",
         "source-part": "A block differs from the file that it shows.",
         "script-unproven": "A script was not run, so nothing proves its output.",
         "script-repeated": "Two blocks have the same path.",
