@@ -45,7 +45,7 @@ _SCALE = re.compile(r"(?:\\mathrm|\\text)\s*(?:\{\s*([CF])\s*\}|([CF]))(?![\^_])
 _UPRIGHT_UNIT = r"\{\s*(\\(?:mathrm|text)\s*(?:\{[^{}]+\}|[A-Za-z])(?:\^(?:\d|\{-?\d\}))?)\s*\}"
 _UNIT_FRACTION = re.compile(rf"(?!\{{\s*\\mathrm\s*\{{?d\b)\s*{_UPRIGHT_UNIT}\s*{_UPRIGHT_UNIT}")
 _DEGREES = re.compile(r"\\circ|\{\s*\\circ\s*\}")
-_FUNCTIONS = frozenset("sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln".split())
+_FUNCTIONS = frozenset("sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln log".split())
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
 _BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
 """What holds all that a function is of: brackets, perhaps in braces, as other programs write."""
@@ -61,7 +61,6 @@ _REASONS = {
     **dict.fromkeys((r"\mathbf", r"\boldsymbol", r"\vec"), "it is a vector"),
     r"\lVert": "it is a norm",
     r"\begin": "it is an array",
-    r"\log": "`\\log` has no one base: only `\\ln` is computed",
     r"\bmod": "it is a remainder",
     **dict.fromkeys(r"\dots \ldots \cdots \dotsc \dotsb".split(), "something is left out"),
 }
@@ -417,11 +416,18 @@ class _Reader:
 
     def function(self, name: str, start: int) -> Expression:
         """Parse a function of a bracket, or of the factors that follow."""
+        base = self.group() if name == "log" and self.take("_") else None
+        if name == "log" and base is None:
+            reason = "`\\log` has no one base: write `\\ln`, or `\\log_{10}`"
+            raise NotUnderstood(reason, start, self.at)
         exponent = self.group() if self.take("^") else None
         if exponent is not None and exponent.kind != "number":
             raise exponent.not_understood("an inverse or a power can be meant")
         argument = self.base() if self.match(_BRACKET) else self.argument()
-        value = Expression(name, start, self.at, (argument,))
+        value = Expression(name if base is None else "ln", start, self.at, (argument,))
+        if base is not None:
+            of_base = Expression("ln", base.start, base.end, (base,))
+            value = Expression("/", start, self.at, (value, of_base))
         end = self.at
         if self.peek() in ("°", "!") or (self.take("^") and (exponent or self.match(_DEGREES))):
             raise self.not_understood("it may be of the function, or of what it is of")
