@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -29,6 +30,9 @@ from coursebuild.core.text.quantities import (
 
 _STRAY = re.compile(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
 """What beside a number is neither a unit nor a word: `-9.81-` has a slip."""
+
+
+_STRAY_INSIDE = re.compile(r"[-+*/=_]+(?=\s)")
 
 
 def shows(number: Number, printed: Number) -> bool:
@@ -151,9 +155,15 @@ class BoundText(Struct, frozen=True):
 
     @property
     def stray(self) -> str:
-        """A sign beside the numbers that is neither a unit nor a word, as in `-9.81-`."""
-        texts = (self.before.strip(), self.after.strip())
+        """A sign beside the numbers that is neither a unit nor a word, as in `-9.81-`, `2= of 20`."""
+        gaps = (_STRAY_INSIDE.match(gap) for gap in self._gaps(self.text, self.numbers))
+        texts = (self.before.strip(), self.after.strip(), *(gap[0] for gap in gaps if gap))
         return next(filter(_STRAY.fullmatch, texts), "")
+
+    @staticmethod
+    def _gaps(text: str, numbers: Sequence[Number]) -> list[str]:
+        """What stands between numbers of a text."""
+        return [text[a.end : b.start] for a, b in pairwise(numbers)]
 
     def places(self, outputs: Iterable[PrintedText]) -> list[PrintedPlace]:
         """The printed numbers that may be meant: those with the same text around, if any."""
@@ -174,6 +184,10 @@ class BoundText(Struct, frozen=True):
                 yield lambda place: not place.units[-1] or is_same_unit(unit, place.units[-1])
             else:
                 yield lambda place: after.match(place.after) is not None
+        gaps = self._gaps(self.text, self.numbers)
+        if any(map(_STRAY_INSIDE.match, gaps)):
+            words = [*map(plain_text, gaps)]
+            yield lambda p: [*map(plain_text, self._gaps(p.line.text, p.numbers))] == words
         if self.before:
             before = re.compile(_whole_words(self.before) + r"\Z")
             reach = 4 * len(self.before) + 200
