@@ -62,11 +62,11 @@ _LINE = re.compile(
     r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]"
     r"(?:\[(?P<path>[A-Za-z_]\w*(?:[.-]\w+)+)?\]|(?=\[\^)))"
-    r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
+    r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\](?!\())"
     rf"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst|{'|'.join(PROOF_LABELS)})"
     r"-(?P<label>\w+(?:-\w+)*)\]?)"
     r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
-    r"|(?<!\^)\^[^\s\^\[\]]+\^(?!\^))"
+    r"|(?<!\^)\^(?:[^\s\^\[\]]|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
@@ -109,10 +109,14 @@ _FIELDS = re.compile(
 )
 """A paragraph of lines such as `:name: words`, a list of fields in Sphinx."""
 _ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
-_EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
-"""The first or last line of code in a quotation or a list, or the first of a comment or formula."""
+_EDGE = re.compile(
+    r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?"
+    r"(`{3,}|~{3,}|<!--(?!.*-->)|<script(?![\w-])(?!.*</script>)|\$\$(?!.*\$\$))"
+)
+"""The first or last line of code in a quotation or a list, or the first of a comment, a script or a
+formula."""
 _EMPTY_HEADING = re.compile(r"[ ]{0,3}#{1,6}[ \t]*$")
-_ENDS = {"<!--": "-->", "$$": "$$"}
+_ENDS = {"<!--": "-->", "<script": "</script>", "$$": "$$"}
 _COMMENT = re.compile(
     r"%%(?P<inner>[^%\n]+)%%|^%%[ \t]*\n(?P<lines>(?:(?!%%)[^\n]*\n)+)%%[ \t]*$"
     r"|^(?:%(?!%)(?P<line>[^\n]*)|\+\+\+(?:[ \t]+(?P<data>[{\[][^\n]*))?[ \t]*)$",
@@ -144,7 +148,8 @@ _KEPT = {
 }
 """What is Markdown here as well."""
 _OVER_LINES = re.compile(
-    r"(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
+    r"(?<!`)(`+)(?!`).+?(?<!`)\1(?!`)"  # what looks like one in code is none
+    r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"

@@ -56,6 +56,22 @@ def lesson(folder: Path, name: str, text: str, **files: str) -> str:
             '<a id="fig-two"></a>\n\n![A](../files/p.png)\n\nBoth.\n\n'
             "See [the figure](#fig-two).\n",
         ),
+        (
+            "a.md",
+            "# One\n\n- In `/users/{id}`, it is `1`.\n- Then `/{id}` and\n- `x`.\n",
+            "- In `/users/{id}`, it is `1`.\n- Then `/{id}` and\n- `x`.\n",
+        ),
+        (
+            "a.qmd",
+            "# One\n\nSee [](`~pkg.part.f`) and [](`pkg.g`), a^[1](#b)^.\n",
+            "See `f` and `pkg.g`, a<sup>1</sup>.\n",
+        ),
+        (
+            "a.md",
+            "# One\n\n```js title=\"app/[[...x]]/{{y}}.js\"\n1\n```\n\n<script>\nx.match(/^[a-z]/)\n"
+            "</script>\n",
+            "**app/\\[\\[...x\\]\\]/\\{\\{y\\}\\}.js**\n\n```js\n1\n```\n\n\n",
+        ),
     ],
 )
 def test_what_has_a_number_keeps_it(tmp_path: Path, name: str, text: str, expected: str) -> None:
