@@ -92,8 +92,8 @@ def test_drift_begins_with_what_changed_in_the_environment(make: Make) -> None:
     folder.replace(RECORD, '"exact"', '"digits"')
     folder.replace(RECORD, PYTHON, "Python 3.9.1")
     folder.replace(folder.lesson(), "arange(4.0)", "arange(5.0)")
-    lead = f"Python 3.9.1 and comparison `digits`, this is {PYTHON[7:]} and `exact`"
-    assert f"error[output-drift]: the script was edited, and recorded with {lead}: " in folder.main("check").out
+    lead = f"recorded with Python 3.9.1 and comparison `digits`, this is {PYTHON[7:]} and `exact`"
+    assert f"error[output-drift]: the script was edited, and {lead}: " in folder.main("check").out
 
 
 def test_nothing_is_refused_without_a_record(make: Make) -> None:

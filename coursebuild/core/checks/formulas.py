@@ -179,15 +179,15 @@ def _check_letters(
     """Report commands without their backslash: the formula shows a product of letters.
 
     `letters` are those that stand alone in formulas of the document, of which `ell` is a product;
-    `commands` are those of the document: two letters, as `mu`, are a product without one. No letters
-    are one beside the command, or behind the end of a row where the formula has no rows.
+    `commands` are those of the document: two letters, as `mu`, are a product where it has none, but
+    not beside the command itself, or right behind two backslashes.
     """
-    words, has_rows = [*_LETTERS.finditer(tex.text)], r"\begin" in tex.text
+    words = [*_LETTERS.finditer(tex.text)]
     for word in words:
         text, name, bracket, brace = word.groups()
         is_name = name in SYMBOLS and not letters >= {*name}
         is_name &= len(name) > 2 or name in commands
-        is_name |= name in (commands if text != name and not has_rows else _COMMAND.findall(tex.text))
+        is_name |= name in (commands if text != name else _COMMAND.findall(tex.text))
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue

@@ -155,7 +155,7 @@ class BoundText(Struct, frozen=True):
 
     @property
     def stray(self) -> str:
-        """A sign beside the numbers that is neither a unit nor a word, as in `-9.81-`, `2= of 20`."""
+        """A sign beside a number that is neither a unit nor a word: `-9.81-`, `2= of 20`."""
         gaps = (_STRAY_INSIDE.match(gap) for gap in self._gaps(self.text, self.numbers))
         texts = (self.before.strip(), self.after.strip(), *(gap[0] for gap in gaps if gap))
         return next(filter(_STRAY.fullmatch, texts), "")

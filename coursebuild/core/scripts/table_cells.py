@@ -302,7 +302,7 @@ class ColumnTitle(Struct, frozen=True):
         return [at for at, count in enumerate(shared) if count == most] if most else []
 
     def names(
-        self, labels: Sequence[str], at: int, unit: UnitText, unit_of_cell: UnitText
+        self, labels: Sequence[str], at: int, unit: UnitText, unit_of_cell: UnitText = NO_UNIT
     ) -> bool | None:
         """Whether number `at` of a line is what the title says; `None` where nothing tells.
 

@@ -119,8 +119,10 @@ def parse_program(fence: Fence) -> Parsed[Script | PlainCode | None]:
     keys = fence.keys(values=("show",))
     word = keys.value.get("show")
     source = None if word is None else _source_part(fence, word)
-    diagnostics = (*keys.diagnostics, *check_language(fence, path))
-    return Parsed(PlainCode(fence.span, fence.body, source, fence.kind), diagnostics)
+    return Parsed(
+        PlainCode(fence.span, fence.body, source, fence.kind),
+        (*keys.diagnostics, *check_language(fence, path)),
+    )
 
 
 def _source_part(fence: Fence, word: Word) -> SourcePart:

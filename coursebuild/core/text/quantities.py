@@ -134,16 +134,12 @@ def with_unit(number: str, unit: str) -> str:
 
 def are_different(left: UnitText, right: UnitText) -> bool:
     """Whether both are units, and certainly not the same one."""
-    return (
-        bool(left)
-        and bool(right)
-        and not any(a.is_same(b) for a in left.readings for b in right.readings)
-    )
+    return bool(left) and bool(right) and not is_same_unit(left, right)
 
 
 def is_same_unit(left: UnitText, right: UnitText) -> bool:
     """Whether both are units, and may be the same one."""
-    return bool(left) and bool(right) and not are_different(left, right)
+    return any(a.is_same(b) for a in left.readings for b in right.readings)
 
 
 def printed_unit(line: str, start: int, end: int) -> UnitText:
