@@ -52,7 +52,7 @@ from coursebuild.core.scripts.table_cells import (
     words_of,
 )
 from coursebuild.core.text.numbers import Number, has_groups, relative_error, scan
-from coursebuild.core.text.quantities import UnitText, are_different, title_of_column
+from coursebuild.core.text.quantities import NO_UNIT, UnitText, are_different, title_of_column
 from coursebuild.core.text.source import Span
 
 _ALIKE_WEIGHT = 6
@@ -400,9 +400,10 @@ class TableMatcher:
 
     def _unit(self, at: int, number: Number) -> UnitText:
         """The unit that is printed with a number; wide gaps tell the titles above it apart."""
-        numbers = self.text.lines[at].numbers
-        with_gaps = dict(zip(numbers, self._text_with_gaps.lines[at].numbers, strict=False))
-        unit = self._text_with_gaps.unit(at, with_gaps.get(number, number))
+        numbers, with_gaps = (text.lines[at].numbers for text in (self.text, self._text_with_gaps))
+        unit = NO_UNIT
+        if len(numbers) == len(with_gaps) and number in numbers:
+            unit = self._text_with_gaps.unit(at, with_gaps[numbers.index(number)])
         return unit or self.text.unit(at, number)
 
     def misplaced_titles(self, match: TableMatch) -> Iterator[tuple[ColumnTitle, str, bool]]:
