@@ -143,9 +143,9 @@ def _recordings(
         if data is None:
             continue
         name, digest = f"{figure.script} {figure.name}", data_digest(data)
-        known = record.find(figure.script, digest)
+        entry = record.find(figure.script, digest)
         made_with = None if run is None else run.provenance
-        is_known = made_with and known and known.provenance.code == made_with.code
+        is_known = made_with and entry and entry.provenance.code == made_with.code
         if run is not None and not is_known:
             run = run if next(compare_figure(figure, run, data, record), None) is None else None
         yield from _recorded(record, figure.script, name, digest, FIGURE, run)

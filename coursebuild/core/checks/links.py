@@ -75,8 +75,8 @@ def is_whole(course: model.Course) -> bool:
 
 def anchors(document: model.Document) -> Mapping[str, Span]:
     """The ids that a link may name in a document, but for lines of scripts, and their spans."""
-    found = model.document_anchors(document)
-    return model.computed_once(document, "anchors", lambda: {id: span for id, _, span in found})
+    triples = model.document_anchors(document)
+    return model.computed_once(document, "anchors", lambda: {id: span for id, _, span in triples})
 
 
 def check_links(

@@ -21,7 +21,7 @@ from pygments.token import Comment, Keyword, Literal, Name, Operator, String, To
 from pygments.util import ClassNotFound
 from tree_sitter import Language, Parser, Query, QueryCursor
 
-from coursebuild.core.syntax.other_tools import XML_KINDS
+from coursebuild.core.model.blocks import XML_KINDS
 from coursebuild.core.text.characters import visible
 
 _KEYWORDS = """

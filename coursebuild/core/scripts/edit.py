@@ -315,12 +315,12 @@ def _update_table(
             if cell_matches(old, new, comparison):
                 continue
             span, text = cell.span(old), number_text(old, new, comparison)
-            written = BoundText.of(join_thousands(span.text), table.comma)
-            if written.text.replace(MINUS, "-") != old.text:
+            number = BoundText.of(join_thousands(span.text), table.comma)
+            if number.text.replace(MINUS, "-") != old.text:
                 reason = "a number written with an entity or an escape cannot be replaced"
                 return refusal(span, reason)
             # The minus signs of the old number stay: before it, and in its exponent.
-            halves = (re.split("(?=[eE])", h) for h in (span.text, written.as_written(text)))
+            halves = (re.split("(?=[eE])", h) for h in (span.text, number.as_written(text)))
             parts = zip_longest(*halves, fillvalue="")
             signed = (part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
             edits.append(Edit(span, "".join(signed)))

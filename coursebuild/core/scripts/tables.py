@@ -24,9 +24,8 @@ from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Address
-from coursebuild.core.model.results import Change, DriftKind, Verdict
+from coursebuild.core.model.results import Change, DriftKind
 from coursebuild.core.scripts.align import MATCH, pair
-from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
     MARK,
     Side,
@@ -42,7 +41,6 @@ from coursebuild.core.scripts.table_cells import (
     PrintedName,
     RowCell,
     cell_matches,
-    elides_rows,
     find_rows,
     misplaced_titles,
     number_text,
@@ -83,44 +81,6 @@ class TableMatch(Struct, frozen=True):
     """Lines, each of another layout, of which the table may mean any."""
     printed: int = 0
     """How many lines have the layout of the table."""
-
-
-def compare_table(
-    recording: model.Recording,
-    table: model.Table,
-    comparison: model.Comparison,
-    stdout: str,
-    addresses: RowAddresses = (),
-) -> Verdict:
-    """The verdict on a recorded table."""
-    matcher = TableMatcher(table, comparison, stdout, addresses)
-    if not matcher.rows:
-        return Verdict(recording, comparison, "drift")
-    match = matcher.match()
-    changes: list[Change] = []
-    for row in match.rows:
-        if row.line < 0:
-            first, last = row.row[0].cell.span, row.row[-1].cell.span
-            changes.append(Change(DriftKind.MISSING, first.to(last), row_text(row.row), ""))
-        for cell, old, new in row.pairs:
-            if not cell_matches(old, new, comparison):
-                span = cell.span(old)
-                changes.append(number_change(span, span.text, new.text, (old, new)))
-        changes += matcher.unit_changes(row)
-    if all(row.line >= 0 and row.certain for row in match.rows):
-        # Below a title of another column, or unit, numbers differ for that reason.
-        changes = [*matcher.header_changes(match)] or changes
-    counts = (len(match.rows), 0 if elides_rows(table) else match.printed)
-    return Verdict(
-        recording,
-        comparison,
-        "drift" if changes else "verified",
-        tuple(changes),
-        addresses if changes else matcher.addresses(match),
-        match.rivals
-        or tuple(text for _, text, is_sure in matcher.misplaced_titles(match) if not is_sure),
-        counts,
-    )
 
 
 class TableMatcher:

@@ -9,9 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from pygments.lexers import find_lexer_class_by_name, find_lexer_class_for_filename
-from pygments.util import ClassNotFound
-
+from coursebuild.core.model.blocks import XML_KINDS
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.fence import (
     Fence,
@@ -72,12 +70,11 @@ def is_known_kind(kind: str) -> bool:
     return kind in CORE_FENCES or kind in fence_names()
 
 
-XML_KINDS = frozenset({"mjcf", "urdf"})
-"""Kinds of code that are XML by another name."""
-
-
 def check_language(fence: Fence, path: str) -> Iterator[Diagnostic]:
     """Report a kind that is no language, where the file that is shown says which one is meant."""
+    from pygments.lexers import find_lexer_class_by_name, find_lexer_class_for_filename
+    from pygments.util import ClassNotFound
+
     lexer = find_lexer_class_for_filename(path)
     try:
         find_lexer_class_by_name("xml" if fence.kind in XML_KINDS else fence.kind)

@@ -156,9 +156,9 @@ def _without_window(code: str) -> str:
 
 def _caption_of(cell: Segment, code: str, context: LessonContext) -> str:
     options, title = options_of(cell), _DRAWN_TITLE.search(code)
-    drawn = "" if title is None else title[3]
-    drawn = drawn if title is None or title[1] == "r" else re.sub(r"\\([\\'\"])", r"\1", drawn)
-    caption = options.get("fig-cap") or options.get("caption") or drawn
+    words = "" if title is None else title[3]
+    words = words if title is None or title[1] == "r" else re.sub(r"\\([\\'\"])", r"\1", words)
+    caption = options.get("fig-cap") or options.get("caption") or words
     caption = " ".join(caption.strip("\"' ").split())
     return rewrite_prose(caption or context.title, context).rstrip()
 

@@ -46,8 +46,7 @@ _KEY = r"\w(?:[\w.:/+-]*\w)?"
 _PLACE = r"(?:<[^<>\n]+>|(?:[^()\s<]|\([^()\s]*\))(?:[^()\s]|\([^()\s]*\))*)"
 _ALT = re.compile(r"\balt=(['\"])(.*?)\1")
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
-# A formula holds no beginning of another: so each character is looked at a few times, not once for
-# each beginning before it.
+# A formula holds no beginning of another, so that each character is looked at a few times only.
 _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)(?:\{=\w+\})?)"
@@ -109,14 +108,10 @@ _FIELDS = re.compile(
 )
 """A paragraph of lines such as `:name: words`, a list of fields in Sphinx."""
 _ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
-_EDGE = re.compile(
-    r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?"
-    r"(`{3,}|~{3,}|<!--(?!.*-->)|<script(?![\w-])(?!.*</script>)|\$\$(?!.*\$\$))"
-)
-"""The first or last line of code in a quotation or a list, or the first of a comment, a script or a
-formula."""
+_EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
+"""The first or last line of code in a quotation or a list, or the first of a comment or formula."""
 _EMPTY_HEADING = re.compile(r"[ ]{0,3}#{1,6}[ \t]*$")
-_ENDS = {"<!--": "-->", "<script": "</script>", "$$": "$$"}
+_ENDS = {"<!--": "-->", "$$": "$$"}
 _COMMENT = re.compile(
     r"%%(?P<inner>[^%\n]+)%%|^%%[ \t]*\n(?P<lines>(?:(?!%%)[^\n]*\n)+)%%[ \t]*$"
     r"|^(?:%(?!%)(?P<line>[^\n]*)|\+\+\+(?:[ \t]+(?P<data>[{\[][^\n]*))?[ \t]*)$",

@@ -68,9 +68,8 @@ def lesson(folder: Path, name: str, text: str, **files: str) -> str:
         ),
         (
             "a.md",
-            '# One\n\n```js title="app/[[...x]]/{{y}}.js"\n1\n```\n\n'
-            "<script>\nx.match(/^[a-z]/)\n</script>\n",
-            "**app/\\[\\[...x\\]\\]/\\{\\{y\\}\\}.js**\n\n```js\n1\n```\n\n\n",
+            '# One\n\n```js title="app/[[...x]]/{{y}}.js"\n1\n```\n',
+            "**app/\\[\\[...x\\]\\]/\\{\\{y\\}\\}.js**\n\n```js\n1\n```\n",
         ),
     ],
 )
