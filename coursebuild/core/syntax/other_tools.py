@@ -83,7 +83,7 @@ def check_language(fence: Fence, path: str) -> Iterator[Diagnostic]:
             kind, (language, *_) = kind_of(fence.info), lexer.aliases
             message = f"`{kind.text}` is not known as a language, and `{path}` is {lexer.name}"
             fix = Fix(f"write `{language}`", language)
-            yield diagnose("script-kind", kind.span(), message, help=fix)
+            yield diagnose("fence-kind", kind.span(), message, help=fix)
 
 
 def check_kind(fence: Fence) -> Iterator[Diagnostic]:
