@@ -17,6 +17,7 @@ from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
+from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from support.fixture_cases import fixture_tables
 from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, tolerance, update
@@ -315,3 +316,10 @@ def test_tables_that_nobody_can_read_are_told() -> None:
     wording = describe_difference("x.csv", b"1\n", long)
     assert wording == "a table cannot be read: field larger than field limit (131072)"
     assert describe_difference("x.csv", text, b"1\n") == wording
+
+
+def test_thousands_of_a_table_are_one_number_with_one_address() -> None:
+    rows = "| 30 | 1,149 | 2 |\n| 60 | 152\u202f034 | 3 |"
+    text = PrintedText.of_recording(table(EDITED_HEAD + rows))
+    assert text.numbers == (("30", "1,149", "2"), ("60", "152,034", "3"))
+    assert text.words(0) == text.words(1) == "# # #"
