@@ -92,7 +92,8 @@ def with_provenance(
         all_packages = _versions(packages, modules_by_path[run.path])
         direct = _versions(packages, names & modules_by_path[run.path])
         requirements = tuple(pair for pair in all_packages if pair not in direct)
-        return Provenance(python, surroundings["platform"], direct, requirements)
+        code = data_digest(extractions[run.path].data)
+        return Provenance(python, surroundings["platform"], direct, requirements, code)
 
     return {**runs, **{run.path: replace(run, provenance=provenance(run)) for run in new_runs}}
 
@@ -142,7 +143,10 @@ def _recordings(
         if data is None:
             continue
         name, digest = f"{figure.script} {figure.name}", data_digest(data)
-        if run is not None and record.find(figure.script, digest) is None:
+        entry = record.find(figure.script, digest)
+        made_with = None if run is None else run.provenance
+        is_known = made_with and entry and entry.provenance.code == made_with.code
+        if run is not None and not is_known:
             run = run if next(compare_figure(figure, run, data, record), None) is None else None
         yield from _recorded(record, figure.script, name, digest, FIGURE, run)
 
@@ -157,6 +161,9 @@ def _recorded(
 ) -> Iterator[Recorded]:
     """How a recording was made: as is known, or else as in the run that bears it out."""
     if (recorded_before := record.find(script, digest)) is not None:
-        yield replace(recorded_before, of=name)
+        made_with = recorded_before.provenance
+        if run is not None and run.provenance is not None:  # this text gives the same
+            made_with = replace(made_with, code=run.provenance.code)
+        yield replace(recorded_before, of=name, provenance=made_with)
     elif run is not None and run.outcome is Outcome.OK and run.provenance is not None:
         yield Recorded(name, digest, comparison, run.provenance)

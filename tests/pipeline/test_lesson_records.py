@@ -77,7 +77,7 @@ def test_drift_begins_with_what_changed_in_the_environment(make: Make) -> None:
     assert folder.main("update").status == 0
     assert folder.read(RECORD) == recorded_elsewhere, "what holds is not recorded anew"
     folder.replace(folder.lesson(), "arange(3.0)", "arange(4.0)")
-    lead = f"recorded with NumPy 1.26.4, this is {version('numpy')}: recorded output differs"
+    lead = f"the script was edited, and recorded with NumPy 1.26.4, this is {version('numpy')}: "
     assert f"error[output-drift]: {lead}" in folder.main("check").out
     assert folder.main("update").status == 0
     assert NUMPY in folder.text(RECORD), "it was recorded here"
@@ -85,7 +85,7 @@ def test_drift_begins_with_what_changed_in_the_environment(make: Make) -> None:
     folder.replace(RECORD, PYTHON, "Python 3.9.1")
     folder.replace(folder.lesson(), "arange(4.0)", "arange(5.0)")
     lead = f"recorded with Python 3.9.1 and comparison `digits`, this is {PYTHON[7:]} and `exact`"
-    assert f"error[output-drift]: {lead}: " in folder.main("check").out
+    assert f"error[output-drift]: the script was edited, and {lead}: " in folder.main("check").out
 
 
 def test_nothing_is_refused_without_a_record(make: Make) -> None:
@@ -222,8 +222,8 @@ def test_figure_of_another_version_is_compared_by_what_it_draws(make: Make) -> N
     folder.write(folder.lesson(), drawing_lesson(middle=1.5, font=17))
     check = folder.main("check")
     assert (
-        f"error[figure-drift]: recorded with Matplotlib 3.9.0, this is {version('matplotlib')}: "
-        "the recorded figure differs from this run: "
+        "error[figure-drift]: the script was edited, and recorded with Matplotlib 3.9.0, "
+        f"this is {version('matplotlib')}: the recorded figure differs from this run: "
         "the curve “fall” has its point 2 of 3 at (1, 1.5) where (1, 1) is recorded\n"
     ) in check.out
     assert folder.main("update").status == 0

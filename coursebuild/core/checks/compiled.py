@@ -89,9 +89,8 @@ def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
         for block in document_blocks(document):
             if isinstance(block, Mjcf) and block.fragment is not None:
                 # `fragment="worldbody/body"` names nested elements, from the outside.
-                path = ["mujoco"]
-                if block.fragment not in ("", "mujoco"):
-                    path += block.fragment.split("/")
+                names = block.fragment.split("/")
+                path = ["mujoco", *(name for name in names if name not in ("", "mujoco"))]
                 opening = "".join(f"<{name}>" for name in path)
                 closing = "".join(f"</{name}>" for name in reversed(path))
                 text = f"{opening}\n{block.code.text}\n{closing}"
@@ -161,13 +160,12 @@ def diagnose_model(
     models: Sequence[MjcfModel] = (),
 ) -> Diagnostic:
     """The diagnostic of a model that does not compile; `models` may be included by it."""
-    text, closing, help = model.source.text, "</mujoco>\n", ""
-    if closing.rstrip() not in text:
-        with contextlib.suppress(expat.ExpatError):
-            closing = closing if text.endswith("\n") else f"\n{closing}"
-            expat.ParserCreate().Parse(f"{text}{closing}".encode(), True)
-            edit = Edit(model.source.span(len(text), len(text)), closing)
-            help = Fix("end it with `</mujoco>`", edits=(edit,), safe=True)
+    text, help = model.source.text, ""
+    closing = "</mujoco>\n" if text.endswith("\n") else "\n</mujoco>\n"
+    with contextlib.suppress(expat.ExpatError):  # as where it has one already
+        expat.ParserCreate().Parse(f"{text}{closing}".encode(), True)
+        edit = Edit(model.source.span(len(text)), closing)
+        help = Fix("end it with `</mujoco>`", edits=(edit,), safe=True)
     return _diagnose_failure(_text_of(model), result, readable, models, help)
 
 
@@ -240,7 +238,7 @@ def _find_fault(text: MjcfText) -> Iterator[Diagnostic]:
     faults = list[tuple[int, str]]()
 
     def read_words(words: str) -> None:
-        if words.strip() and not faults:
+        if words.strip():
             extract = textwrap.shorten(words, 40, placeholder="…")
             faults.append((parser.CurrentLineNumber, f"`{extract}` outside any tag"))
 
@@ -346,18 +344,18 @@ def _check_timestep(scenario: DeclaredScenario, step: float) -> Iterator[Diagnos
 
     MuJoCo compiles models with any timestep, also with 0 and NaN.
     """
-    lengths = (
-        ("sample", scenario.sample),
-        ("hold", scenario.hold),
-        ("duration", scenario.duration),
-    )
-    name, length = next((pair for pair in lengths if pair[1] is not None), ("", None))
-    if length is None or (step > 0 and is_multiple(length, step)):
+    lengths = {"sample": scenario.sample, "hold": scenario.hold, "duration": scenario.duration}
+    for name, length in lengths.items():
+        if length is None:
+            continue
+        if step > 0 and is_multiple(length, step):
+            return
+        message = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
+        help = ""
+        if 1e-15 < step / length < math.inf:
+            help = f"a multiple near it is {max(round(length / step), 1) * step:.12g}"
+        yield diagnose(_RULE, scenario.place(name), message, help=help)
         return
-    message, help = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)", ""
-    if 1e-15 < step / length < math.inf:
-        help = f"a multiple near it is {max(round(length / step), 1) * step:.12g}"
-    yield diagnose(_RULE, scenario.place(name), message, help=help)
 
 
 MAX_SWEEP_STEPS = 2_000_000
@@ -368,13 +366,10 @@ def _check_sweep(
     sweep: DeclaredSweep, scenarios: Sequence[DeclaredScenario], facts: ModelFacts
 ) -> Iterator[Diagnostic]:
     timestep, total = facts.timestep, 0.0
-    scenario = next((s for s in scenarios if sweep.scenario in (None, s.name)), None)
-    duration = None if scenario is None else scenario.duration
-    if duration is None:
-        command_seconds = (
-            0.0 if scenario is None else len(scenario.controls) * (scenario.hold or 0.0)
-        )
-        duration = max(command_seconds, min(DURATION, MOST_STEPS * timestep))
+    duration = min(DURATION, MOST_STEPS * timestep)
+    for scenario in [s for s in scenarios if sweep.scenario in (None, s.name)][:1]:
+        command_seconds = len(scenario.controls) * (scenario.hold or 0.0)
+        duration = scenario.duration or max(command_seconds, duration)
     for variation in sweep.variations:
         timed = variation.parameter == "option.timestep"
         for value in variation.values:

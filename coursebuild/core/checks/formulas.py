@@ -57,6 +57,7 @@ _LETTERS = re.compile(
     r"(?<![\\A-Za-z])((?:\\\\)?([A-Za-z]{2,}))(?![A-Za-z0-9])"
     r"(?=(\s*(?:\\(?:left|[bB]igg?l?)\s*)?\()|(\{)|)"
 )
+_COMMAND = re.compile(r"(?<!\\)\\([A-Za-z]+)")
 _LETTER = re.compile(r"(?<![A-Za-z\\])[A-Za-z](?![A-Za-z])")
 _BRACKET = re.compile(r"\\[{}]|\\.|[()\[\]]", re.DOTALL)
 _NAMED_BRACKET = re.compile(r"\\[lr](?:brack|brace|paren)(?![A-Za-z])")
@@ -89,6 +90,7 @@ def check_formulas(
     diagnostics: list[Diagnostic] = []
     uses = [*_formula_uses(document)]
     letters = {letter for _, _, tex in uses for letter in _LETTER.findall(tex.text)}
+    commands = {command for _, _, tex in uses for command in _COMMAND.findall(tex.text)}
     in_features = feature_block_ids(document)
     for _, group in groupby(uses, key=lambda use: id(use[0])):
         typeset_ones: list[tuple[Excerpt, _Signs]] = []
@@ -100,7 +102,8 @@ def check_formulas(
             if (signs := _read_signs(result)) is not None:
                 typeset_ones.append((tex, signs))
                 # In JSON a backslash may need another one, so that nothing is written there.
-                diagnostics += _check_letters(tex, signs, letters, id(block) not in in_features)
+                can_write = id(block) not in in_features
+                diagnostics += _check_letters(tex, signs, letters, commands, can_write)
         diagnostics += _check_brackets(block, typeset_ones)
     return tuple(diagnostics)
 
@@ -171,16 +174,20 @@ def _letter_runs(elements: Iterable[Element], parent: str = "") -> Iterator[str]
 
 
 def _check_letters(
-    tex: Excerpt, signs: _Signs, letters: set[str], can_write: bool
+    tex: Excerpt, signs: _Signs, letters: set[str], commands: set[str], can_write: bool
 ) -> Iterator[Diagnostic]:
     """Report commands without their backslash: the formula shows a product of letters.
 
-    `letters` are those that stand alone in formulas of the document: of these `pi` is a product.
+    `letters` are those that stand alone in formulas of the document, of which `ell` is a product;
+    `commands` are those of the document: two letters, as `mu`, are a product where it has none, but
+    not beside the command itself, or right behind two backslashes.
     """
     words = [*_LETTERS.finditer(tex.text)]
     for word in words:
-        _, name, bracket, brace = word.groups()  # the first may begin with two backslashes
+        text, name, bracket, brace = word.groups()
         is_name = name in SYMBOLS and not letters >= {*name}
+        is_name &= len(name) > 2 or name in commands
+        is_name |= name in (commands if text != name else _COMMAND.findall(tex.text))
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue

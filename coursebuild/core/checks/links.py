@@ -45,11 +45,9 @@ class LinkTargets(Struct, frozen=True):
 
 def link_targets(course: model.Course) -> LinkTargets:
     """What the course offers as targets."""
-    scripts: set[str] = set()
     terms: dict[str, Span] = {}
     progress_ids: dict[str, Span] = {}
     for document in course.documents:
-        scripts.update(script.path for script in model.document_scripts(document))
         for term in model.find_inlines(document, model.Term):
             terms.setdefault(term.id, term.span)
         for block in model.find_blocks(document, model.FeatureBlock):
@@ -61,7 +59,7 @@ def link_targets(course: model.Course) -> LinkTargets:
         {page.id: page.document for page in course.pages},
         {mjcf.name: mjcf for mjcf in course.models},
         {d.model: tuple(scenario.name for scenario in d.scenarios) for d in course.declarations},
-        frozenset(scripts),
+        frozenset(s.path for d in course.documents for s in model.document_scripts(d)),
         frozenset(course.files),
         terms,
         progress_ids,
@@ -77,11 +75,8 @@ def is_whole(course: model.Course) -> bool:
 
 def anchors(document: model.Document) -> Mapping[str, Span]:
     """The ids that a link may name in a document, but for lines of scripts, and their spans."""
-
-    def collect() -> dict[str, Span]:
-        return {id: span for id, _, span in model.document_anchors(document)}
-
-    return model.computed_once(document, "anchors", collect)
+    triples = model.document_anchors(document)
+    return model.computed_once(document, "anchors", lambda: {id: span for id, _, span in triples})
 
 
 def check_links(
@@ -213,9 +208,11 @@ class _Checker(Struct, frozen=True):
         parts = urlsplit_or_none(url)
         if parts is None:
             yield diagnose("link-file", span, f"`{url}` is not a readable address")
-        elif parts.path and not (parts.scheme or parts.netloc):
+        elif parts.scheme or parts.netloc:
+            return
+        elif parts.path:
             yield from self.check_file(url, span)
-        elif not (parts.scheme or parts.netloc):
+        else:
             yield from _check_document_anchor(span, parts.fragment, self.document, "this page")
 
     def check_file(self, url: str, span: Span) -> Iterator[Diagnostic]:

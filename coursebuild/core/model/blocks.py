@@ -160,6 +160,8 @@ class ScriptPart(Labelled, frozen=True):
 
 
 PYTHON = "python"
+XML_KINDS = frozenset({"mjcf", "urdf"})
+"""Kinds of code that are XML by another name."""
 
 
 class Script(Labelled, frozen=True):

@@ -90,6 +90,8 @@ class Provenance(Struct, frozen=True):
     """What the script imports, or a module of the course that it imports, sorted."""
     requirements: Versions = ()
     """What those import, sorted."""
+    code: str = ""
+    """The hash of the script."""
 
 
 def shown_versions(provenances: Iterable[Provenance | None]) -> tuple[str, ...]:
@@ -131,7 +133,9 @@ class Recorded(Struct, frozen=True, tag_field="is", tag="recording"):
         if not pairs:
             return ""
         old, new = (_join(words) for words in zip(*pairs, strict=True))
-        return f"recorded with {old}, this is {new}"
+        change = f"recorded with {old}, this is {new}"
+        is_edited = before.code not in ("", now.code)  # this alone may explain what differs
+        return f"the script was edited, and {change}" if is_edited else change
 
 
 class _Bound(Struct, frozen=True, tag_field="is", tag="value"):

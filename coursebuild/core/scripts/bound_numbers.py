@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -12,9 +13,8 @@ from coursebuild.core.scripts.lines import plain_text, replace_ranges
 from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText
 from coursebuild.core.text.numbers import (
     Number,
-    comma_groups,
+    as_printed,
     group_space,
-    point_decimals,
     round_like,
     scan_prose,
     within_half_unit,
@@ -30,6 +30,9 @@ from coursebuild.core.text.quantities import (
 
 _STRAY = re.compile(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
 """What beside a number is neither a unit nor a word: `-9.81-` has a slip."""
+
+
+_STRAY_INSIDE = re.compile(r"[-+*/=_]+(?=\s)")
 
 
 def shows(number: Number, printed: Number) -> bool:
@@ -59,7 +62,7 @@ class BoundText(Struct, frozen=True):
     @classmethod
     def of(cls, text: str, comma: bool = False) -> BoundText:
         """The numbers and the plain text of a binding, in a language that may have the comma."""
-        pointed = point_decimals(text) if comma else comma_groups(text)
+        pointed = as_printed(text, comma)
         if pointed != text:
             return replace(cls.of(pointed), comma=comma, space=group_space(text))
         numbers = numbers_of_quantities(text, scan_prose(text))
@@ -87,11 +90,13 @@ class BoundText(Struct, frozen=True):
             rounded = round_like(number, printed.value) if printed.is_finite else None
             if rounded is None or (printed.value and not any(n.value for n in scan_prose(rounded))):
                 return ""
-            rounded = write_comma(rounded) if self.comma else rounded
-            if self.space:
-                rounded = rounded.replace("." if self.comma else ",", self.space)
-            places.append((number.start, number.end, rounded))
+            places.append((number.start, number.end, self.as_written(rounded)))
         return replace_ranges(self.text, places)
+
+    def as_written(self, number: str) -> str:
+        """A printed number with the decimal comma, and the spaces of thousands, that it has."""
+        number = write_comma(number) if self.comma else number
+        return number.replace("." if self.comma else ",", self.space) if self.space else number
 
     def is_in(self, outputs: Iterable[PrintedText]) -> bool:
         """Whether printed numbers that may be meant, rounded, are those of the binding."""
@@ -150,9 +155,15 @@ class BoundText(Struct, frozen=True):
 
     @property
     def stray(self) -> str:
-        """A sign beside the numbers that is neither a unit nor a word, as in `-9.81-`."""
-        texts = (self.before.strip(), self.after.strip())
+        """A sign beside a number that is neither a unit nor a word: `-9.81-`, `2= of 20`."""
+        gaps = (_STRAY_INSIDE.match(gap) for gap in self._gaps(self.text, self.numbers))
+        texts = (self.before.strip(), self.after.strip(), *(gap[0] for gap in gaps if gap))
         return next(filter(_STRAY.fullmatch, texts), "")
+
+    @staticmethod
+    def _gaps(text: str, numbers: Sequence[Number]) -> list[str]:
+        """What stands between numbers of a text."""
+        return [text[a.end : b.start] for a, b in pairwise(numbers)]
 
     def places(self, outputs: Iterable[PrintedText]) -> list[PrintedPlace]:
         """The printed numbers that may be meant: those with the same text around, if any."""
@@ -173,6 +184,10 @@ class BoundText(Struct, frozen=True):
                 yield lambda place: not place.units[-1] or is_same_unit(unit, place.units[-1])
             else:
                 yield lambda place: after.match(place.after) is not None
+        gaps = self._gaps(self.text, self.numbers)
+        if any(map(_STRAY_INSIDE.match, gaps)):
+            words = [*map(plain_text, gaps)]
+            yield lambda p: [*map(plain_text, self._gaps(p.line.text, p.numbers))] == words
         if self.before:
             before = re.compile(_whole_words(self.before) + r"\Z")
             reach = 4 * len(self.before) + 200

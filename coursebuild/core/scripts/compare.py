@@ -20,8 +20,8 @@ from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
 from coursebuild.core.scripts.diff import find_differences, number_change, quote, text_diff
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
-from coursebuild.core.scripts.table_cells import row_values
-from coursebuild.core.scripts.tables import RowAddresses, compare_table
+from coursebuild.core.scripts.table_cells import cell_matches, elides_rows, row_text, row_values
+from coursebuild.core.scripts.tables import RowAddresses, TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -71,7 +71,7 @@ def compare(
     if comparison.mode is model.Mode.VOLATILE:
         return Verdict(recording, comparison, "volatile")
     if isinstance(body, model.Table):
-        return compare_table(recording, body, comparison, stdout, addresses)
+        return _compare_table(recording, body, comparison, stdout, addresses)
     if stdout in (body.text, f"{body.text}\n"):  # as it nearly always is
         return Verdict(recording, comparison, "verified")
     recorded, printed = (Side.of(text, comparison.filters) for text in (body.text, stdout))
@@ -226,3 +226,41 @@ _TABLE_HELP = f"{_REPEAT_HELP}, or record the output in a `text` fence with `vol
 
 
 _DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
+
+
+def _compare_table(
+    recording: model.Recording,
+    table: model.Table,
+    comparison: model.Comparison,
+    stdout: str,
+    addresses: RowAddresses = (),
+) -> Verdict:
+    """The verdict on a recorded table."""
+    matcher = TableMatcher(table, comparison, stdout, addresses)
+    if not matcher.rows:
+        return Verdict(recording, comparison, "drift")
+    match = matcher.match()
+    changes: list[Change] = []
+    for row in match.rows:
+        if row.line < 0:
+            first, last = row.row[0].cell.span, row.row[-1].cell.span
+            changes.append(Change(DriftKind.MISSING, first.to(last), row_text(row.row), ""))
+        for cell, old, new in row.pairs:
+            if not cell_matches(old, new, comparison):
+                span = cell.span(old)
+                changes.append(number_change(span, span.text, new.text, (old, new)))
+        changes += matcher.unit_changes(row)
+    if all(row.line >= 0 and row.certain for row in match.rows):
+        # Below a title of another column, or unit, numbers differ for that reason.
+        changes = [*matcher.header_changes(match)] or changes
+    counts = (len(match.rows), 0 if elides_rows(table) else match.printed)
+    return Verdict(
+        recording,
+        comparison,
+        "drift" if changes else "verified",
+        tuple(changes),
+        addresses if changes else matcher.addresses(match),
+        match.rivals
+        or tuple(text for _, text, is_sure in matcher.misplaced_titles(match) if not is_sure),
+        counts,
+    )

@@ -22,11 +22,12 @@ import difflib
 import re
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import groupby, pairwise, zip_longest
+from itertools import chain, groupby, pairwise, zip_longest
 from typing import TypeVar
 
 from coursebuild.core import model
 from coursebuild.core.scripts.align import StepKind, align, same_lines
+from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.failures import without_indentation
 from coursebuild.core.scripts.fill_table import fill_table
 from coursebuild.core.scripts.lines import (
@@ -34,13 +35,17 @@ from coursebuild.core.scripts.lines import (
     LineMatcher,
     Side,
     replace_ranges,
-    same_number,
 )
 from coursebuild.core.scripts.module_code import DEFINITIONS, first_line
-from coursebuild.core.scripts.table_cells import HEADER_HELP, number_text, table_rows
+from coursebuild.core.scripts.table_cells import (
+    HEADER_HELP,
+    cell_matches,
+    number_text,
+    table_rows,
+)
 from coursebuild.core.scripts.tables import RowAddresses, TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
-from coursebuild.core.text.numbers import point_decimals, write_comma
+from coursebuild.core.text.numbers import join_thousands
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _T = TypeVar("_T")
@@ -307,23 +312,22 @@ def _update_table(
             )
             return refusal(span, f"{reason} the cells of this row in order")
         for cell, old, new in row.pairs:
-            if same_number(old, new, comparison):
+            if cell_matches(old, new, comparison):
                 continue
             span, text = cell.span(old), number_text(old, new, comparison)
-            has_comma = table.comma and point_decimals(span.text) != span.text
-            pointed_text = point_decimals(span.text) if has_comma else span.text
-            if pointed_text.replace(MINUS, "-") != old.text:
+            number = BoundText.of(join_thousands(span.text), table.comma)
+            if number.text.replace(MINUS, "-") != old.text:
                 reason = "a number written with an entity or an escape cannot be replaced"
                 return refusal(span, reason)
             # The minus signs of the old number stay: before it, and in its exponent.
-            text = write_comma(text) if has_comma else text
-            halves = (re.split("(?=[eE])", half) for half in (span.text, text))
+            halves = (re.split("(?=[eE])", h) for h in (span.text, number.as_written(text)))
             parts = zip_longest(*halves, fillvalue="")
             signed = (part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
             edits.append(Edit(span, "".join(signed)))
-    change = next(matcher.header_changes(match), None)
-    if change is not None:
-        return refusal(change.span, "the header is not what is printed", HEADER_HELP)
+    changes = (*matcher.header_changes(match), *chain(*map(matcher.unit_changes, match.rows)))
+    for change in changes:
+        message = f"`{change.recorded}` is not what is printed here"
+        return refusal(change.span, message, HEADER_HELP)
     if not edits:
         return None
     for title, _, _ in matcher.misplaced_titles(match):

@@ -188,12 +188,16 @@ class CanonicalText(Struct, frozen=True):
 
 
 @lru_cache(maxsize=8192)
-def canonicalize(text: str, offset: int = 0, *, has_powers: bool = False) -> CanonicalText:
+def canonicalize(
+    text: str, offset: int = 0, *, has_powers: bool = False, is_grouped: bool = False
+) -> CanonicalText:
     """The skeleton and the numbers of a text that stands at `offset` of its line.
 
-    `has_powers`: a person wrote it, with numbers such as `3.9 × 10⁻¹¹`.
+    `has_powers`: a person wrote it, with numbers such as `3.9 × 10⁻¹¹`; `is_grouped`: `1,234` is
+    one number.
     """
-    numbers = with_powers(text, scan(text)) if has_powers else scan(text)
+    numbers = scan(text, is_grouped)
+    numbers = with_powers(text, numbers) if has_powers else numbers
     places = ((number.start, number.end, MARK) for number in numbers)
 
     def fold_space(match: re.Match[str]) -> str:

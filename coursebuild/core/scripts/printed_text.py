@@ -26,7 +26,7 @@ from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.model.lesson_record import Address
 from coursebuild.core.scripts.lines import MARK, MappedText, Side, canonicalize, plain_text
 from coursebuild.core.scripts.table_cells import ColumnTitle, RowCell, table_rows
-from coursebuild.core.text.numbers import Number, has_groups, point_decimals, scan
+from coursebuild.core.text.numbers import Number, as_printed, has_groups, scan
 from coursebuild.core.text.quantities import (
     UnitText,
     is_same_unit,
@@ -191,7 +191,7 @@ class PrintedText:
 
     @cached_property
     def _words(self) -> list[str]:
-        return [masked(line.text) for line in self.lines]
+        return [masked(line.text, line.is_grouped) for line in self.lines]
 
     @property
     def numbers(self) -> tuple[tuple[str, ...], ...]:
@@ -384,9 +384,10 @@ class PrintedText:
         return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
 
 
-def masked(text: str) -> str:
+def masked(text: str, is_grouped: bool = False) -> str:
     """A text with `#` for each of its numbers, white space folded."""
-    return plain_text(canonicalize(text).skeleton.replace(MARK, " # "))
+    skeleton = canonicalize(text, is_grouped=is_grouped).skeleton
+    return plain_text(skeleton.replace(MARK, " # "))
 
 
 def describe_line(address: Address) -> str:
@@ -427,7 +428,7 @@ def _ends_with(context: _Words, sought: _Words) -> bool:
 def _lines_of_table(table: Table) -> Iterator[PrintedLine]:
     rows, titles = table_rows(table), list(map(ColumnTitle.of, table.header))
     joined_rows = [_join_cells(row) for row in rows]
-    texts = [point_decimals(row.text) if table.comma else row.text for row in joined_rows]
+    texts = [" ".join(as_printed(c.mapped.text, table.comma) for c in row) for row in rows]
     is_grouped = has_groups("\n".join(texts))
     for row, joined_row, text in zip(rows, joined_rows, texts, strict=True):
         ends = accumulate(len(cell.mapped.text) + 1 for cell in row)

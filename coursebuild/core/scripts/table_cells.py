@@ -24,17 +24,30 @@ from coursebuild.core.scripts.lines import (
     numbers_fit,
     same_number,
 )
-from coursebuild.core.text.numbers import Number, only_number, point_decimals, round_like
+from coursebuild.core.text.numbers import (
+    Number,
+    as_printed,
+    has_groups,
+    join_thousands,
+    only_number,
+    round_like,
+    scan_prose,
+)
 from coursebuild.core.text.quantities import (
     NO_UNIT,
     UnitText,
     are_different,
     is_same_unit,
+    numbers_of_quantities,
+    read_unit,
     unit_of_header,
 )
 from coursebuild.core.text.source import Span
 
-_RUN = re.compile(r"\s{2,}|[^\S ]")
+_RUN = re.compile(r"\s{2,}|(?<![0-9])[^\S ]|[^\S ](?![0-9])")
+"""What is one space in a cell; not what may part thousands."""
+_SPACED_PAIR = re.compile(r"[0-9] [0-9]{3}(?![0-9])")
+"""Two numbers, or one with its thousands apart."""
 _ENDS = re.compile(r"\A\s+|\s+\Z")
 
 
@@ -64,6 +77,28 @@ class RowCell(Struct, frozen=True):
     column: int
     mapped: MappedText
     canonical: CanonicalText
+    """Without the unit."""
+    unit: UnitText = NO_UNIT
+    """That of its last number, if it ends with one: it need not be printed, nor be spelt so."""
+
+    @classmethod
+    def of(
+        cls, cell: model.Cell, column: int, mapped: MappedText, text: str, is_grouped: bool
+    ) -> RowCell:
+        """A cell with its text, in which numbers are as programs print them."""
+        numbers = numbers_of_quantities(text, scan_prose(text))
+        end = numbers[-1].end if numbers else len(text)
+        if unit := read_unit(text[end:]):
+            text = text[:end]
+        canonical = canonicalize(text, has_powers=True, is_grouped=is_grouped)
+        return cls(cell, column, mapped, canonical, unit)
+
+    @property
+    def unit_span(self) -> Span:
+        """Where its unit stands in the lesson."""
+        text, end = self.mapped.text, self.canonical.numbers[-1].end
+        start = len(text) - len(text[end:].lstrip())
+        return Span(self.cell.span.source, *self.mapped.origin(start, len(text)))
 
     def span(self, number: Number) -> Span:
         """Where a number of the cell stands in the lesson."""
@@ -75,14 +110,22 @@ ELISIONS = ("\u2026", "...")
 
 
 def table_rows(
-    table: model.Table, filters: Iterable[model.Filter] = ()
+    table: model.Table, filters: Iterable[model.Filter] = (), printed: str = ""
 ) -> tuple[tuple[RowCell, ...], ...]:
-    """The body rows of a table; cells without text, or left out, and rows of such are not there."""
+    """The body rows of a table; cells without text, or left out, and rows of such are not there.
+
+    Commas and spaces between digits part thousands unless they do not so in what is printed.
+    """
     rules = tuple(filters)
-    with_point = point_decimals if table.comma else str
+    is_grouped = "," not in printed or has_groups(printed)
+    has_pairs = _SPACED_PAIR.search(printed) is not None
+
+    def read(text: str) -> str:
+        return as_printed(text if has_pairs else join_thousands(text), table.comma)
+
     rows = (
         tuple(
-            RowCell(cell, column, mapped, canonicalize(with_point(mapped.text), has_powers=True))
+            RowCell.of(cell, column, mapped, read(mapped.text), is_grouped)
             for column, cell in enumerate(row)
             if (mapped := cell_text(cell, rules)).text not in ("", *ELISIONS)
         )
@@ -155,7 +198,9 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
 
 
 def cell_matches(recorded: Number, printed: Number, comparison: model.Comparison) -> bool:
-    """Whether a number in a cell is the printed one: also a `2` for `2.0`."""
+    """Whether a number in a cell is the printed one: also a `2` for `2.0`, `1,234` for `1234`."""
+    if recorded.text.replace(",", "") == printed.text.replace(",", ""):
+        return True
     is_exact = comparison.mode is model.Mode.EXACT or recorded.is_padded or printed.is_padded
     is_equal = not is_exact and recorded.value == printed.value
     return is_equal or same_number(recorded, printed, comparison)
@@ -166,6 +211,8 @@ def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
     has_more = new.place < old.place or only_number(old.text) is None  # `3.9 × 10⁻¹¹`
     if comparison.mode is model.Mode.DIGITS and old.is_inexact and has_more:
         return round_like(old, new.value) or new.text
+    if "," in old.text and new.is_finite:
+        return format(new.value, "+,f" if new.text.startswith("+") else ",f")
     return new.text
 
 
@@ -254,16 +301,19 @@ class ColumnTitle(Struct, frozen=True):
         most = max(shared, default=0)
         return [at for at, count in enumerate(shared) if count == most] if most else []
 
-    def names(self, labels: Sequence[str], at: int, unit: UnitText) -> bool | None:
+    def names(
+        self, labels: Sequence[str], at: int, unit: UnitText, unit_of_cell: UnitText = NO_UNIT
+    ) -> bool | None:
         """Whether number `at` of a line is what the title says; `None` where nothing tells.
 
         `labels` are those of all numbers of the line, and `unit` the unit of this one.
         """
-        if are_different(self.unit, unit):
+        own_unit = unit_of_cell or self.unit
+        if are_different(own_unit, unit):
             return False
         if best := self.best_places(labels):
             return at in best
-        return True if is_same_unit(self.unit, unit) else None
+        return True if is_same_unit(own_unit, unit) else None
 
 
 class PrintedName(NamedTuple):

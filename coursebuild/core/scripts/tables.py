@@ -24,9 +24,8 @@ from msgspec.structs import replace
 
 from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Address
-from coursebuild.core.model.results import Change, DriftKind, Verdict
+from coursebuild.core.model.results import Change, DriftKind
 from coursebuild.core.scripts.align import MATCH, pair
-from coursebuild.core.scripts.diff import number_change
 from coursebuild.core.scripts.lines import (
     MARK,
     Side,
@@ -42,7 +41,6 @@ from coursebuild.core.scripts.table_cells import (
     PrintedName,
     RowCell,
     cell_matches,
-    elides_rows,
     find_rows,
     misplaced_titles,
     number_text,
@@ -51,8 +49,8 @@ from coursebuild.core.scripts.table_cells import (
     table_rows,
     words_of,
 )
-from coursebuild.core.text.numbers import Number, relative_error, scan
-from coursebuild.core.text.quantities import UnitText, are_different, title_of_column
+from coursebuild.core.text.numbers import Number, has_groups, relative_error, scan
+from coursebuild.core.text.quantities import NO_UNIT, UnitText, are_different, title_of_column
 from coursebuild.core.text.source import Span
 
 _ALIKE_WEIGHT = 6
@@ -85,43 +83,6 @@ class TableMatch(Struct, frozen=True):
     """How many lines have the layout of the table."""
 
 
-def compare_table(
-    recording: model.Recording,
-    table: model.Table,
-    comparison: model.Comparison,
-    stdout: str,
-    addresses: RowAddresses = (),
-) -> Verdict:
-    """The verdict on a recorded table."""
-    matcher = TableMatcher(table, comparison, stdout, addresses)
-    if not matcher.rows:
-        return Verdict(recording, comparison, "drift")
-    match = matcher.match()
-    changes: list[Change] = []
-    for row in match.rows:
-        if row.line < 0:
-            first, last = row.row[0].cell.span, row.row[-1].cell.span
-            changes.append(Change(DriftKind.MISSING, first.to(last), row_text(row.row), ""))
-        for cell, old, new in row.pairs:
-            if not cell_matches(old, new, comparison):
-                span = cell.span(old)
-                changes.append(number_change(span, span.text, new.text, (old, new)))
-    if all(row.line >= 0 and row.certain for row in match.rows):
-        # Below a title of another column, or unit, numbers differ for that reason.
-        changes = [*matcher.header_changes(match)] or changes
-    counts = (len(match.rows), 0 if elides_rows(table) else match.printed)
-    return Verdict(
-        recording,
-        comparison,
-        "drift" if changes else "verified",
-        tuple(changes),
-        addresses if changes else matcher.addresses(match),
-        match.rivals
-        or tuple(text for _, text, is_sure in matcher.misplaced_titles(match) if not is_sure),
-        counts,
-    )
-
-
 class TableMatcher:
     """Matches the rows of one table with the lines of one output."""
 
@@ -132,15 +93,21 @@ class TableMatcher:
         stdout: str,
         addresses: RowAddresses = (),
     ) -> None:
-        self.rows = table_rows(table, comparison.filters)
+        printed_lines = Side.of(stdout, comparison.filters).lines
+        printed = "\n".join(printed_lines)
+        is_grouped = has_groups(printed)
+        self.rows = table_rows(table, comparison.filters, printed)
         self.titles = [ColumnTitle.of(cell) for cell in table.header]
         self._addresses = addresses if len(addresses) == len(self.rows) else [()] * len(self.rows)
         self._numbers_match = partial(cell_matches, comparison=comparison)
-        printed_lines = Side.of(stdout, comparison.filters).lines
         self.lines = list(map(plain_text, printed_lines))
-        self.text = PrintedText(map(PrintedLine, self.lines))
-        self._text_with_gaps = PrintedText(map(PrintedLine, printed_lines))
-        self._canonical_line = cache(lambda line: canonicalize(self.lines[line]))
+        self.text, self._text_with_gaps = (
+            PrintedText(PrintedLine(line, None, is_grouped) for line in lines)
+            for lines in (self.lines, printed_lines)
+        )
+        self._canonical_line = cache(
+            lambda line: canonicalize(self.lines[line], is_grouped=is_grouped)
+        )
         self._fits_of_row = cache(self._fits_at_address)
 
     def match(self) -> TableMatch:
@@ -216,7 +183,8 @@ class TableMatcher:
         names = self._names(fit.line)
         labels = [name.text for name in names]
         places = [(cell.column, numbers.index(n)) for cell, _, n in pairs if n in numbers]
-        verdicts = [self.titles[c].names(labels, at, names[at].unit) for c, at in places]
+        units = {cell.column: cell.unit for cell in self.rows[0]}
+        verdicts = [self.titles[c].names(labels, at, names[at].unit, units[c]) for c, at in places]
         share = len(pairs) / max(1, len(numbers))
         return self._right_rows(layout), verdicts.count(True), -verdicts.count(False), share
 
@@ -360,7 +328,10 @@ class TableMatcher:
                 parts.append(canonical.skeleton[at:])
                 columns = tuple(cell.column for cell in cells)
                 layout = LineLayout(self.text.heading(line), tuple(parts), columns)
-                yield Fit(line, way, layout, is_right)
+                fit = Fit(line, way, layout, is_right)
+                if is_right and any(cell.unit for cell in cells):
+                    is_right = not any(self.unit_changes(self._row_match(row, fit)))
+                yield fit._replace(is_right=is_right)
 
     # --- the header
 
@@ -374,6 +345,26 @@ class TableMatcher:
         for title, reading, is_certain in self.misplaced_titles(match):
             if is_certain:
                 yield Change(DriftKind.TEXT, title.span, title.text, reading)
+
+    def unit_changes(self, match: RowMatch) -> Iterator[Change]:
+        """Units of cells that are not those of their numbers."""
+        for cell, unit in self._cell_units(match):
+            if are_different(cell.unit, unit):
+                yield Change(DriftKind.TEXT, cell.unit_span, cell.unit.text, unit.text)
+
+    def _cell_units(self, match: RowMatch) -> Iterator[tuple[RowCell, UnitText]]:
+        """The cells of a row that have units, with those that are printed."""
+        pairs = {cell.column: (cell, new) for cell, _, new in match.pairs if cell.unit}
+        for cell, new in pairs.values():  # with its last number
+            yield cell, self._unit(match.line, new)
+
+    def _unit(self, at: int, number: Number) -> UnitText:
+        """The unit that is printed with a number; wide gaps tell the titles above it apart."""
+        numbers, with_gaps = (text.lines[at].numbers for text in (self.text, self._text_with_gaps))
+        unit = NO_UNIT
+        if len(numbers) == len(with_gaps) and number in numbers:
+            unit = self._text_with_gaps.unit(at, with_gaps[numbers.index(number)])
+        return unit or self.text.unit(at, number)
 
     def misplaced_titles(self, match: TableMatch) -> Iterator[tuple[ColumnTitle, str, bool]]:
         """The titles of other numbers, each with what is printed, and whether it is certain."""
@@ -396,18 +387,23 @@ class TableMatcher:
                     yield self.titles[column], likely[at].reading, is_certain
 
     def unprinted_units(self) -> Iterator[tuple[Span, str]]:
-        """The titles whose units nothing prints, and these."""
-        for column, units in self._column_units(self.match()).items():
+        """The titles and cells whose units nothing prints, and these."""
+        match = self.match()
+        for column, units in self._column_units(match).items():
             title = self.titles[column]
             if title.unit and not any(units):
                 yield title.span, title.unit.text
+        for row in match.rows:
+            for cell, unit in self._cell_units(row):
+                if not unit:
+                    yield cell.unit_span, cell.unit.text
 
     def _column_units(self, match: TableMatch) -> dict[int, list[UnitText]]:
         """The units that are printed with the numbers of each column."""
         units: dict[int, list[UnitText]] = {}
         for row in match.rows:
             for cell, _, number in row.pairs:
-                units.setdefault(cell.column, []).append(self.text.unit(row.line, number))
+                units.setdefault(cell.column, []).append(self._unit(row.line, number))
         return units
 
 

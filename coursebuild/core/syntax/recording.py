@@ -17,7 +17,7 @@ from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
 from coursebuild.core.syntax.other_tools import is_known_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
-from coursebuild.core.text.patterns import matches_empty_text, pattern_mistake
+from coursebuild.core.text.patterns import pattern_mistake, replacements
 from coursebuild.core.text.source import Span
 
 OUTPUT_KIND = "output"
@@ -175,7 +175,7 @@ def _read_comparison(keys: FenceKeys, diagnostics: list[Diagnostic]) -> model.Co
     if word is not None and word.value_text is not None:
         pattern = word.value_text.text
         mistake = pattern_mistake(pattern) or pattern_mistake(volatile_pattern(pattern))
-        if mistake is not None or matches_empty_text(pattern):
+        if mistake is not None or replacements(pattern, "", ""):
             message = "the pattern matches where there is nothing"
             if mistake is not None:
                 message = f"the pattern does not compile: {mistake[0]}"

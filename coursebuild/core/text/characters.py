@@ -27,9 +27,7 @@ def _picture(match: re.Match[str]) -> str:
     code = ord(match[0])
     if code > 0xFFFF and code & 0xFFFE != 0xFFFE:
         return match[0]
-    if code < 0x20:
-        return chr(0x2400 + code)
-    return "\u2421" if code == 0x7F else "\ufffd"
+    return chr(_PICTURES.get(code, 0xFFFD))
 
 
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
@@ -60,13 +58,7 @@ ISOLATING = re.compile("[\u202a-\u202e\u2066-\u2069]")
 """These, and those that texts in Arabic may need, but code does not."""
 
 TAB = 4
-
-
-_PICTURES: dict[int, int | str] = {
-    **{code: 0x2400 + code for code in range(0x20)},
-    0x7F: 0x2421,
-    0x09: " " * TAB,
-}
+_PICTURES = {0x7F: 0x2421, **{code: 0x2400 + code for code in range(0x20)}}
 
 
 def printable(text: str) -> str:
@@ -74,7 +66,7 @@ def printable(text: str) -> str:
     unseen = ("Cc", "Cf", "Cs", "Zl", "Zp")
     return "".join(
         "\ufffd" if unicodedata.category(char) in unseen and char != "\u200d" else char
-        for char in text.translate(_PICTURES)
+        for char in text.replace("\t", " " * TAB).translate(_PICTURES)
     )
 
 

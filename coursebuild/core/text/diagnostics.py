@@ -155,9 +155,8 @@ def keeps_words(edits: Iterable[Edit]) -> bool:
     for source, changes in by_source.items():
         changes.sort(key=lambda edit: edit.span.start)
         first, last = changes[0].span.start, max(edit.span.end for edit in changes)
-        start = 1 + max(source.text.rfind(space, 0, first) for space in " \n")
-        ends = (source.text.find(space, last) for space in " \n")
-        old = source.text[start : min((end for end in ends if end >= 0), default=None)]
+        start = 1 + source.text.rfind("\n", 0, first)
+        old = source.text[start : source.text.find("\n", last) % (len(source.text) + 1)]
         new, at = "", start
         for edit in changes:
             new += source.text[at : edit.span.start] + edit.text

@@ -122,26 +122,19 @@ def scan(text: str, is_grouped: bool = False) -> tuple[Number, ...]:
         kind = match.lastgroup
         if kind not in ("number", "imaginary", "special"):
             continue
-        if is_grouped and numbers and match.start() < numbers[-1].end:
+        start, end = match.span()
+        if is_grouped and numbers and start < numbers[-1].end:
             continue
-        groups = None
         if is_grouped and kind == "number":
-            groups = _GROUPS.match(text, match.end() - len(match[0].lstrip("+-\u2212")))
-        if groups is not None:
-            digits = text[match.start() : groups.end()]
+            groups = _GROUPS.match(text, end - len(match[0].lstrip("+-\u2212")))
+            end = end if groups is None else groups.end()
+        if end - start <= _LONGEST:
+            digits = text[start:end]
             value = Decimal(digits.replace("\u2212", "-").replace(",", ""))
-            place = -len(digits.partition(".")[2])
-            numbers.append(
-                Number(match.start(), groups.end(), digits, value, place, "." not in digits)
-            )
-            continue
-        if match.end() - match.start() <= _LONGEST:
-            digits = match.group()
-            value = Decimal(digits.replace("\u2212", "-"))
             exponent = value.as_tuple().exponent
             place = exponent if isinstance(exponent, int) else 0
             is_integer = value.is_finite() and not any(c in digits for c in ".eE")
-            numbers.append(Number(*match.span(), digits, value, place, is_integer))
+            numbers.append(Number(start, end, digits, value, place, is_integer))
     return tuple(numbers)
 
 
@@ -161,12 +154,17 @@ def join_thousands(text: str) -> str:
 
 def group_space(text: str) -> str:
     """The space that parts the thousands of a number; empty where none does."""
-    match = _GROUP_SPACE.search(text)
-    return "" if match is None else match[0]
+    return next(iter(_GROUP_SPACE.findall(text)), "")
 
 
-def comma_groups(text: str) -> str:
-    """A text of the same length, with commas for the thin or no-break spaces of thousands."""
+def as_printed(text: str, comma: bool) -> str:
+    """A text of the same length in which numbers are as programs print them.
+
+    Thin and no-break spaces that part thousands become commas. `comma`: its language may have one
+    before decimals.
+    """
+    if comma:
+        return point_decimals(text)
     return _WITH_SPACES.sub(lambda match: re.sub(r"\s", ",", match[0]), text)
 
 

@@ -23,11 +23,6 @@ def makes_alike(pattern: str, replacement: str, texts: tuple[str, str]) -> bool:
     return len({_compile(pattern).sub(template, text) for text in texts}) == 1
 
 
-def matches_empty_text(pattern: str) -> bool:
-    """Whether a pattern matches an empty text."""
-    return _compile(pattern).search("") is not None
-
-
 def _compile(pattern: str) -> Any:
     import re2
 

@@ -14,11 +14,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from fractions import Fraction
 
 from msgspec import Struct
 
 from coursebuild.core.text.numbers import Number, only_number, scan
-from coursebuild.core.text.unit_table import NAMES
+from coursebuild.core.text.unit_table import LEVELS, NAMES
 from coursebuild.core.text.units import PER, Unit, find_units, is_name, write_quantities
 
 _SECOND_READINGS = {
@@ -111,7 +112,9 @@ def read_unit(text: str) -> UnitText:
     """The unit that a whole text is, with all its readings."""
     text = plain_unit(text)
     readings = [*find_units(text)] if text.strip("()1 ") else []
-    for reading in _SECOND_READINGS.get(NAMES.get(text, text), ()):
+    if (symbol := NAMES.get(text, text)) in LEVELS:
+        readings = [Unit(Fraction(1), ((symbol, Fraction(1)),))]  # it has no size, but a name
+    for reading in _SECOND_READINGS.get(symbol, ()):
         readings += find_units(reading)
     return UnitText(text, tuple(readings))
 
@@ -131,16 +134,12 @@ def with_unit(number: str, unit: str) -> str:
 
 def are_different(left: UnitText, right: UnitText) -> bool:
     """Whether both are units, and certainly not the same one."""
-    return (
-        bool(left)
-        and bool(right)
-        and not any(a.is_same(b) for a in left.readings for b in right.readings)
-    )
+    return bool(left) and bool(right) and not is_same_unit(left, right)
 
 
 def is_same_unit(left: UnitText, right: UnitText) -> bool:
     """Whether both are units, and may be the same one."""
-    return bool(left) and bool(right) and not are_different(left, right)
+    return any(a.is_same(b) for a in left.readings for b in right.readings)
 
 
 def printed_unit(line: str, start: int, end: int) -> UnitText:
@@ -311,10 +310,14 @@ def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
     for pattern in _CELLS:
         row = [*pattern.finditer(line)]
         column = next((i for i, cell in enumerate(row) if cell.end() > start), 0)
-        if len(row) < 2 or not all(only_number(c[0]) or c[0] == "\u2026" for c in row[1:]):
+        # Single spaces part words as well
+        cells_that_tell = row[1:] if pattern is _CELLS[1] else row[column : column + 1]
+        are_numbers = all(only_number(c[0]) or c[0] == "\u2026" for c in cells_that_tell)
+        if len(row) < 2 or not are_numbers:
             continue
         for header in reversed(above):
-            cells = pattern.findall(header)
+            places = pattern.finditer(_with_signs_of(line, header))
+            cells = [header[place.start() : place.end()] for place in places]
             if _RULE.fullmatch(header) and header.strip():
                 continue
             if len(cells) != len(row):

@@ -59,7 +59,7 @@ week? 604800 s weeks Woche Wochen semaine semaines semana semanas
 fortnight? 1209600 s fortnights
 month? 2629800,2628000,2592000,2629746 s months Monat Monate Monaten mois meses
 a*? 31557600,31536000,31556952 s
-yr 31557600,31536000,31556952 s year years Jahr Jahre Jahren annee annees año años
+yr* 31557600,31536000,31556952 s year years Jahr Jahre Jahren annee annees año años
 century? 3155760000,3153600000,3155695200 s centuries
 t*! 1e3 kg tonne tonnes Tonne Tonnen tonelada toneladas
 ton 1e3,907.18474,1016.0469088 kg tons
@@ -68,7 +68,7 @@ l*! 1e-3 m^3
 cc 1e-6 m^3 ccm
 ha 1e4 m^2 hectare hectares Hektar
 au 149597870700 m AU
-ly 9460730472580800 m lightyear lightyears Lichtjahr Lichtjahre
+ly* 9460730472580800 m lightyear lightyears Lichtjahr Lichtjahre
 pc* 96939420213600000/π m parsec parsecs
 Å 1e-10 m angstrom ångström angstroms
 micron 1e-6 m microns
@@ -185,3 +185,5 @@ def _read_table() -> tuple[dict[str, UnitRow], dict[str, str]]:
 
 
 UNITS, NAMES = _read_table()
+LEVELS = frozenset(symbol for symbol, row in UNITS.items() if "?" in row.sizes)
+"""Of a logarithmic scale, without a size."""

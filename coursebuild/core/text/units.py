@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Excerpt
-from coursebuild.core.text.unit_table import NAMES, UNITS
+from coursebuild.core.text.unit_table import LEVELS, NAMES, UNITS
 
 Dimension: TypeAlias = tuple[tuple[str, Fraction], ...]
 """Powers of base quantities, as of length and time, in the order of their names."""
@@ -315,7 +315,7 @@ def find_symbol(word: str) -> tuple[Unit, ...]:
     symbol = NAMES.get(word, word)
     if symbol in UNITS:
         row = UNITS[symbol]
-        return tuple(_read_size(size, row.base) for size in row.sizes if size != "?")
+        return () if symbol in LEVELS else tuple(_read_size(s, row.base) for s in row.sizes)
     if symbol in _BASES:
         return (_base_unit(symbol),)
     for name, prefix in _PREFIX_NAMES.items():

@@ -27,8 +27,7 @@ from coursebuild.features.arithmetic.expressions import (
     join_units,
 )
 
-_MAX_FACTORS = 100
-"""The limit for one expression, which also limits how deep it nests."""
+_MAX_FACTORS = 100  # of one expression, which also limits how deep it nests
 TOKEN = re.compile(r"\\[A-Za-z]+\*?|\\[\s\S]|[\s\S]")
 SPACE = re.compile(
     r"(?:\s|&|~|\\[,;:! ]|\\(?:left|right|[bB]igg?[lrm]?|displaystyle|textstyle|nolimits|limits"
@@ -45,7 +44,7 @@ _SCALE = re.compile(r"(?:\\mathrm|\\text)\s*(?:\{\s*([CF])\s*\}|([CF]))(?![\^_])
 _UPRIGHT_UNIT = r"\{\s*(\\(?:mathrm|text)\s*(?:\{[^{}]+\}|[A-Za-z])(?:\^(?:\d|\{-?\d\}))?)\s*\}"
 _UNIT_FRACTION = re.compile(rf"(?!\{{\s*\\mathrm\s*\{{?d\b)\s*{_UPRIGHT_UNIT}\s*{_UPRIGHT_UNIT}")
 _DEGREES = re.compile(r"\\circ|\{\s*\\circ\s*\}")
-_FUNCTIONS = frozenset("sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln".split())
+_FUNCTIONS = "sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln log".split()
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
 _BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
 """What holds all that a function is of: brackets, perhaps in braces, as other programs write."""
@@ -56,12 +55,11 @@ _NO_FACTOR = frozenset(")]}|+-−=<>,;:.!'_^") | {r"\rvert", *_PRODUCT_SIGNS}
 _NUMBER_ONE, _NUMBER_TWO = (Expression("number", 0, 0, text=digit) for digit in "12")
 _REASONS = {
     ",": "a comma between digits may part two numbers",
-    r"\pm": "`\\pm` has two values",
-    r"\mp": "`\\mp` has two values",
+    **{sign: f"`{sign}` has two values" for sign in (r"\pm", r"\mp")},
     **dict.fromkeys((r"\mathbf", r"\boldsymbol", r"\vec"), "it is a vector"),
     r"\lVert": "it is a norm",
     r"\begin": "it is an array",
-    r"\log": "`\\log` has no one base: only `\\ln` is computed",
+    r"\log": "`\\log` has no one base: write `\\ln`, or `\\log_{10}`",
     r"\bmod": "it is a remainder",
     **dict.fromkeys(r"\dots \ldots \cdots \dotsc \dotsb".split(), "something is left out"),
 }
@@ -213,8 +211,7 @@ class _Reader:
         start = self.at
         if self.take(r"\%"):
             return Expression("unit", start, self.at, text="%")
-        upright = self.match(_UPRIGHT)
-        if upright is None:
+        if (upright := self.match(_UPRIGHT)) is None:
             return None
         self.at = upright.end()
         text = plain_unit(self.raw())
@@ -302,7 +299,7 @@ class _Reader:
             return self.series(sign[1:], start)
         if sign == r"\int":
             return self.integral(start)
-        if sign[1:] in _FUNCTIONS:
+        if sign[1:] in _FUNCTIONS and (sign != r"\log" or self.peek() == "_"):
             return self.function(sign[1:], start)
         self.at = start
         if (upright := self.match(_UPRIGHT)) and self.tex[upright.end() :].startswith(("e", "{e}")):
@@ -417,11 +414,15 @@ class _Reader:
 
     def function(self, name: str, start: int) -> Expression:
         """Parse a function of a bracket, or of the factors that follow."""
+        base = self.group() if name == "log" and self.take("_") else None
         exponent = self.group() if self.take("^") else None
         if exponent is not None and exponent.kind != "number":
             raise exponent.not_understood("an inverse or a power can be meant")
         argument = self.base() if self.match(_BRACKET) else self.argument()
-        value = Expression(name, start, self.at, (argument,))
+        value = Expression(name if base is None else "ln", start, self.at, (argument,))
+        if base is not None:
+            parts = value, Expression("ln", start, start, (base,))
+            value = Expression("/", start, self.at, parts)
         end = self.at
         if self.peek() in ("°", "!") or (self.take("^") and (exponent or self.match(_DEGREES))):
             raise self.not_understood("it may be of the function, or of what it is of")

@@ -226,7 +226,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         head += f' title="{caption}"' if caption else ""
     change = "dropped: its tool colours the lines beside it"
     text = context.files.account.replace(_HIGHLIGHT, "", text, "comment in code", change)
-    words = re.sub(r"(?<!\\)[_*`]", r"\\\g<0>", _title_of(head))
+    words = re.sub(r"(\$[^$]+\$)|(?<!\\)([][_*`{}<])", _escape, _title_of(head))
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
     kind = f"block of `{language}`" if language else "block without a kind"
@@ -235,6 +235,10 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     new = marks.fence(f"{language or 'text' * bool(label)}{label}", text)
     context.files.account.convert(kind, "without what its tool adds", head, lambda: language)
     return (f"**{words}**\n\n" if words else "") + new
+
+
+def _escape(match: re.Match[str]) -> str:
+    return match[1] or f"\\{match[2]}"
 
 
 def _convert_nested(text: str, context: LessonContext, title: re.Pattern[str] | None = None) -> str:

@@ -179,7 +179,9 @@ def _without_window(code: str) -> str:
 
 def _caption_of(cell: Segment, code: str, context: LessonContext) -> str:
     options, title = options_of(cell), _DRAWN_TITLE.search(code)
-    caption = options.get("fig-cap") or options.get("caption") or (title[2] if title else "")
+    words = "" if title is None else title[3]
+    words = words if title is None or title[1] == "r" else re.sub(r"\\([\\'\"])", r"\1", words)
+    caption = options.get("fig-cap") or options.get("caption") or words
     caption = " ".join(caption.strip("\"' ").split())
     return rewrite_prose(caption or context.title, context).rstrip()
 
@@ -193,7 +195,7 @@ def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = T
 
 
 _DRAWN_TITLE = re.compile(
-    r"\.(?:set_)?(?:sup)?title\(\s*(?:r|f(?!.*\{))?([\"'])((?:(?!\1).)+)\1"  # none is computed
+    r"\.(?:set_)?(?:sup)?title\(\s*(r|f(?!.*\{))?([\"'])((?:(?!\2).)+)\2"  # none is computed
 )
 
 

@@ -49,8 +49,7 @@ _KEY = r"\w(?:[\w.:/+-]*\w)?"
 _PLACE = r"(?:<[^<>\n]+>|(?:[^()\s<]|\([^()\s]*\))(?:[^()\s]|\([^()\s]*\))*)"
 _ALT = re.compile(r"\balt=(['\"])(.*?)\1")
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
-# A formula holds no beginning of another: so each character is looked at a few times, not once for
-# each beginning before it.
+# A formula holds no beginning of another, so that each character is looked at a few times only.
 _LINE = re.compile(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)(?:\{=\w+\})?)"
@@ -65,11 +64,11 @@ _LINE = re.compile(
     r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]"
     r"(?:\[(?P<path>[A-Za-z_]\w*(?:[.-]\w+)+)?\]|(?=\[\^)))"
-    r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\])"
+    r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\](?!\())"
     rf"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst|{'|'.join(PROOF_LABELS)})"
     r"-(?P<label>\w+(?:-\w+)*)\]?)"
     r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
-    r"|(?<!\^)\^[^\s\^\[\]]+\^(?!\^))"
+    r"|(?<!\^)\^(?:[^\s\^\[\]]|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
@@ -142,7 +141,8 @@ _KEPT = {
 }
 """What is Markdown here as well."""
 _OVER_LINES = re.compile(
-    r"(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
+    r"(?<!`)(`+)(?!`).+?(?<!`)\1(?!`)"  # what looks like one in code is none
+    r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"

@@ -27,6 +27,8 @@ def words_of_link(address: str, old: str) -> str:
     """Return what a link without words is called; nothing where the page knows the title."""
     if re.match("#|lesson:|page:", address):
         return ""
+    if name := re.fullmatch(r"`(?:~(?:\w+\.)*)?([^`]+)`", old):
+        return f"`{name[1]}`"  # Quarto's `interlinks`, which shows the last part behind a tilde
     return urlsplit(address).hostname or title_of_file(re.split("[:#]", old)[-1])
 
 

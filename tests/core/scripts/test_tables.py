@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import re
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
@@ -16,6 +17,7 @@ from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
+from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from support.fixture_cases import fixture_tables
 from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, tolerance, update
@@ -122,6 +124,11 @@ def test_the_numbers_of_a_table_are_replaced_in_place() -> None:
     assert table_after("| a | −1.5e-03 | 1.5e−03 |", "a -2.5e-03 -3.5e-03\n") == (
         "| a | −2.5e-03 | -3.5e−03 |"
     )
+    rows, printed = "| a | 1,234 | 1\u202f234 |", "a  1234567  3456.5\n"
+    assert table_after(rows, printed) == "| a | 1,234,567 | 3\u202f456.5 |"
+    assert table_after("| a | 3 m | 5% |", "a 4 m 6 %\n") == "| a | 4 m | 6% |"
+    with pytest.raises(AssertionError, match="`mm` is not what is printed here"):
+        table_after("| a | 3 mm | |", "a 4 m\n")
 
 
 def test_a_table_under_digits_keeps_its_decimals() -> None:
@@ -309,3 +316,10 @@ def test_tables_that_nobody_can_read_are_told() -> None:
     wording = describe_difference("x.csv", b"1\n", long)
     assert wording == "a table cannot be read: field larger than field limit (131072)"
     assert describe_difference("x.csv", text, b"1\n") == wording
+
+
+def test_thousands_of_a_table_are_one_number_with_one_address() -> None:
+    rows = "| 30 | 1,149 | 2 |\n| 60 | 152\u202f034 | 3 |"
+    text = PrintedText.of_recording(table(EDITED_HEAD + rows))
+    assert text.numbers == (("30", "1,149", "2"), ("60", "152,034", "3"))
+    assert text.words(0) == text.words(1) == "# # #"

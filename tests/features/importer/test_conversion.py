@@ -198,12 +198,12 @@ def test_a_computed_title_is_no_caption_and_a_shown_window_no_code(tmp_path: Pat
     code = """import matplotlib.pyplot as plt
 plt.plot([1, 2])
 plt.title(f"min {max(2, 3)}")
-plt.suptitle(f"$y$ over $x$")
+plt.suptitle(f"$y$ over $\\\\mu$")
 display(plt.show())
 """
     course = convert_files(tmp_path, {"one.qmd": f"# One\n\n```{{python}}\n{code}```\n"})
     lesson = course.files["content/lessons/1.1-one.md"].decode()
-    assert "Figure: ![y over x](l1-1-one-1.svg) $y$ over $x$\n" in lesson
+    assert "Figure: ![y over mu](l1-1-one-1.svg) $y$ over $\\mu$\n" in lesson
     assert "show()" not in lesson
 
 
