@@ -116,12 +116,18 @@ class Laboratory(Struct, frozen=True, eq=False):
 
     def findings(self) -> str:
         """What a search that was cut has seen, in words; empty before its first run."""
-        steps = self.own_steps()
-        lost = [step for step in steps if self.is_lost(0, step)]
-        stable = [step for step in steps if step not in lost]
-        clauses = [f"lost at {seconds_text(lost[0], 3)}"] if lost else []
-        clauses += [f"bounded at {seconds_text(stable[-1], 3)}"] if stable else []
-        return f"so far {' and '.join(clauses)}" if clauses else ""
+        steps, clauses = self.own_steps(), []
+        for words, is_lost in (
+            ("near the motion of small steps", lambda step: self.trial(0, step).astray),
+            ("bounded", lambda step: self.is_lost(0, step)),
+        ):
+            lost = next((step for step in steps if is_lost(step)), math.inf)
+            kept = [seconds_text(step, 3) for step in steps if step < lost]
+            clause = f"{words} at {' to '.join(dict.fromkeys((kept[0], kept[-1])))}" if kept else ""
+            if lost < math.inf:
+                clause += f"{', not' if kept else f'not {words}'} at {seconds_text(lost, 3)}"
+            clauses += [clause] if clause else []
+        return f"so far {'; '.join(clauses)}" if clauses else ""
 
 
 def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
@@ -192,8 +198,11 @@ def search_row(
     theory: Theory,
     *,
     quick: bool = False,
+    closer: bool = True,
 ) -> StableRow:
     """Search for the largest stable timestep between two (s), and for what speaks against it.
+
+    Without `closer` from the own start on the grid alone.
 
     1. From the own start over the span: a grid, falling, down to a tenth of the largest timestep
        below which nothing was lost, a bisection at its end, and a finer grid below that.
@@ -205,7 +214,12 @@ def search_row(
     count = max(2, round((_QUICK_GRID if quick else _GRID) * math.log10(high / low)) + 1)
     grid: list[float] = np.geomspace(low, high, count).tolist()
     resolution = _COARSE if quick else _FINE
-    largest = _look_closer(partial(laboratory.is_lost, 0), grid, resolution, quick)
+    for kind in laboratory.questions:  # which matter most; their runs say what is bounded too
+        _limit_of(laboratory, grid, resolution, kind)
+    is_lost = partial(laboratory.is_lost, 0)
+    largest = bisect(is_lost, grid, _COARSE)
+    if closer:
+        largest = _look_closer(is_lost, grid, resolution, quick)
     near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
     # A first look asks other starts and times about that limit alone, where most of them fail.
     enough = min(largest, grid[-1]) / _NEAR if quick else 0.0
@@ -213,8 +227,9 @@ def search_row(
     def estimate(start: int, width: float) -> float:
         return bisect(partial(laboratory.is_lost, start, spans=2), near, width, _NEAR, enough)
 
-    estimates = [estimate(0, resolution)]
-    by_start = {n: estimate(n, math.inf) for n in range(1, laboratory.starts)}
+    estimates = [estimate(0, resolution)] if closer else []
+    others = range(1, laboratory.starts if closer else 1)
+    by_start = {n: estimate(n, math.inf) for n in others}
     if by_start:
         estimates.append(estimate(min(by_start, key=lambda n: by_start[n]), resolution))
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
@@ -241,7 +256,7 @@ def search_row(
         steps=step_count(laboratory.span, max(stable_steps, default=steps[0])),
         tried=len(stable_steps),
         energy=_finite(setup.energy_bound),
-        bracket=None if min(largest, *estimates) == math.inf else (min(bounds), max(bounds)),
+        bracket=(min(bounds), max(bounds)) if estimates and min(bounds) < grid[-1] else None,
         theory=None if limit is None else reach(limit.timestep),
         formula="" if limit is None else limit.source,
         gain=gain,
@@ -260,8 +275,8 @@ def _limit_of(
     if kind not in laboratory.questions:
         return None, ""
     steps_tried = laboratory.own_steps()
-    low = min(steps_tried[0], laboratory.shortest)
-    steps = [h for h in grid if h >= low * (1 - 1e-9)] or [*steps_tried]
+    low = min([laboratory.shortest, *steps_tried[:1]])
+    steps = [h for h in grid if h >= low * (1 - 1e-9)] or steps_tried
 
     def is_lost(step: float) -> bool:
         return bool(getattr(laboratory.trial(0, step), kind))
@@ -385,7 +400,20 @@ def stable_rows(
         share=0.2,
     )
 
-    def row(integrator: Integrator) -> StableRow | None:
+    def find(
+        laboratory: Laboratory, integrator: Integrator, search: tuple[float, float], closer: bool
+    ) -> StableRow:
+        least = search[0] if scene.declaration.search else laboratory.span / MOST_STEPS
+        look = partial(search_row, quick=quick, closer=closer)
+        while True:
+            row = look(laboratory, integrator, search, pilot.setup, theory)
+            if row.largest != "none" or search[0] <= least:
+                return row
+            search = max(search[0] / _LOWER, least), search[0]
+
+    def first_look(integrator: Integrator) -> tuple[StableRow, partial[StableRow]] | None:
+        """What the own start shows, and what looks closer."""
+
         def run(start: int, step: float, span: float) -> StabilityTrial:
             is_longer = span > scene.scenario.duration and not pilot.settles
             setup = setup_over(span) if is_longer else pilot.setup
@@ -396,27 +424,29 @@ def stable_rows(
         limit = theory.limit(integrator, (low, high)) if settles else None
         if limit is not None and math.isfinite(limit.timestep):
             span = max(span, _SETTLED_STEPS * limit.timestep)
-        least = low if scene.declaration.search else span / MOST_STEPS
         search = max(low, span / MOST_STEPS), min(high, span / FEWEST_STEPS)
         if search[1] <= search[0]:
             return None
         starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
         laboratory = Laboratory(run, span, starts, questions, shortest)
-        while True:
-            try:
-                row = search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
-            except TimeLimitError:
-                raise TimeLimitError(laboratory.findings()) from None
-            if row.largest != "none" or search[0] <= least:
-                return row
-            search = max(search[0] / _LOWER, least), search[0]
+        look = partial(find, laboratory, integrator, search)
+        try:
+            return look(closer=False), partial(look, closer=True)
+        except TimeLimitError:
+            raise TimeLimitError(laboratory.findings()) from None
 
-    rows = dict.fromkeys(STANDARD)
     baseline = integrator_of(model)  # of which the verdict tells, so it comes first
-    for integrator in sorted(STANDARD, key=lambda i: i is not baseline):
-        name = f"{scene.name}: stable timesteps of {integrator.value}"
-        share = 0.5 if integrator is baseline else 0.25
-        rows[integrator] = parts.run(name, partial(row, integrator), None, share=share)
+    order = sorted(STANDARD, key=lambda i: i is not baseline)
+    shares = {integrator: 0.5 if integrator is baseline else 0.25 for integrator in order}
+    part = f"{scene.name}: stable timesteps of {{}}".format
+    looks = {
+        i: parts.run(part(i.value), partial(first_look, i), None, share=shares[i]) for i in order
+    }
+    rows = dict.fromkeys(STANDARD)
+    for integrator in order:
+        if look := looks[integrator]:
+            name = f"{part(integrator.value)} from starts nearby"
+            rows[integrator] = parts.run(name, look[1], look[0], share=shares[integrator])
     return tuple(filter(None, rows.values()))
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from mjbench.machine import Machine
 from mjbench.reports import Interval
 from mjbench.reports.case_report import CaseReport
 from mjbench.reports.diet_report import DietReport
@@ -67,7 +66,7 @@ def scene_text(report: SceneReport, style: Style = _PLAIN) -> str:
     for sweep in report.sweeps:
         title = f"  {style.strong(sweep.name)}: {sweep.title}"
         lines += ["", title, *indented(_sweep(sweep, style))]
-    lines += ["", *style.wrap(_machine_text(report.machine), "  ")]
+    lines += ["", *style.wrap(report.machine.text, "  ")]
     return printable("\n".join(lines) + "\n")
 
 
@@ -159,6 +158,7 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
         ("gains energy from", ["" if r.gain is None else seconds_text(r.gain[0], 2) for r in rows]),
         ("stable again", [_again(row) for row in rows]),
+        ("starts lost: · none, ∘ some, • all", [row.map for row in rows]),
     ]
     yield from fitted_table(columns, style.width)
     reasons: dict[str, list[str]] = {}
@@ -194,7 +194,7 @@ def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
 
 def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
     """A model in other engines."""
-    lines = [style.strong(report.model), f"  {_machine_text(report.machine)}"]
+    lines = [style.strong(report.model), f"  {report.machine.text}"]
     for scenario in report.scenarios:
         rows = scenario.rows
         names = [f"{row.title}, {row.bits} bits" if row.bits else row.title for row in rows]
@@ -259,7 +259,7 @@ def case_text(report: CaseReport, style: Style = _PLAIN) -> str:
     parts += ["", *fitted_table(columns, inner.width), ""]
     for chart in report.charts[:1]:
         parts += plot_lines(chart, inner.width)
-    lines += style.wrap(_machine_text(report.machine), "  ")
+    lines += style.wrap(report.machine.text, "  ")
     return "\n".join([*lines, *indented(parts)]) + "\n"
 
 
@@ -274,11 +274,6 @@ def departures_text(departures: Sequence[Departure]) -> str:
 
 _WIDEST = 1000
 """Figures that differ are shown whole."""
-
-
-def _machine_text(machine: Machine) -> str:
-    parts = [f"MuJoCo {machine.engine}", f"Python {machine.python}", f"NumPy {machine.numpy}"]
-    return ", ".join(filter(None, [*parts, machine.system, machine.cpu]))
 
 
 def _interval(value: Interval | None) -> str:
