@@ -76,6 +76,8 @@ _SMALL_STEPS = 100_000
 _GAIN, _GAIN_RESOLUTION = 0.01, 0.02
 """The share of the largest kinetic energy that counts as a rise of energy, and the width at which
 its timestep is known."""
+_SHARE = 0.4
+"""Of the time that is left, what the search of an integrator may take."""
 _SETTLED_STEPS = 2000
 """Steps, at the limit of theory, of a run that comes to rest: growth at rest shows slowly."""
 
@@ -122,11 +124,11 @@ class Laboratory(Struct, frozen=True, eq=False):
             ("bounded", lambda step: self.is_lost(0, step)),
         ):
             lost = next((step for step in steps if is_lost(step)), math.inf)
-            kept = [seconds_text(step, 3) for step in steps if step < lost]
-            clause = f"{words} at {' to '.join(dict.fromkeys((kept[0], kept[-1])))}" if kept else ""
+            kept = [step for step in steps if step < lost]
+            texts = [f"{words} at {seconds_text(kept[-1], 3)}"] if kept else []
             if lost < math.inf:
-                clause += f"{', not' if kept else f'not {words}'} at {seconds_text(lost, 3)}"
-            clauses += [clause] if clause else []
+                texts.append(f"not {'' if kept else f'{words} '}at {seconds_text(lost, 3)}")
+            clauses += [", ".join(texts)] if texts else []
         return f"so far {'; '.join(clauses)}" if clauses else ""
 
 
@@ -364,11 +366,6 @@ def _tries(laboratory: Laboratory) -> tuple[tuple[float, int, int], ...]:
     return tuple((step, *counts[step]) for step in sorted(counts))
 
 
-def attempt(problem: Problem, integrator: Integrator, timestep: float) -> StabilityTrial:
-    """Run the problem over its span at a timestep (s)."""
-    return run_trial(problem, compile_model(problem.mjcf, integrator, timestep), problem.span)
-
-
 _SEARCH, _LOWER = (0.25, 64.0), 8.0
 """The multiples of the model's timestep between which the largest stable one is searched for, and
 by how much lower it is searched for again where all of these are lost."""
@@ -437,16 +434,13 @@ def stable_rows(
 
     baseline = integrator_of(model)  # of which the verdict tells, so it comes first
     order = sorted(STANDARD, key=lambda i: i is not baseline)
-    shares = {integrator: 0.5 if integrator is baseline else 0.25 for integrator in order}
     part = f"{scene.name}: stable timesteps of {{}}".format
-    looks = {
-        i: parts.run(part(i.value), partial(first_look, i), None, share=shares[i]) for i in order
-    }
+    looks = [parts.run(part(i.value), partial(first_look, i), None, share=_SHARE) for i in order]
     rows = dict.fromkeys(STANDARD)
-    for integrator in order:
-        if look := looks[integrator]:
+    for integrator, look in zip(order, looks, strict=True):
+        if look is not None:
             name = f"{part(integrator.value)} from starts nearby"
-            rows[integrator] = parts.run(name, look[1], look[0], share=shares[integrator])
+            rows[integrator] = parts.run(name, look[1], look[0], share=_SHARE)
     return tuple(filter(None, rows.values()))
 
 

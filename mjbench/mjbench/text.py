@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from mjbench.reports import Interval
 from mjbench.reports.case_report import CaseReport
 from mjbench.reports.diet_report import DietReport
 from mjbench.reports.diet_text import diet_text
@@ -26,6 +25,7 @@ from mjbench.reports.scene_report import (
 )
 from mjbench.reports.shown_errors import (
     horizon_error_text,
+    interval_text,
     seconds_text,
     setting_text,
     status_text,
@@ -94,7 +94,7 @@ def _settings(report: ScenarioReport, style: Style) -> Iterator[str]:
     columns: list[tuple[str, list[str]]] = [
         ("", [(">" if r.own else " ") + ("*" if r.front else " ") for r in rows]),
         ("setting", [r.name for r in rows]),
-        ("cost", [_interval(r.cost) for r in rows]),
+        ("cost", [interval_text(r.cost) for r in rows]),
     ]
     for quantity in report.quantities:
         if quantity.resolved:
@@ -185,8 +185,8 @@ def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
         values = [getattr(row, name) for row in rows]
         columns.append((name, ["" if value is None else f"{value:.3g}" for value in values]))
     columns += [
-        ("cost", [_interval(row.cost) for row in rows]),
-        ("× real time", [_interval(row.throughput) for row in rows]),
+        ("cost", [interval_text(row.cost) for row in rows]),
+        ("× real time", [interval_text(row.throughput) for row in rows]),
         ("status", [_lost(row.status, row.reasons) for row in rows]),
     ]
     yield from fitted_table(columns, style.width - 4)
@@ -276,27 +276,24 @@ _WIDEST = 1000
 """Figures that differ are shown whole."""
 
 
-def _interval(value: Interval | None) -> str:
-    if value is None:
-        return ""
-    share = 100 * value.half_width
-    return f"{value.value:.3g}" + (f" ± {share:.2g} %" if 0.05 <= share < 1e3 else "")
-
-
 def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.6g}"
 
 
 def report_text(
-    report: SceneReport | EngineReport | DietReport | Sequence[CaseReport], style: Style
+    report: SceneReport | EngineReport | DietReport | CaseReport,
+    style: Style,
+    command: str = "mjbench diet MODEL",
+    declarations: str = "MODEL.toml",
 ) -> str:
-    """A report of any kind."""
+    """A report of any kind; `command` and `declarations` as for `diet_text`, `{}` is its model."""
     match report:
         case SceneReport():
             return scene_text(report, style)
         case EngineReport():
             return engines_text(report, style)
         case DietReport():
-            return diet_text(report, "mjbench diet MODEL", "MODEL.toml", style)
-        case _:
-            return "\n".join(case_text(case, style) for case in report)
+            model = report.model
+            return diet_text(report, command.format(model), declarations.format(model), style)
+        case CaseReport():
+            return case_text(report, style)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mjbench.bench import CannotMeasureError, compile_subject, run_scenario
+from mjbench.exact import integrate
 from mjbench.host import LocalHost
 from mjbench.reports.scene_report import ScenarioReport
 from mjbench.subjects import read_subject
@@ -345,16 +347,15 @@ def test_what_is_not_exact_or_no_motion_is_a_mistake(folder: Path) -> None:
         "import sys\n\nsys.exit()\n": "gives no motion: it exits",
         "def motion(time, qpos, qvel):\n    return [1] * int(1 + time * 9)\n": "coordinates change",
     }
-    ball = "def acceleration(time, qpos, qvel):\n    return qvel\n"
-    model, _, rest = BALL.replace('type="slide" axis="0 0 1"', 'type="ball"').partition("<sensor>")
-    write(folder / "ball.xml", model + rest.partition("</sensor>")[2])
-    toml = TOML.replace("[1]", "[1, 0, 0, 0]").replace("[3]", "[0, 0, 3]").partition("measure")[0]
-    assert "are of slides and hinges" in mistake(folder, ball, toml).message
-    write(folder / "ball.xml", BALL)
     for text, message in cases.items():
         diagnostic = mistake(folder, text)
         assert message in diagnostic.message, text
         assert diagnostic.place.path == "ball.exact.py", text
+
+
+def test_accelerations_of_a_ball_joint_are_refused() -> None:
+    with pytest.raises(ValueError, match="of slides and hinges: for others define `motion`"):
+        integrate(lambda *_: (), [0.1], np.ones(4), np.ones(3))
 
 
 def test_what_was_measured_depends_on_it(folder: Path) -> None:
