@@ -257,10 +257,8 @@ def _measure_scene(
         sweeps += [] if report is None else [report]
     failures = [*parts.failures, *(f for report in scenarios for f in report.failures)]
     is_stopped = parts.stopped or any(failure.reason.startswith(LATE) for failure in failures)
-    report = bench.join_parts(
-        compiled_model, scenarios, sweeps, host, quick=quick, failures=parts.failures
-    )
-    return report, is_stopped
+    join = partial(bench.join_parts, compiled_model, scenarios, sweeps, host, quick=quick)
+    return join(failures=parts.failures), is_stopped
 
 
 def _style() -> Style:

@@ -17,6 +17,7 @@ import os
 import sys
 import time
 from collections.abc import Mapping
+from functools import partial
 from typing import IO, Any, Literal, TypeAlias
 
 import msgspec
@@ -337,5 +338,7 @@ def _file_text(job: Write) -> str:
 
 
 def _words(job: Text) -> str:
-    style, reports = Style(job.width, job.colour), (*job.bench, *job.engines, *job.cases, *job.diet)
-    return "\n".join(report_text(r, style, job.command, job.declarations) for r in reports)
+    style = Style(job.width, job.colour)
+    word = partial(report_text, style=style, command=job.command, declarations=job.declarations)
+    kinds = map(word, job.bench), map(word, job.engines), map(word, job.cases), map(word, job.diet)
+    return "\n".join(text for texts in kinds for text in texts)

@@ -30,12 +30,7 @@ from mjbench.detector import Passages, driving_force
 from mjbench.linearization import Theory, find_theory
 from mjbench.loop import TimeLimitError
 from mjbench.parts import Parts
-from mjbench.pilot import (
-    MOST_STEPS,
-    Pilot,
-    longer_setup,
-    position_distances,
-)
+from mjbench.pilot import MOST_STEPS, Pilot, longer_setup, position_distances
 from mjbench.problem import (
     STANDARD,
     Array,
@@ -124,10 +119,10 @@ class Laboratory(Struct, frozen=True, eq=False):
             ("bounded", lambda step: self.is_lost(0, step)),
         ):
             lost = next((step for step in steps if is_lost(step)), math.inf)
-            kept = [step for step in steps if step < lost]
-            texts = [f"{words} at {seconds_text(kept[-1], 3)}"] if kept else []
+            shorter = [step for step in steps if step < lost]
+            texts = [f"{words} at {seconds_text(shorter[-1], 3)}"] if shorter else []
             if lost < math.inf:
-                texts.append(f"not {'' if kept else f'{words} '}at {seconds_text(lost, 3)}")
+                texts.append(f"not {'' if shorter else f'{words} '}at {seconds_text(lost, 3)}")
             clauses += [", ".join(texts)] if texts else []
         return f"so far {'; '.join(clauses)}" if clauses else ""
 
@@ -230,8 +225,8 @@ def search_row(
         return bisect(partial(laboratory.is_lost, start, spans=2), near, width, _NEAR, enough)
 
     estimates = [estimate(0, resolution)] if closer else []
-    others = range(1, laboratory.starts if closer else 1)
-    by_start = {n: estimate(n, math.inf) for n in others}
+    starts = range(1, laboratory.starts if closer else 1)
+    by_start = {n: estimate(n, math.inf) for n in starts}
     if by_start:
         estimates.append(estimate(min(by_start, key=lambda n: by_start[n]), resolution))
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
