@@ -17,7 +17,6 @@ import os
 import sys
 import time
 from collections.abc import Mapping
-from functools import partial
 from typing import IO, Any, Literal, TypeAlias
 
 import msgspec
@@ -46,7 +45,7 @@ from mjbench.reports.records import (
 )
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.reports.terminal import Style
-from mjbench.text import report_text
+from mjbench.text import AnyReport, report_text
 
 
 class About(Struct, frozen=True, tag_field="job", tag="about"):
@@ -339,6 +338,5 @@ def _file_text(job: Write) -> str:
 
 def _words(job: Text) -> str:
     style = Style(job.width, job.colour)
-    word = partial(report_text, style=style, command=job.command, declarations=job.declarations)
-    kinds = map(word, job.bench), map(word, job.engines), map(word, job.cases), map(word, job.diet)
-    return "\n".join(text for texts in kinds for text in texts)
+    reports: tuple[AnyReport, ...] = (*job.bench, *job.engines, *job.cases, *job.diet)
+    return "\n".join(report_text(r, style, job.command, job.declarations) for r in reports)

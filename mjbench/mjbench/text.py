@@ -6,7 +6,9 @@ The JSON has all of it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TypeAlias
 
+from mjbench.reports import Interval
 from mjbench.reports.case_report import CaseReport
 from mjbench.reports.diet_report import DietReport
 from mjbench.reports.diet_text import diet_text
@@ -32,7 +34,6 @@ from mjbench.reports.shown_errors import (
 )
 from mjbench.reports.terminal import Style, fitted_table, indented, printable
 
-_FIGURES = ("change", "penetration", "slip", "restitution", "residual", "iterations")
 _PLAIN = Style()
 _HEADS = {
     "step_error": "seen of steps",
@@ -40,8 +41,9 @@ _HEADS = {
     "position": "position",
     "attitude": "attitude",
     "velocity": "velocity",
+    "throughput": "× real time",
 }
-"""Short titles of errors; plots have the long ones."""
+"""Short titles of figures; plots have the long ones."""
 
 
 def scene_text(report: SceneReport, style: Style = _PLAIN) -> str:
@@ -106,7 +108,10 @@ def _settings(report: ScenarioReport, style: Style) -> Iterator[str]:
             f"off by {off} at",
             ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
         ),
-        ("energy drift", [_percent(r.energy_drift) for r in rows]),
+        (
+            "energy drift",
+            ["" if r.energy_drift is None else f"{100 * r.energy_drift:+.2g} %" for r in rows],
+        ),
         ("creep (m)", ["" if not r.slip else f"{r.slip:.2g}" for r in rows]),
         ("depth (m)", ["" if not r.penetration else f"{r.penetration:.2g}" for r in rows]),
         ("× real time", ["" if r.realtime is None else f"{r.realtime:.3g}" for r in rows]),
@@ -131,10 +136,6 @@ def _error(row: WorkPrecisionRow, name: str, least: float) -> str:
     return f"< {least:.2g}" if least and value <= least * (1 + 1e-9) else f"{value:.3g}"
 
 
-def _percent(value: float | None) -> str:
-    return "" if value is None else f"{100 * value:+.2g} %"
-
-
 def _orders(orders: Sequence[OrderRow], style: Style) -> Iterator[str]:
     rows = [row for row in orders if row.has_orders]
     if rows:
@@ -157,7 +158,10 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
         ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
         ("gains energy from", ["" if r.gain is None else seconds_text(r.gain[0], 2) for r in rows]),
-        ("stable again", [_again(row) for row in rows]),
+        (
+            "stable again",
+            [" to ".join(seconds_text(step, 3) for step in row.islands or ()) for row in rows],
+        ),
         ("starts lost: · none, ∘ some, • all", [row.map for row in rows]),
     ]
     yield from fitted_table(columns, style.width)
@@ -170,10 +174,6 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         yield from style.wrap(f"beyond it {', '.join(dict.fromkeys(names))}: {reason}")
 
 
-def _again(row: StableRow) -> str:
-    return "" if row.islands is None else " to ".join(seconds_text(s, 3) for s in row.islands)
-
-
 def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
     rows = report.rows
     columns = [
@@ -181,15 +181,14 @@ def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
         ("parameter", [row.parameter for row in rows]),
         ("value", [row.value for row in rows]),
     ]
-    for name in _FIGURES:
-        values = [getattr(row, name) for row in rows]
-        columns.append((name, ["" if value is None else f"{value:.3g}" for value in values]))
-    columns += [
-        ("cost", [interval_text(row.cost) for row in rows]),
-        ("× real time", [interval_text(row.throughput) for row in rows]),
-        ("status", [_lost(row.status, row.reasons) for row in rows]),
-    ]
+    for name in report.show:
+        columns.append((_HEADS.get(name, name), [_figure(getattr(row, name)) for row in rows]))
+    columns.append(("status", [_lost(row.status, row.reasons) for row in rows]))
     yield from fitted_table(columns, style.width - 4)
+
+
+def _figure(value: Interval | float | None) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else interval_text(value)
 
 
 def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
@@ -280,8 +279,11 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.6g}"
 
 
+AnyReport: TypeAlias = SceneReport | EngineReport | DietReport | CaseReport
+
+
 def report_text(
-    report: SceneReport | EngineReport | DietReport | CaseReport,
+    report: AnyReport,
     style: Style,
     command: str = "mjbench diet MODEL",
     declarations: str = "MODEL.toml",

@@ -241,13 +241,13 @@ ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
 SERVO = '<actuator><position joint="j" kp="2e5" kv="1500"/></actuator>'
 
 
-def rows_of(mjcf: str, *names: str, **fields: Any) -> dict[str, StableRow]:
+def rows_of(mjcf: str, parts: Parts | None = None, **fields: Any) -> dict[str, StableRow]:
     model = mujoco.MjModel.from_xml_string(mjcf)
     table = DeclaredScenario("s", table=Place("m.xml"), duration=2.0, **fields)
     (scene,) = scenes(model, Declarations("m.xml", (table,)))
     fine = with_integrator(model, Integrator.RK4, min(scene.timesteps))
     states = simulate(Setup(scenario=scene.scenario), fine).states
-    rows = stable_rows(model, run_pilot(model, scene), states, Parts(), quick=True)
+    rows = stable_rows(model, run_pilot(model, scene), states, parts or Parts(), quick=True)
     return {row.integrator: row for row in rows}
 
 
@@ -260,15 +260,9 @@ def test_a_search_that_is_cut_says_what_it_has_seen(monkeypatch: pytest.MonkeyPa
 
         monkeypatch.setattr(stability, "run_trial", run_until)
         parts = Parts()
-        rows = stable_rows(model, pilot, states, parts, quick=True)
-        failures = {failure.part.partition(" of ")[2]: failure.reason for failure in parts.failures}
-        return {row.integrator: row for row in rows}, failures
+        rows = rows_of(ARM.format("", SERVO), parts, qpos=(0.1,), sample=0.02)
+        return rows, {part.part.partition(" of ")[2]: part.reason for part in parts.failures}
 
-    model = mujoco.MjModel.from_xml_string(ARM.format("", SERVO))
-    table = DeclaredScenario("s", table=Place("m.xml"), qpos=(0.1,), duration=2.0, sample=0.02)
-    (scene,) = scenes(model, Declarations("m.xml", (table,)))
-    fine = with_integrator(model, Integrator.RK4, min(scene.timesteps))
-    states, pilot = simulate(Setup(scenario=scene.scenario), fine).states, run_pilot(model, scene)
     rows, reasons = rows_until(0.01, starts=3)
     assert "far not near the motion of small steps at 11.9 ms; not bounded at" in reasons["Euler"]
     assert reasons["RK4"].endswith("; bounded at 17.7 ms, not at 26.3 ms")
