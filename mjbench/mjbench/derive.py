@@ -138,7 +138,7 @@ def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...
             if reason:
                 claim, semicolon, remark = verdict.text.partition("; ")
                 claim = claim.replace(" is better: it ", " ", 1)
-                text = f"no difference that holds: {claim} here, but {reason}{semicolon}{remark}"
+                text = f"no difference that holds: here {claim}, but {reason}{semicolon}{remark}"
                 verdict = replace(
                     verdict, on_front=True, better=None, text=text, worse=(reason, *verdict.worse)
                 )
