@@ -295,7 +295,7 @@ def join_parts(
     host: Host,
     *,
     quick: bool,
-    card: bool,
+    card: bool = False,
     failures: Sequence[PartFailure] = (),
 ) -> SceneReport:
     """The report on a model of what was measured of it; with `card`, also what it is made of.

@@ -258,7 +258,7 @@ def _measure_scene(
     failures = [*parts.failures, *(f for report in scenarios for f in report.failures)]
     is_stopped = parts.stopped or any(failure.reason.startswith(LATE) for failure in failures)
     join = partial(bench.join_parts, compiled_model, scenarios, sweeps, host, quick=quick)
-    return join(card=not is_stopped, failures=parts.failures), is_stopped
+    return join(failures=parts.failures), is_stopped
 
 
 def _style() -> Style:
@@ -269,7 +269,8 @@ def _show(arguments: argparse.Namespace) -> int:
     """Show a report of any kind; what follows from its figures is derived anew."""
     report = _read(arguments.report, read_report)
     if arguments.html is None:
-        sys.stdout.write(text.report_text(report, _style()))
+        reports = report if isinstance(report, tuple) else (report,)
+        sys.stdout.write("\n".join(text.report_text(r, _style()) for r in reports))
         return 0
     if not isinstance(report, SceneReport):
         raise UsageError(f"{arguments.report} is no report on a model in scenarios: no page")

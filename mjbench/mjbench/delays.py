@@ -71,7 +71,9 @@ def loop_note(model: Any, pilot: Pilot, reference: EngineStates) -> str:
             else f"at no delay longer than {loop.delay:.3g} s"
         )
     span = f"for the {scene.scenario.duration:.3g} s of the scenario"
-    clause = "small differences do not grow" if is_calm else f"it stays bounded {span}"
+    clause = "small differences do not grow"
+    if not is_calm:
+        clause = f"small differences do not fade at its own delay, and it stays bounded {span}"
     return (
         f"with {Path(loop.path).name} every {loop.period:.3g} s {clause} {bounds[0]}, and it stays "
         f"near the motion of small steps {span if is_calm else 'for as long'} {bounds[1]}, at the "

@@ -103,10 +103,13 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
     if report.parts is not None:
         report = replace(report, parts=find_parts(report, report.parts))
     if report.own_row is not None:
-        report = replace(report, verdict=judge_setting(report, starts))
-        lines = five_lines(report)
-        report = replace(report, verdict=replace(report.verdict, lines=lines))
+        report = _with_lines(replace(report, verdict=judge_setting(report, starts)))
     return report
+
+
+def _with_lines(report: ScenarioReport) -> ScenarioReport:
+    """The report, which has its verdict, with that in five lines."""
+    return replace(report, verdict=replace(report.verdict, lines=five_lines(report)))
 
 
 def derive_charts(report: ScenarioReport) -> ScenarioReport:
@@ -116,8 +119,7 @@ def derive_charts(report: ScenarioReport) -> ScenarioReport:
 
 def derive_failures(report: ScenarioReport, failures: Sequence[PartFailure]) -> ScenarioReport:
     """The report with what was not measured, which its last line tells."""
-    report = replace(report, failures=tuple(failures))
-    return replace(report, verdict=replace(report.verdict, lines=five_lines(report)))
+    return _with_lines(replace(report, failures=tuple(failures)))
 
 
 def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...]:
@@ -136,12 +138,11 @@ def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...
             if reason:
                 claim, semicolon, remark = verdict.text.partition("; ")
                 claim = claim.replace(" is better: it ", " ", 1)
-                text = f"no difference that holds: {claim} here, but {reason}{semicolon}{remark}"
+                text = f"no difference that holds: here {claim}, but {reason}{semicolon}{remark}"
                 verdict = replace(
                     verdict, on_front=True, better=None, text=text, worse=(reason, *verdict.worse)
                 )
-                report = replace(report, verdict=verdict)
-                report = replace(report, verdict=replace(verdict, lines=five_lines(report)))
+                report = _with_lines(replace(report, verdict=verdict))
         derived.append(report)
     return tuple(derived)
 

@@ -57,6 +57,8 @@ def integrate(
     from scipy.integrate import solve_ivp
 
     count = len(qpos)
+    if count != len(qvel):  # of a quaternion `qvel` are no rates
+        raise ValueError("accelerations are of slides and hinges: for others define `motion`")
 
     def rate(time: float, state: np.ndarray) -> np.ndarray:
         return np.concatenate(

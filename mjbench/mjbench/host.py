@@ -34,12 +34,14 @@ class Host(Protocol):
 
     def browser_speed(self, keyframe: int | None, duration: float) -> float | None:
         """Simulated time over the time that it takes in a browser; `None` where not known."""
+        return None
 
     def rerun(self, files: Mapping[str, bytes]) -> str:
         """The name of a program whose output changes with these files; empty if none does."""
+        return ""
 
 
-class LocalHost:
+class LocalHost(Host):
     """This process: what code prints is looked at here, and there is no browser."""
 
     def __init__(self, folder: Path, tell: Callable[[str], None]) -> None:
@@ -69,11 +71,3 @@ class LocalHost:
             return ExactRun("", f"it takes longer than {seconds:g} s, or crashed")
         last = run.stderr.strip().splitlines()[-1:] if run.returncode else []
         return ExactRun(run.stdout, last[0] if last else "")
-
-    def browser_speed(self, keyframe: int | None, duration: float) -> float | None:
-        """Nothing is known of browsers here."""
-        return None
-
-    def rerun(self, files: Mapping[str, bytes]) -> str:
-        """No program is known."""
-        return ""

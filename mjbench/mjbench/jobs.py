@@ -33,7 +33,6 @@ from mjbench.machine import Machine, code_digest, one_processor, this_machine
 from mjbench.problems import all_problems
 from mjbench.reports.case_report import CaseReport
 from mjbench.reports.diet_report import DietReport, Keep
-from mjbench.reports.diet_text import diet_text
 from mjbench.reports.engine_report import EngineReport
 from mjbench.reports.model_report import SceneReport
 from mjbench.reports.records import (
@@ -46,7 +45,7 @@ from mjbench.reports.records import (
 )
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.reports.terminal import Style
-from mjbench.text import case_text, engines_text, scene_text
+from mjbench.text import AnyReport, report_text
 
 
 class About(Struct, frozen=True, tag_field="job", tag="about"):
@@ -339,10 +338,5 @@ def _file_text(job: Write) -> str:
 
 def _words(job: Text) -> str:
     style = Style(job.width, job.colour)
-    texts = [scene_text(report, style) for report in job.bench]
-    texts += [engines_text(report, style) for report in job.engines]
-    texts += [case_text(report, style) for report in job.cases]
-    for report in job.diet:
-        command, declarations = (t.format(report.model) for t in (job.command, job.declarations))
-        texts.append(diet_text(report, command, declarations, style))
-    return "\n".join(texts)
+    reports: tuple[AnyReport, ...] = (*job.bench, *job.engines, *job.cases, *job.diet)
+    return "\n".join(report_text(r, style, job.command, job.declarations) for r in reports)

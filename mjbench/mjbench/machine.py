@@ -36,6 +36,13 @@ class Machine(Struct, frozen=True, forbid_unknown_fields=True):
     pinned: bool = False
     """Whether times were taken on a single one of them."""
 
+    @property
+    def text(self) -> str:
+        """The same in words, but for the number of processors."""
+        versions = f"MuJoCo {self.engine}, Python {self.python}, NumPy {self.numpy}"
+        clock = f"clock governor {self.governor}" if self.governor else ""
+        return ", ".join(filter(None, (versions, self.system, self.cpu, clock)))
+
 
 def this_machine(*, pinned: bool = False) -> Machine:
     """Versions, system and processor; `pinned`: times are taken on one processor alone."""

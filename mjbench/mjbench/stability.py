@@ -30,12 +30,7 @@ from mjbench.detector import Passages, driving_force
 from mjbench.linearization import Theory, find_theory
 from mjbench.loop import TimeLimitError
 from mjbench.parts import Parts
-from mjbench.pilot import (
-    MOST_STEPS,
-    Pilot,
-    longer_setup,
-    position_distances,
-)
+from mjbench.pilot import MOST_STEPS, Pilot, longer_setup, position_distances
 from mjbench.problem import (
     STANDARD,
     Array,
@@ -76,6 +71,8 @@ _SMALL_STEPS = 100_000
 _GAIN, _GAIN_RESOLUTION = 0.01, 0.02
 """The share of the largest kinetic energy that counts as a rise of energy, and the width at which
 its timestep is known."""
+_SHARE = 0.4
+"""Of the time that is left, what the search of an integrator may take."""
 _SETTLED_STEPS = 2000
 """Steps, at the limit of theory, of a run that comes to rest: growth at rest shows slowly."""
 
@@ -116,12 +113,18 @@ class Laboratory(Struct, frozen=True, eq=False):
 
     def findings(self) -> str:
         """What a search that was cut has seen, in words; empty before its first run."""
-        steps = self.own_steps()
-        lost = [step for step in steps if self.is_lost(0, step)]
-        stable = [step for step in steps if step not in lost]
-        clauses = [f"lost at {seconds_text(lost[0], 3)}"] if lost else []
-        clauses += [f"bounded at {seconds_text(stable[-1], 3)}"] if stable else []
-        return f"so far {' and '.join(clauses)}" if clauses else ""
+        steps, clauses = self.own_steps(), []
+        for words, is_lost in (
+            ("near the motion of small steps", lambda step: self.trial(0, step).astray),
+            ("bounded", lambda step: self.is_lost(0, step)),
+        ):
+            lost = next((step for step in steps if is_lost(step)), math.inf)
+            shorter = [step for step in steps if step < lost]
+            texts = [f"{words} at {seconds_text(shorter[-1], 3)}"] if shorter else []
+            if lost < math.inf:
+                texts.append(f"not {'' if shorter else f'{words} '}at {seconds_text(lost, 3)}")
+            clauses += [", ".join(texts)] if texts else []
+        return f"so far {'; '.join(clauses)}" if clauses else ""
 
 
 def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
@@ -192,8 +195,11 @@ def search_row(
     theory: Theory,
     *,
     quick: bool = False,
+    closer: bool = True,
 ) -> StableRow:
     """Search for the largest stable timestep between two (s), and for what speaks against it.
+
+    Without `closer` from the own start on the grid alone.
 
     1. From the own start over the span: a grid, falling, down to a tenth of the largest timestep
        below which nothing was lost, a bisection at its end, and a finer grid below that.
@@ -205,7 +211,12 @@ def search_row(
     count = max(2, round((_QUICK_GRID if quick else _GRID) * math.log10(high / low)) + 1)
     grid: list[float] = np.geomspace(low, high, count).tolist()
     resolution = _COARSE if quick else _FINE
-    largest = _look_closer(partial(laboratory.is_lost, 0), grid, resolution, quick)
+    for kind in laboratory.questions:  # which matter most; their runs say what is bounded too
+        _limit_of(laboratory, grid, resolution, kind)
+    is_lost = partial(laboratory.is_lost, 0)
+    largest = bisect(is_lost, grid, _COARSE)
+    if closer:
+        largest = _look_closer(is_lost, grid, resolution, quick)
     near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
     # A first look asks other starts and times about that limit alone, where most of them fail.
     enough = min(largest, grid[-1]) / _NEAR if quick else 0.0
@@ -213,8 +224,9 @@ def search_row(
     def estimate(start: int, width: float) -> float:
         return bisect(partial(laboratory.is_lost, start, spans=2), near, width, _NEAR, enough)
 
-    estimates = [estimate(0, resolution)]
-    by_start = {n: estimate(n, math.inf) for n in range(1, laboratory.starts)}
+    estimates = [estimate(0, resolution)] if closer else []
+    starts = range(1, laboratory.starts if closer else 1)
+    by_start = {n: estimate(n, math.inf) for n in starts}
     if by_start:
         estimates.append(estimate(min(by_start, key=lambda n: by_start[n]), resolution))
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
@@ -241,7 +253,7 @@ def search_row(
         steps=step_count(laboratory.span, max(stable_steps, default=steps[0])),
         tried=len(stable_steps),
         energy=_finite(setup.energy_bound),
-        bracket=None if min(largest, *estimates) == math.inf else (min(bounds), max(bounds)),
+        bracket=(min(bounds), max(bounds)) if estimates and min(bounds) < grid[-1] else None,
         theory=None if limit is None else reach(limit.timestep),
         formula="" if limit is None else limit.source,
         gain=gain,
@@ -260,8 +272,8 @@ def _limit_of(
     if kind not in laboratory.questions:
         return None, ""
     steps_tried = laboratory.own_steps()
-    low = min(steps_tried[0], laboratory.shortest)
-    steps = [h for h in grid if h >= low * (1 - 1e-9)] or [*steps_tried]
+    low = min([laboratory.shortest, *steps_tried[:1]])
+    steps = [h for h in grid if h >= low * (1 - 1e-9)] or steps_tried
 
     def is_lost(step: float) -> bool:
         return bool(getattr(laboratory.trial(0, step), kind))
@@ -349,11 +361,6 @@ def _tries(laboratory: Laboratory) -> tuple[tuple[float, int, int], ...]:
     return tuple((step, *counts[step]) for step in sorted(counts))
 
 
-def attempt(problem: Problem, integrator: Integrator, timestep: float) -> StabilityTrial:
-    """Run the problem over its span at a timestep (s)."""
-    return run_trial(problem, compile_model(problem.mjcf, integrator, timestep), problem.span)
-
-
 _SEARCH, _LOWER = (0.25, 64.0), 8.0
 """The multiples of the model's timestep between which the largest stable one is searched for, and
 by how much lower it is searched for again where all of these are lost."""
@@ -385,7 +392,20 @@ def stable_rows(
         share=0.2,
     )
 
-    def row(integrator: Integrator) -> StableRow | None:
+    def find(
+        laboratory: Laboratory, integrator: Integrator, search: tuple[float, float], closer: bool
+    ) -> StableRow:
+        least = search[0] if scene.declaration.search else laboratory.span / MOST_STEPS
+        look = partial(search_row, quick=quick, closer=closer)
+        while True:
+            row = look(laboratory, integrator, search, pilot.setup, theory)
+            if row.largest != "none" or search[0] <= least:
+                return row
+            search = max(search[0] / _LOWER, least), search[0]
+
+    def first_look(integrator: Integrator) -> tuple[StableRow, partial[StableRow]] | None:
+        """What the own start shows, and what looks closer."""
+
         def run(start: int, step: float, span: float) -> StabilityTrial:
             is_longer = span > scene.scenario.duration and not pilot.settles
             setup = setup_over(span) if is_longer else pilot.setup
@@ -396,27 +416,26 @@ def stable_rows(
         limit = theory.limit(integrator, (low, high)) if settles else None
         if limit is not None and math.isfinite(limit.timestep):
             span = max(span, _SETTLED_STEPS * limit.timestep)
-        least = low if scene.declaration.search else span / MOST_STEPS
         search = max(low, span / MOST_STEPS), min(high, span / FEWEST_STEPS)
         if search[1] <= search[0]:
             return None
         starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
         laboratory = Laboratory(run, span, starts, questions, shortest)
-        while True:
-            try:
-                row = search_row(laboratory, integrator, search, pilot.setup, theory, quick=quick)
-            except TimeLimitError:
-                raise TimeLimitError(laboratory.findings()) from None
-            if row.largest != "none" or search[0] <= least:
-                return row
-            search = max(search[0] / _LOWER, least), search[0]
+        look = partial(find, laboratory, integrator, search)
+        try:
+            return look(closer=False), partial(look, closer=True)
+        except TimeLimitError:
+            raise TimeLimitError(laboratory.findings()) from None
 
-    rows = dict.fromkeys(STANDARD)
     baseline = integrator_of(model)  # of which the verdict tells, so it comes first
-    for integrator in sorted(STANDARD, key=lambda i: i is not baseline):
-        name = f"{scene.name}: stable timesteps of {integrator.value}"
-        share = 0.5 if integrator is baseline else 0.25
-        rows[integrator] = parts.run(name, partial(row, integrator), None, share=share)
+    order = sorted(STANDARD, key=lambda i: i is not baseline)
+    part = f"{scene.name}: stable timesteps of {{}}".format
+    looks = [parts.run(part(i.value), partial(first_look, i), None, share=_SHARE) for i in order]
+    rows = dict.fromkeys(STANDARD)
+    for integrator, look in zip(order, looks, strict=True):
+        if look is not None:
+            name = f"{part(integrator.value)} from starts nearby"
+            rows[integrator] = parts.run(name, look[1], look[0], share=_SHARE)
     return tuple(filter(None, rows.values()))
 
 

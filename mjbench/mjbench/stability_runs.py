@@ -123,6 +123,8 @@ def run_trial(
     holds = setup.scenario.holds(span)
     commands = {min(math.ceil(begin / timestep - 1e-9), steps): new for begin, _, new in holds}
     late = [begin for begin, _, _ in holds if begin and not is_multiple(begin, timestep)]
+    if (loop := setup.scenario.loop) and not is_multiple(loop.period, timestep):
+        late = [0.0]
     times = () if motion is None or start else motion.states.times.tolist()
     samples = _nearest_samples(times, timestep)
     stops = sorted(

@@ -6,8 +6,8 @@ The JSON has all of it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TypeAlias
 
-from mjbench.machine import Machine
 from mjbench.reports import Interval
 from mjbench.reports.case_report import CaseReport
 from mjbench.reports.diet_report import DietReport
@@ -27,13 +27,13 @@ from mjbench.reports.scene_report import (
 )
 from mjbench.reports.shown_errors import (
     horizon_error_text,
+    interval_text,
     seconds_text,
     setting_text,
     status_text,
 )
 from mjbench.reports.terminal import Style, fitted_table, indented, printable
 
-_FIGURES = ("change", "penetration", "slip", "restitution", "residual", "iterations")
 _PLAIN = Style()
 _HEADS = {
     "step_error": "seen of steps",
@@ -41,8 +41,9 @@ _HEADS = {
     "position": "position",
     "attitude": "attitude",
     "velocity": "velocity",
+    "throughput": "× real time",
 }
-"""Short titles of errors; plots have the long ones."""
+"""Short titles of figures; plots have the long ones."""
 
 
 def scene_text(report: SceneReport, style: Style = _PLAIN) -> str:
@@ -67,7 +68,7 @@ def scene_text(report: SceneReport, style: Style = _PLAIN) -> str:
     for sweep in report.sweeps:
         title = f"  {style.strong(sweep.name)}: {sweep.title}"
         lines += ["", title, *indented(_sweep(sweep, style))]
-    lines += ["", *style.wrap(_machine_text(report.machine), "  ")]
+    lines += ["", *style.wrap(report.machine.text, "  ")]
     return printable("\n".join(lines) + "\n")
 
 
@@ -95,7 +96,7 @@ def _settings(report: ScenarioReport, style: Style) -> Iterator[str]:
     columns: list[tuple[str, list[str]]] = [
         ("", [(">" if r.own else " ") + ("*" if r.front else " ") for r in rows]),
         ("setting", [r.name for r in rows]),
-        ("cost", [_interval(r.cost) for r in rows]),
+        ("cost", [interval_text(r.cost) for r in rows]),
     ]
     for quantity in report.quantities:
         if quantity.resolved:
@@ -107,7 +108,10 @@ def _settings(report: ScenarioReport, style: Style) -> Iterator[str]:
             f"off by {off} at",
             ["" if r.parted is None else seconds_text(r.parted, 3) for r in rows],
         ),
-        ("energy drift", [_percent(r.energy_drift) for r in rows]),
+        (
+            "energy drift",
+            ["" if r.energy_drift is None else f"{100 * r.energy_drift:+.2g} %" for r in rows],
+        ),
         ("creep (m)", ["" if not r.slip else f"{r.slip:.2g}" for r in rows]),
         ("depth (m)", ["" if not r.penetration else f"{r.penetration:.2g}" for r in rows]),
         ("× real time", ["" if r.realtime is None else f"{r.realtime:.3g}" for r in rows]),
@@ -132,10 +136,6 @@ def _error(row: WorkPrecisionRow, name: str, least: float) -> str:
     return f"< {least:.2g}" if least and value <= least * (1 + 1e-9) else f"{value:.3g}"
 
 
-def _percent(value: float | None) -> str:
-    return "" if value is None else f"{100 * value:+.2g} %"
-
-
 def _orders(orders: Sequence[OrderRow], style: Style) -> Iterator[str]:
     rows = [row for row in orders if row.has_orders]
     if rows:
@@ -158,7 +158,11 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
         ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
         ("gains energy from", ["" if r.gain is None else seconds_text(r.gain[0], 2) for r in rows]),
-        ("stable again", [_again(row) for row in rows]),
+        (
+            "stable again",
+            [" to ".join(seconds_text(step, 3) for step in row.islands or ()) for row in rows],
+        ),
+        ("starts lost: · none, ∘ some, • all", [row.map for row in rows]),
     ]
     yield from fitted_table(columns, style.width)
     reasons: dict[str, list[str]] = {}
@@ -170,10 +174,6 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         yield from style.wrap(f"beyond it {', '.join(dict.fromkeys(names))}: {reason}")
 
 
-def _again(row: StableRow) -> str:
-    return "" if row.islands is None else " to ".join(seconds_text(s, 3) for s in row.islands)
-
-
 def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
     rows = report.rows
     columns = [
@@ -181,20 +181,19 @@ def _sweep(report: SweepReport, style: Style) -> Iterator[str]:
         ("parameter", [row.parameter for row in rows]),
         ("value", [row.value for row in rows]),
     ]
-    for name in _FIGURES:
-        values = [getattr(row, name) for row in rows]
-        columns.append((name, ["" if value is None else f"{value:.3g}" for value in values]))
-    columns += [
-        ("cost", [_interval(row.cost) for row in rows]),
-        ("× real time", [_interval(row.throughput) for row in rows]),
-        ("status", [_lost(row.status, row.reasons) for row in rows]),
-    ]
+    for name in report.show:
+        columns.append((_HEADS.get(name, name), [_figure(getattr(row, name)) for row in rows]))
+    columns.append(("status", [_lost(row.status, row.reasons) for row in rows]))
     yield from fitted_table(columns, style.width - 4)
+
+
+def _figure(value: Interval | float | None) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else interval_text(value)
 
 
 def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
     """A model in other engines."""
-    lines = [style.strong(report.model), f"  {_machine_text(report.machine)}"]
+    lines = [style.strong(report.model), f"  {report.machine.text}"]
     for scenario in report.scenarios:
         rows = scenario.rows
         names = [f"{row.title}, {row.bits} bits" if row.bits else row.title for row in rows]
@@ -259,7 +258,7 @@ def case_text(report: CaseReport, style: Style = _PLAIN) -> str:
     parts += ["", *fitted_table(columns, inner.width), ""]
     for chart in report.charts[:1]:
         parts += plot_lines(chart, inner.width)
-    lines += style.wrap(_machine_text(report.machine), "  ")
+    lines += style.wrap(report.machine.text, "  ")
     return "\n".join([*lines, *indented(parts)]) + "\n"
 
 
@@ -276,32 +275,27 @@ _WIDEST = 1000
 """Figures that differ are shown whole."""
 
 
-def _machine_text(machine: Machine) -> str:
-    parts = [f"MuJoCo {machine.engine}", f"Python {machine.python}", f"NumPy {machine.numpy}"]
-    return ", ".join(filter(None, [*parts, machine.system, machine.cpu]))
-
-
-def _interval(value: Interval | None) -> str:
-    if value is None:
-        return ""
-    share = 100 * value.half_width
-    return f"{value.value:.3g}" + (f" ± {share:.2g} %" if 0.05 <= share < 1e3 else "")
-
-
 def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.6g}"
 
 
+AnyReport: TypeAlias = SceneReport | EngineReport | DietReport | CaseReport
+
+
 def report_text(
-    report: SceneReport | EngineReport | DietReport | Sequence[CaseReport], style: Style
+    report: AnyReport,
+    style: Style,
+    command: str = "mjbench diet MODEL",
+    declarations: str = "MODEL.toml",
 ) -> str:
-    """A report of any kind."""
+    """A report of any kind; `command` and `declarations` as for `diet_text`, `{}` is its model."""
     match report:
         case SceneReport():
             return scene_text(report, style)
         case EngineReport():
             return engines_text(report, style)
         case DietReport():
-            return diet_text(report, "mjbench diet MODEL", "MODEL.toml", style)
-        case _:
-            return "\n".join(case_text(case, style) for case in report)
+            model = report.model
+            return diet_text(report, command.format(model), declarations.format(model), style)
+        case CaseReport():
+            return case_text(report, style)

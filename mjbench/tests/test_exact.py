@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mjbench.bench import CannotMeasureError, compile_subject, run_scenario
+from mjbench.exact import integrate
 from mjbench.host import LocalHost
 from mjbench.reports.scene_report import ScenarioReport
 from mjbench.subjects import read_subject
@@ -349,6 +351,11 @@ def test_what_is_not_exact_or_no_motion_is_a_mistake(folder: Path) -> None:
         diagnostic = mistake(folder, text)
         assert message in diagnostic.message, text
         assert diagnostic.place.path == "ball.exact.py", text
+
+
+def test_accelerations_of_a_ball_joint_are_refused() -> None:
+    with pytest.raises(ValueError, match="of slides and hinges: for others define `motion`"):
+        integrate(lambda *_: (), [0.1], np.ones(4), np.ones(3))
 
 
 def test_what_was_measured_depends_on_it(folder: Path) -> None:

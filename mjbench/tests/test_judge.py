@@ -193,15 +193,15 @@ def test_what_is_better_under_one_seed_and_worse_under_another_is_not_better() -
     first, second = derive_seeds(seeds)
     assert second == seeds[1]
     reason = "in seed-2 the error of position is 2.1 times as large over the whole run"
-    claim = "no difference that holds: implicit at 4.16667 ms takes 0.47 of the time and errs no "
-    assert first.verdict.text.startswith(f"{claim}more in any column here, but {reason}; ")
+    claim = "no difference that holds: here implicit at 4.16667 ms takes 0.47 of the time and errs "
+    assert first.verdict.text.startswith(f"{claim}no more in any column, but {reason}; ")
     assert first.verdict.better is None and first.verdict.worse == (reason,)
     assert any(reason in line for line in first.verdict.lines)
     alike = [replace(seeds[0], name=name) for name in ("seed-1", "seed-2")]
     assert list(derive_seeds(alike)) == alike
     lost = masked(status="diverged", reasons=("it is not finite",))
     (first, _) = derive_seeds([seeds[0], replace(judged(lost, contact_model=CONES), name="b")])
-    assert "here, but in b it is lost; " in first.verdict.text
+    assert ", but in b it is lost; " in first.verdict.text
 
 
 def test_gains_are_told_with_their_spread() -> None:
@@ -237,7 +237,7 @@ def test_what_is_off_before_the_horizon_is_not_better() -> None:
     assert judged(off, contact_model=CONES).verdict.better is None
     good = judged(masked(position=(0.0049, 0.0049)), contact_model=CONES)
     (first, _) = derive_seeds([good, replace(judged(off, contact_model=CONES), name="b")])
-    assert "here, but in b it is off at 0.9 s; " in first.verdict.text
+    assert ", but in b it is off at 0.9 s; " in first.verdict.text
 
 
 def test_a_start_inside_something_is_told_before_any_error() -> None:

@@ -7,14 +7,13 @@ import math
 from msgspec.structs import replace
 
 from mjbench.reports import reach, reach_bound
-from mjbench.reports.limits import limit_text, map_text, reach_text, stability_text
+from mjbench.reports.limits import limit_text, reach_text, stability_text
 from mjbench.reports.scene_report import StableRow
 from samples.reports import row as setting_row
 from samples.reports import scenario
 
 LOW, HIGH = 1.0, 1000.0
 ROW = StableRow("RK4", 25.44, (LOW, HIGH), None, 5.0, 1, 9, None, (25.44, 25.48))
-TRIES = ((10.0, 10, 0), (11.5, 10, 0), (13.0, 10, 0), (24.0, 10, 3), (24.55, 10, 10))
 GRID = (9.0, 10.35, 11.9, *(13.0 * 1.0227**n for n in range(30)))
 """A step of 15 % below half the limit, which does not count, and of 2.3 % above."""
 
@@ -69,11 +68,6 @@ def test_all_and_none_are_values_of_their_own() -> None:
     assert reach_text("all", (LOW, HIGH)) == "all to 1000 s"
     assert reach_text("none", (LOW, HIGH)) == "none from 1 s on"
     assert reach_text(None, (LOW, HIGH)) == "", "not measured"
-
-
-def test_a_map_has_a_sign_for_each_timestep() -> None:
-    assert map_text(replace(ROW, tries=TRIES)) == "10 s ···∘• 25 s"
-    assert map_text(replace(ROW, tries=TRIES[:3])) == "", "nothing was lost"
 
 
 def test_where_limits_have_islands_digits_are_no_finer_than_the_gaps() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from collections.abc import Callable
 from typing import Any
 
@@ -22,14 +21,12 @@ from mjbench.parts import Parts
 from mjbench.pilot import run_pilot
 from mjbench.problem import STANDARD, Integrator, Scenario, Setup
 from mjbench.problems import all_problems
-from mjbench.problems.oscillators import rk4_factor, rk4_limit
 from mjbench.reports.scene_report import StableRow
 from mjbench.scene import scenes
 from mjbench.simulation import compile_model, simulate, with_integrator
 from mjbench.stability import (
     Laboratory,
     StabilityTrial,
-    attempt,
     boundaries,
     boundary,
     search_row,
@@ -37,6 +34,7 @@ from mjbench.stability import (
     with_energy_bound,
 )
 from mjbench.stability_runs import KeptMotion, run_trial
+from samples.runs import attempt
 
 pytestmark = pytest.mark.long
 
@@ -243,32 +241,34 @@ ARM = """<mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody><body>
 SERVO = '<actuator><position joint="j" kp="2e5" kv="1500"/></actuator>'
 
 
-def rows_of(mjcf: str, *names: str, **fields: Any) -> dict[str, StableRow]:
+def rows_of(mjcf: str, parts: Parts | None = None, **fields: Any) -> dict[str, StableRow]:
     model = mujoco.MjModel.from_xml_string(mjcf)
     table = DeclaredScenario("s", table=Place("m.xml"), duration=2.0, **fields)
     (scene,) = scenes(model, Declarations("m.xml", (table,)))
     fine = with_integrator(model, Integrator.RK4, min(scene.timesteps))
     states = simulate(Setup(scenario=scene.scenario), fine).states
-    rows = stable_rows(model, run_pilot(model, scene), states, Parts(), quick=True)
+    rows = stable_rows(model, run_pilot(model, scene), states, parts or Parts(), quick=True)
     return {row.integrator: row for row in rows}
 
 
 def test_a_search_that_is_cut_says_what_it_has_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    def run_until(setup: Setup, model: Any, *rest: Any, **options: Any) -> StabilityTrial:
-        if model.opt.timestep < 0.01:
-            raise TimeLimitError
-        return run_trial(setup, model, *rest, **options)
+    def rows_until(shortest: float, starts: int) -> tuple[dict[str, StableRow], dict[str, str]]:
+        def run_until(setup: Setup, model: Any, *rest: Any, start: int) -> StabilityTrial:
+            if model.opt.timestep < shortest or start >= starts:
+                raise TimeLimitError
+            return run_trial(setup, model, *rest, start=start)
 
-    monkeypatch.setattr(stability, "run_trial", run_until)
-    model = mujoco.MjModel.from_xml_string(ARM.format("", SERVO))
-    table = DeclaredScenario("s", table=Place("m.xml"), qpos=(0.1,), duration=2.0, sample=0.02)
-    (scene,) = scenes(model, Declarations("m.xml", (table,)))
-    fine = with_integrator(model, Integrator.RK4, min(scene.timesteps))
-    states, parts = simulate(Setup(scenario=scene.scenario), fine).states, Parts()
-    assert stable_rows(model, run_pilot(model, scene), states, parts, quick=True) == ()
-    reasons = {failure.part.rpartition(" ")[2]: failure.reason for failure in parts.failures}
-    assert reasons["Euler"].startswith("not enough time; so far lost at 1")
-    assert re.fullmatch(r"not enough time; so far lost at .+ and bounded at .+ ms", reasons["RK4"])
+        monkeypatch.setattr(stability, "run_trial", run_until)
+        parts = Parts()
+        rows = rows_of(ARM.format("", SERVO), parts, qpos=(0.1,), sample=0.02)
+        return rows, {part.part.partition(" of ")[2]: part.reason for part in parts.failures}
+
+    rows, reasons = rows_until(0.01, starts=3)
+    assert "far not near the motion of small steps at 11.9 ms; not bounded at" in reasons["Euler"]
+    assert reasons["RK4"].endswith("; bounded at 17.7 ms, not at 26.3 ms")
+    rows, reasons = rows_until(0.0, starts=1)
+    assert reasons == {f"{name} from starts nearby": "not enough time" for name in rows}
+    assert isinstance(near := rows["Euler"].near, float) and near < 0.0104
 
 
 def test_a_servo_is_stable_as_far_as_the_spring_and_damper_that_it_is() -> None:
@@ -440,9 +440,3 @@ def test_growth_beyond_the_boundary_is_that_of_theory() -> None:
     endless = replace(endless, span=100 * z)
     trial = attempt(endless, Integrator.EULER_EXPLICIT, z / 10)
     assert trial.growth == pytest.approx(root, rel=1e-8)
-
-
-def test_the_polynomial_of_runge_and_kutta() -> None:
-    assert rk4_limit(0.0) == pytest.approx(2 * math.sqrt(2), rel=1e-12)
-    assert rk4_limit(1.0) == pytest.approx(2.785293563405282, rel=1e-9)
-    assert abs(rk4_factor(2j * math.sqrt(2))) == pytest.approx(1.0, rel=1e-15)

@@ -16,7 +16,7 @@ from mjbench.problem import Array
 from mjbench.reports.scene_report import ScenarioReport
 from mjbench.scene import ExactMotion, ExactStates, SceneError, scenes
 from mjbench.work_precision import measure_scenario
-from samples.runs import BOX, FAMILY, FLIP, measure, orders, row, with_search
+from samples.runs import BOX, FLIP, measure, orders, row, with_search
 from samples.surveys import parse_declared
 
 pytestmark = pytest.mark.long
@@ -45,13 +45,6 @@ def test_a_report_on_the_tumbling_box() -> None:
     assert (own_row.setting.solver, own_row.setting.cone) == ("", ""), "nothing is solved"
     assert report.verdict.noticeable is False
     assert len({line.setting for line in report.rows}) == len(report.rows) == 35
-
-
-def test_orders_of_the_tumbling_box() -> None:
-    first = dict.fromkeys(FAMILY, 1.0)
-    assert orders(of_box(), "attitude") == pytest.approx({**first, "RK4": 2.0}, abs=0.05)
-    assert orders(of_box(), "velocity") == pytest.approx({**first, "RK4": 4.0}, abs=0.1)
-    assert orders(of_box(), "position") == {}, "its centre does not move"
 
 
 def test_an_error_that_can_be_seen() -> None:

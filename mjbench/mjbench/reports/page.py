@@ -35,8 +35,7 @@ def scene_page(report: SceneReport) -> str:
         parts.append(f"<p>{escape(text)}</p>")
     for scenario in report.scenarios:
         parts += _scenario(scenario)
-    machine = report.machine
-    parts.append(f"<p>MuJoCo {escape(machine.engine)}, {escape(machine.cpu)}</p></body></html>")
+    parts.append(f"<p>{escape(report.machine.text)}</p></body></html>")
     return "\n".join(parts) + "\n"
 
 

@@ -197,7 +197,9 @@ def status_text(status: str) -> str:
     return "grew" if status == "slow-growth" else status
 
 
-def interval_text(value: Interval) -> str:
-    """A figure in three digits with half the width of its interval, in per cent."""
+def interval_text(value: Interval | None) -> str:
+    """A figure in three digits with half the width of its interval, in per cent; empty for none."""
+    if value is None:
+        return ""
     share = 100 * value.half_width
-    return f"{value.value:.3g}" + (f" ± {share:.2g} %" if 0.05 <= share < math.inf else "")
+    return f"{value.value:.3g}" + (f" ± {share:.2g} %" if 0.05 <= share < 1e3 else "")

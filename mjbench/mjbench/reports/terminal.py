@@ -55,9 +55,9 @@ def _visible(character: str) -> str:
     return "\ufffd"
 
 
-def indented(lines: Iterable[str], by: int = 4) -> list[str]:
+def indented(lines: Iterable[str]) -> list[str]:
     """Lines with spaces before them."""
-    return [f"{' ' * by}{line}".rstrip() for line in lines]
+    return [f"    {line}".rstrip() for line in lines]
 
 
 def count_text(count: int, noun: str) -> str:

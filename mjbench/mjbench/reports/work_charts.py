@@ -17,7 +17,7 @@ from msgspec.structs import replace
 from mjbench.reports import Interval
 from mjbench.reports.case_report import CaseReport, ErrorLine
 from mjbench.reports.charts import Chart, ChartLevel, ChartLine, ChartMark, ChartPoint, chart_point
-from mjbench.reports.scene_report import FLOORS, ScenarioReport, WorkPrecisionRow, step_evaluations
+from mjbench.reports.scene_report import FLOORS, ScenarioReport, WorkPrecisionRow
 from mjbench.reports.shown_errors import (
     INTEGRATORS,
     SEEN,
@@ -31,10 +31,9 @@ from mjbench.reports.shown_errors import (
     status_text,
 )
 
-EVALUATION_LABEL = "evaluations of the forward dynamics"
 _WORKS = {
     "cost": "cost",
-    "evaluations": EVALUATION_LABEL,
+    "evaluations": "evaluations of the forward dynamics",
     "iterations": "iterations of the solver",
 }
 """What a setting costs: time, and what is the same on every machine."""
@@ -222,13 +221,9 @@ def _point_title(
 
 
 def case_charts(report: CaseReport) -> tuple[Chart, ...]:
-    """The charts of each error against processor time, where it was measured, and evaluations."""
-    return tuple(
-        _case_chart(report, quantity, is_time=is_time)
-        for quantity in case_quantities(report)
-        for is_time in (True, False)
-        if not is_time or report.costs
-    )
+    """The charts of each error against processor time; none where that was not measured."""
+    quantities = case_quantities(report) if report.costs else ()
+    return tuple(_case_chart(report, quantity) for quantity in quantities)
 
 
 def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
@@ -253,36 +248,30 @@ def step_cost(report: CaseReport, line: ErrorLine) -> Interval | None:
     return None if step is None else step.scale(1 / line.timestep)
 
 
-def _case_chart(report: CaseReport, quantity: Quantity, *, is_time: bool) -> Chart:
-    work = "processor time" if is_time else EVALUATION_LABEL
-
-    def amount(x: float, digits: int = 2) -> str:
-        return seconds_text(x, digits) if is_time else f"{x:.{digits}g}"
-
+def _case_chart(report: CaseReport, quantity: Quantity) -> Chart:
     lines = []
     for number, integrator in enumerate(INTEGRATORS):
         points = []
         for run in report.errors:
-            count = step_evaluations(run.integrator) / run.timestep
-            x = step_cost(report, run) if is_time else Interval(count, count, count)
+            x = step_cost(report, run)
             if run.integrator != integrator or x is None:
                 continue
             setting = f"{integrator} at {seconds_text(run.timestep)}"
             if run.status != "ok":
                 points.append(chart_point(x, None, f"{setting}: {status_text(run.status)}"))
             elif error := quantity.value_of(run):
-                title = f"{setting}: {error:.3g}, {amount(x.value, 3)}"
+                title = f"{setting}: {error:.3g}, {seconds_text(x.value, 3)}"
                 points.append(chart_point(x, error, title))
         lines += [ChartLine(integrator, number, tuple(points))] if points else []
     texts = []
     for line in lines:
         if visible := [point for point in line.points if point.y is not None]:
-            ends = (f"{p.y:.2g} at {amount(p.x)}" for p in (visible[0], visible[-1]))
+            ends = (f"{p.y:.2g} at {seconds_text(p.x, 2)}" for p in (visible[0], visible[-1]))
             texts.append(f"{line.name}: {', '.join(ends)}.")
     return Chart(
-        title=f"{report.title}: {quantity.label} against {work}",
+        title=f"{report.title}: {quantity.label} against processor time",
         text=" ".join(texts),
-        axes=(f"{work} for a simulated second{' (s)' * is_time}", quantity.label),
+        axes=("processor time for a simulated second (s)", quantity.label),
         lines=tuple(lines),
         least=quantity.least,
     )

@@ -6,8 +6,11 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from mjbench.problem import Integrator, Problem
 from mjbench.reports.scene_report import ScenarioReport, WorkPrecisionRow
 from mjbench.scene import Scene, scenes
+from mjbench.simulation import compile_model
+from mjbench.stability_runs import StabilityTrial, run_trial
 from mjbench.work_precision import measure_scenario
 from samples.surveys import parse_declared
 
@@ -32,7 +35,6 @@ duration = 2
 sample = 0.1
 reference = "closed:tumbling-box"
 """
-FAMILY = ("Euler", "implicit", "implicitfast", "discrete")
 
 
 def measure(model: Any, text: str = "", *, quick: bool = False) -> tuple[ScenarioReport, ...]:
@@ -41,6 +43,11 @@ def measure(model: Any, text: str = "", *, quick: bool = False) -> tuple[Scenari
         measure_scenario(model, with_search(scene), quick=quick, clock=None)
         for scene in scenes(model, parse_declared(text), quick=quick)
     )
+
+
+def attempt(problem: Problem, integrator: Integrator, timestep: float) -> StabilityTrial:
+    """A run of a problem over its span at a timestep (s)."""
+    return run_trial(problem, compile_model(problem.mjcf, integrator, timestep), problem.span)
 
 
 def with_search(scene: Scene) -> Scene:
