@@ -6,6 +6,7 @@ file of the site, and its fragment an id of that page; otherwise the nearest one
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Collection, Iterable
 from typing import TypeAlias
 from urllib.parse import unquote, urljoin, urlsplit
@@ -141,6 +142,13 @@ def _target(path: str, url: str, base_url: str) -> Reference | None:
     """The target of an address; `None` for another site."""
     if url.startswith("#") and url.isprintable():  # as most
         return path, unquote(url.strip()[1:])
+    is_own = url.strip()[:1] in ("", "?", "#")
+    return _resolve(path if is_own else path[: path.rfind("/") + 1], url, base_url)
+
+
+@functools.lru_cache(maxsize=4096)
+def _resolve(path: str, url: str, base_url: str) -> Reference | None:
+    """The target of an address on a page, or on any page of a folder: all have the same menus."""
     base = urlsplit(base_url)
     folder = f"{base.path.rstrip('/')}/"
     site_host = f"{base.scheme}://{base.netloc}" if base.netloc else ""
