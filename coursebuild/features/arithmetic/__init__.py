@@ -61,11 +61,12 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
             if comparison.kind == "holds":
                 results.append(span)
             elif comparison.kind == "wrong":
-                texts = (span.text, comparison.result)
+                point = "{,}" if "{,}" in span.text else "."
+                texts = (span.text.replace(point, "."), comparison.result)
                 are_plain = all(re.fullmatch(r"-?[\d.]+", text) for text in texts)
                 label_text = "" if is_inline else "#eq:name "
                 help = "; ".join(filter(None, (comparison.help, _OTHER_NUMBERS % label_text)))
-                fix = Fix(help, comparison.result if are_plain else None)
+                fix = Fix(help, comparison.result.replace(".", point) if are_plain else None)
                 mistake = diagnose("formula-arithmetic", span, message, help=fix)
                 diagnostics.append(mistake)
     units = tuple((symbol.name, symbol.unit_text) for symbol in symbols.declarations.values())

@@ -88,12 +88,21 @@ def _check_statements(
             statement, by_name, unit if statement is statements[-1] else ""
         )
     )
+    pointed = point_decimals(tex, comma)
+    comparisons = tuple(replace(c, end=_end_of_number(tex, pointed, c.end)) for c in comparisons)
     rests = [statement.sides[0] for statement in statements if not statement.relations]
     if any(c.kind == "wrong" for c in comparisons) and any(
         isinstance(rest.expression, NotUnderstood) for rest in rests
     ):  # as `\quad(\mathrm{mod}\ 12)` or `\quad\text{is false}`
         return (FormulaComparison("unread", 0, len(tex), "a part of it may say how it is meant"),)
     return comparisons
+
+
+def _end_of_number(tex: str, pointed: str, end: int) -> int:
+    """Where what ends at `end` of a formula with points ends in the formula as it is written."""
+    while end < len(tex) and pointed[end] == " " != tex[end]:
+        end += 1
+    return end
 
 
 def _check_chain(
