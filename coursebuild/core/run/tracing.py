@@ -108,13 +108,12 @@ class Tracer:
         self._installed = tuple(f"{folder.rstrip('/')}/" for folder in installed)
         self._packages_inside = tuple(f for f in self._installed if f.startswith(self.root))
         self._packages_around = tuple(f for f in self._installed if self.root.startswith(f))
-        self._ignored = (
-            *_SYSTEM,
-            self.temporary,
-            overflow,
-            f"{cache}/.cache/",
-            *(f for f in self._installed if f not in self._packages_around),
+        folders = (*_SYSTEM, self.temporary, overflow, f"{cache}/.cache/")
+        self._ignored = tuple(
+            folder for folder in (*folders, *self._installed) if not self.root.startswith(folder)
         )
+        self._ignored_around = tuple(folder for folder in folders if self.root.startswith(folder))
+        """Folders of which only the course in them counts, such as `/dev/` with `/dev/shm`."""
         self.has_mujoco = True
         """Whether MuJoCo, if the script imports it, reports the files that it opens."""
         self._shared = shared
@@ -370,15 +369,19 @@ class Tracer:
             path = path.decode("utf-8", "surrogateescape")
         if not isinstance(path, str):
             return None  # a descriptor, whose file was opened before
-        if path.startswith(self._ignored) and "/.." not in path:
+        if self._is_ignored(path) and "/.." not in path:
             return None
         if not path.startswith("/"):
             path = f"{posix.getcwd()}/{path}"
         full_path = "/" + normpath(path).lstrip("/")
-        if full_path.startswith(self._ignored) or full_path == self.temporary[:-1]:
+        if self._is_ignored(full_path) or full_path == self.temporary[:-1]:
             return None
         is_package = full_path.startswith(self._installed) and not full_path.startswith(self.root)
         return None if self._packages_around and is_package else full_path
+
+    def _is_ignored(self, path: str) -> bool:
+        is_around = path.startswith(self._ignored_around) and not path.startswith(self.root)
+        return is_around or path.startswith(self._ignored)
 
     def _project_folder(self, folder: object) -> str | None:
         if not isinstance(folder, str):

@@ -61,6 +61,20 @@ def test_files_that_are_read_however_the_script_ends(traced: RunTraced) -> None:
         assert (trace.folders, trace.outside, trace.opaque) == ((), (), ""), code
 
 
+def test_files_of_a_course_below_a_folder_that_does_not_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spawning: ScriptServer
+) -> None:
+    root = tmp_path.resolve() / ".cache/a course"
+    (root / "examples").mkdir(parents=True)
+    (root / "a.txt").write_text("a")
+    (root.parent / "b.txt").write_text("b")
+    (root / "examples/x.py").write_text("open('a.txt'); open('../b.txt')")
+    monkeypatch.setenv("HOME", str(tmp_path.resolve()))
+    (result,) = spawning.run(root, [job()], parallel=1)
+    assert result.trace is not None
+    assert ([*result.trace.files], result.trace.outside) == (["a.txt"], ())
+
+
 def test_what_is_asked_about_files_without_opening_them(traced: RunTraced, root: Path) -> None:
     (root / "data/link").symlink_to("a.txt")
     for path in ("data/a.txt", "lib/helper.py", "lib/other.py"):
