@@ -105,6 +105,16 @@ def address(tmp_path_factory: pytest.TempPathFactory, path: str) -> Iterator[str
 
 
 @pytest.fixture
+def make(tmp_path: Path, stores: Path) -> Make:
+    def make(*lessons: str | bytes, name: str = "a cöurse") -> Folder:
+        folder = Folder(tmp_path / name)
+        folder.fill(lessons, stores)
+        return folder
+
+    return make
+
+
+@pytest.fixture
 def run(path: str) -> Callable[..., CommandResult]:
     def run(folder: Folder, *arguments: str, **variables: str) -> CommandResult:
         return folder.run(*arguments, env=environment(path) | variables)
