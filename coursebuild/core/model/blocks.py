@@ -160,8 +160,6 @@ class ScriptPart(Labelled, frozen=True):
 
 
 PYTHON = "python"
-XML_KINDS = frozenset({"mjcf", "urdf"})
-"""Kinds of code that are XML by another name."""
 
 
 class Script(Labelled, frozen=True):

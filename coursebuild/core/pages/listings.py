@@ -21,7 +21,6 @@ from pygments.token import Comment, Keyword, Literal, Name, Operator, String, To
 from pygments.util import ClassNotFound
 from tree_sitter import Language, Parser, Query, QueryCursor
 
-from coursebuild.core.model.blocks import XML_KINDS
 from coursebuild.core.text.characters import visible
 
 _KEYWORDS = """
@@ -93,6 +92,7 @@ _PYTHON = ("python", "py", "python3", "py3")
 _MAX_FOR_TREE_SITTER = 20_000
 """The most characters of Python that tree-sitter reads. For absurd texts, such as backslashes only,
 its time grows with the square of the length, unlike that of Pygments: a second at this length."""
+_ALIASES = {"mjcf": "xml", "urdf": "xml"}
 _WITHOUT_OUTER_SPACE = re.compile(r"\S(?:.*\S)?")
 
 
@@ -105,7 +105,7 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     runs: Iterable[tuple[str, str]] = [("", text)]
     if language in _PYTHON and len(text) <= _MAX_FOR_TREE_SITTER:
         runs = python_runs(text)
-    elif (lexer := _lexer("xml" if language in XML_KINDS else language)) is not None:
+    elif (lexer := _lexer(_ALIASES.get(language, language))) is not None:
         for end in ("", "\n"):  # lexers of sessions need a line end
             tokens = [(_class_of(token), part) for token, part in lexer.get_tokens(text + end)]
             if "".join(part for _, part in tokens) == text + end:  # else nothing is marked

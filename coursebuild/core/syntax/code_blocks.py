@@ -31,7 +31,7 @@ from coursebuild.core.syntax.fence import (
     Word,
     split_words,
 )
-from coursebuild.core.syntax.other_tools import check_kind, check_language
+from coursebuild.core.syntax.other_tools import check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.python_syntax import check_syntax
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
@@ -109,7 +109,6 @@ def parse_program(fence: Fence) -> Parsed[Script | PlainCode | None]:
         keys = fence.keys(values=("file", *_PROGRAM_VALUES), flags=("norun", *_SHOWS))
         diagnostics, file = list(keys.diagnostics), keys.value.get("file")
         script = None if file is None else _build_script(fence, file, keys.value, diagnostics)
-        diagnostics += check_language(fence, file_path)
         return Parsed(
             script or PlainCode(fence.span, fence.body, None, fence.kind), (*diagnostics,)
         )
@@ -119,10 +118,7 @@ def parse_program(fence: Fence) -> Parsed[Script | PlainCode | None]:
     keys = fence.keys(values=("show",))
     word = keys.value.get("show")
     source = None if word is None else _source_part(fence, word)
-    return Parsed(
-        PlainCode(fence.span, fence.body, source, fence.kind),
-        (*keys.diagnostics, *check_language(fence, path)),
-    )
+    return Parsed(PlainCode(fence.span, fence.body, source, fence.kind), keys.diagnostics)
 
 
 def _source_part(fence: Fence, word: Word) -> SourcePart:

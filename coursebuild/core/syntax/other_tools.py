@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from coursebuild.core.model.blocks import XML_KINDS
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
 from coursebuild.core.syntax.fence import (
     Fence,
@@ -68,22 +67,6 @@ def check_marks(content: Excerpt, start: int, text: str) -> Iterator[Diagnostic]
 def is_known_kind(kind: str) -> bool:
     """Whether a block of a kind is more than code to be shown."""
     return kind in CORE_FENCES or kind in fence_names()
-
-
-def check_language(fence: Fence, path: str) -> Iterator[Diagnostic]:
-    """Report a kind that is no language, where the file that is shown says which one is meant."""
-    from pygments.lexers import find_lexer_class_by_name, find_lexer_class_for_filename
-    from pygments.util import ClassNotFound
-
-    lexer = find_lexer_class_for_filename(path)
-    try:
-        find_lexer_class_by_name("xml" if fence.kind in XML_KINDS else fence.kind)
-    except ClassNotFound:
-        if lexer is not None:
-            kind, (language, *_) = kind_of(fence.info), lexer.aliases
-            message = f"`{kind.text}` is not known as a language, and `{path}` is {lexer.name}"
-            fix = Fix(f"write `{language}`", language)
-            yield diagnose("fence-kind", kind.span(), message, help=fix)
 
 
 def check_kind(fence: Fence) -> Iterator[Diagnostic]:

@@ -156,7 +156,7 @@ def keeps_words(edits: Iterable[Edit]) -> bool:
         changes.sort(key=lambda edit: edit.span.start)
         first, last = changes[0].span.start, max(edit.span.end for edit in changes)
         start = 1 + source.text.rfind("\n", 0, first)
-        old = source.text[start : source.text.find("\n", last) % (len(source.text) + 1)]
+        old = source.text[start:last] + source.text[last:].partition("\n")[0]
         new, at = "", start
         for edit in changes:
             new += source.text[at : edit.span.start] + edit.text

@@ -106,7 +106,6 @@ GROUPS: dict[str, dict[str, str]] = {
     "Code blocks": {
         "fence-unclosed": "A code block is not closed, or not before the next one.",
         "fence-info": "The first line of a fence cannot be read.",
-        "fence-kind": "The kind of a block that shows a file is no language that can be coloured.",
         "fence-key-unknown": "This kind of block has no such key.",
         "fence-key-repeated": "A fence has the same key twice.",
         "fence-key-value": "A key of a fence has a value that it does not take.",
@@ -247,8 +246,8 @@ GROUPS: dict[str, dict[str, str]] = {
 _MILD: dict[str, Severity] = {"shown-as-written": "hint"}
 _MILD |= dict.fromkeys(
     """
-    draft-empty fence-kind unit-unproven file-unlisted no-scripts theme-contrast template-outdated
-    heading-skip markup-foreign math-brackets math-command symbol-repeated footnote-unused image-alt
+    draft-empty unit-unproven file-unlisted no-scripts theme-contrast template-outdated heading-skip
+    markup-foreign math-brackets math-command symbol-repeated footnote-unused image-alt
     recording-loose script-unrepeatable script-penetration script-writes script-connects
     output-ambiguous output-noise report-stale bench-unrecorded lab-penetration lab-reset
     package-reduced
