@@ -298,11 +298,11 @@ export class Lab {
   }
 
   stepOnce() {
-    const { data, tape } = this
+    const { watch, tape } = this
     const numbers = this.advance()
     const before = this.began
-    const time = data.time // once, as each access goes through the bindings
-    const findings = this.watch.look(before, time)
+    const time = watch.numbers.time
+    const findings = watch.look(before, time)
     if (findings !== null) {
       this.warnings.push(...findings.warnings)
       if ((this.diverged = findings.diverged) !== null) return 'diverged'
@@ -322,7 +322,7 @@ export class Lab {
     recorder?.begin()
     if (this.code.controller) this.watched(() => call(['controller'], () => this.code.controller(this.env)))
     recorder?.controlled()
-    this.began = data.time // which the controller may have set
+    this.began = this.watch.numbers.time // which the controller may have set
     drag.push()
     const numbers = tape?.before() ?? null
     engine.mj.mj_step(model, data)

@@ -1,9 +1,9 @@
 /**
  * C structures of the engine, read directly from its memory.
  *
- * The bindings can only copy the warning counters and the geoms of a scene, object by object, which would cost more than a step.
- * Both are plain structures whose layout belongs to the engine's version. Before it is used, each reader compares its values with
- * those of the bindings, and throws on a difference.
+ * The bindings can only copy the warning counters and the geoms of a scene, object by object, which would cost more than a step; a
+ * number that is read through them after each step costs a tenth of a short one. All are plain structures whose layout belongs to the
+ * engine's version. Before it is used, each reader compares its values with those of the bindings, and throws on a difference.
  *
  * The engine's memory may grow, which detaches every array on it: a view that has become empty is made anew.
  */
@@ -15,9 +15,11 @@ const WRONG = 'the engine lays out its memory in another way than this version o
 /** The memory of the engine, found through any array of a model. */
 const memory = (data) => data.xpos.buffer
 
-/** Counts how often each of MuJoCo's warnings was raised since the last reset of the data. */
-export class WarningCounters {
-  /** @param {Record<string, any>} data MjData, which must outlive the counters */
+const REACH = 1024 // bytes behind the first warning counter, in which the other numbers lie
+
+/** What is looked at after each step: the time, the number of contacts, and how often each warning was raised since the last reset. */
+export class StepNumbers {
+  /** @param {Record<string, any>} data MjData, which must outlive the numbers */
   constructor(data) {
     this.data = data
     // A vector of {pointer to an mjWarningStat, owned}; the structures themselves lie in mjData, one behind the other.
@@ -26,28 +28,48 @@ export class WarningCounters {
     const words = new Int32Array(memory(data))
     const start = words[vector.$$.ptr >> 2] >> 2
     this.address = words[start]
-    for (let i = 0; i < this.count; i++) {
-      if (words[start + 2 * i] !== this.address + 8 * i) throw new EngineError(WRONG, true)
-    }
-    this.view = new Int32Array(0)
-    this.verify(vector)
+    this.ints = new Int32Array(0)
+    this.doubles = new Float64Array(0)
+    for (let i = 0; i < this.count; i++) this.verify(vector, i)
+    this.contactsAt = this.find('ncon', this.words(), 0x5eedbeef)
+    this.timeAt = this.find('time', this.doubles, Math.PI * 1e-300)
   }
 
-  verify(vector) {
-    for (let i = 0; i < this.count; i++) {
-      const before = this.number(i)
-      this.words()[2 * i + 1] = 1000 + i
-      const copy = vector.get(i)
-      const agrees = copy.number === 1000 + i
-      copy.delete()
-      this.words()[2 * i + 1] = before
-      if (!agrees) throw new EngineError(WRONG, true)
-    }
+  verify(vector, i) {
+    const before = this.number(i)
+    this.words()[2 * i + 1] = 1000 + i
+    const copy = vector.get(i)
+    this.words()[2 * i + 1] = before
+    if (copy.number !== 1000 + i) throw new EngineError(WRONG, true)
+    copy.delete()
+  }
+
+  /** Where a number of the data lies, which is found by writing one through the bindings. */
+  find(name, array, marker) {
+    const before = this.data[name]
+    this.data[name] = marker
+    const index = array.indexOf(marker)
+    this.data[name] = before
+    if (index < 0 || array[index] !== before) throw new EngineError(WRONG, true)
+    return index
   }
 
   words() {
-    if (this.view.length === 0) this.view = new Int32Array(memory(this.data), this.address, 2 * this.count)
-    return this.view
+    if (this.ints.length === 0) {
+      this.ints = new Int32Array(memory(this.data), this.address, REACH / 4)
+      this.doubles = new Float64Array(memory(this.data), this.address, REACH / 8)
+    }
+    return this.ints
+  }
+
+  /** s */
+  get time() {
+    this.words()
+    return this.doubles[this.timeAt]
+  }
+
+  get contacts() {
+    return this.words()[this.contactsAt]
   }
 
   /** How often warning `i` was raised. */
@@ -60,11 +82,11 @@ export class WarningCounters {
     return this.words()[2 * i]
   }
 
-  /** The sum of all counters. */
+  /** The sum of all warning counters. */
   total() {
     const words = this.words()
     let sum = 0
-    for (let i = 1; i < words.length; i += 2) sum += words[i]
+    for (let i = 0; i < this.count; i++) sum += words[2 * i + 1]
     return sum
   }
 }

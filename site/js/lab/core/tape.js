@@ -74,7 +74,7 @@ export class Tape {
   /** Note that there are more contacts than in the step before, or less. */
   touch(time) {
     const { touches, contacts } = this
-    this.contacts = this.lab.data.ncon
+    this.contacts = this.lab.watch.numbers.contacts
     if (contacts < 0 || contacts === this.contacts || time - touches.at(-1) < APART) return
     this.touches = [...touches, time].slice(-MOST_MARKS)
   }

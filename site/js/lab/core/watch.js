@@ -6,7 +6,7 @@
  * check at the next step. If the author has switched the reset on again, the counter still shows it.
  */
 
-import { WarningCounters } from './structs.js'
+import { StepNumbers } from './structs.js'
 
 const LARGEST = 1e10 // mjMAXVAL
 
@@ -18,8 +18,8 @@ export class Watch {
     this.engine = engine
     this.model = model
     this.data = data
-    this.counters = new WarningCounters(data)
-    this.counts = new Int32Array(this.counters.count)
+    this.numbers = new StepNumbers(data)
+    this.counts = new Int32Array(this.numbers.count)
     this.total = 0
     this.arrays = {}
     const { warning } = engine.k
@@ -34,8 +34,8 @@ export class Watch {
 
   /** Start anew: after a reset, or after lab code that may have repaired the state. */
   restart() {
-    for (let i = 0; i < this.counts.length; i++) this.counts[i] = this.counters.number(i)
-    this.total = this.counters.total()
+    for (let i = 0; i < this.counts.length; i++) this.counts[i] = this.numbers.number(i)
+    this.total = this.numbers.total()
   }
 
   /**
@@ -44,7 +44,7 @@ export class Watch {
    * @returns {{diverged: Finding | null, warnings: Finding[]} | null} null when all is well
    */
   look(before, time) {
-    if (this.counters.total() === this.total && time > before && this.isBounded('qpos') && this.isBounded('qvel')) return null
+    if (this.numbers.total() === this.total && time > before && this.isBounded('qpos') && this.isBounded('qvel')) return null
     const warnings = this.takeNew(time)
     const fatal = warnings.find((finding) => finding.fatal)
     return {
@@ -57,14 +57,14 @@ export class Watch {
   takeNew(time) {
     const findings = []
     for (let i = 0; i < this.counts.length; i++) {
-      const number = this.counters.number(i)
+      const number = this.numbers.number(i)
       if (number > this.counts[i]) {
-        const message = sentence(this.engine.mj.mju_warningText(i, this.counters.info(i)))
+        const message = sentence(this.engine.mj.mju_warningText(i, this.numbers.info(i)))
         findings.push({ time, kind: this.names[i], message, fatal: this.fatal.has(i) })
       }
       this.counts[i] = number
     }
-    this.total = this.counters.total()
+    this.total = this.numbers.total()
     return findings
   }
 
