@@ -104,7 +104,10 @@ class Watcher:
         self.root = root
         self.command = command
         self.began = time.time_ns()
-        self.before = self._look([])
+        try:
+            self.before: str | None = _State(root, self.began).digest()
+        except (OSError, _UnclearError):
+            self.before = None
 
     def keep(self, message: str, files: tuple[str, ...], outputs: tuple[str, ...]) -> bool:
         """Record the state, if it is certainly the one that the command saw; return whether it was.
@@ -117,13 +120,15 @@ class Watcher:
         output_paths = sorted(os.path.join(self.root, path) for path in outputs)
         if any("\n" in path for path in (*input_paths, *output_paths)):
             return False
-        if self.before is None or self._look([]) != self.before or self._look(input_paths) is None:
-            return False
         try:
-            state = _state(self.root, [*input_paths, *output_paths])
+            state = _State(self.root, self.began)
+            if state.digest() != self.before:
+                return False
+            state.add_paths(input_paths, self.began)
+            state.add_paths(output_paths)
         except (OSError, _UnclearError):
             return False
-        body = "\n".join((_HEADER, state, *input_paths, *output_paths, "", message))
+        body = "\n".join((_HEADER, state.digest(), *input_paths, *output_paths, "", message))
         data = body.encode("utf-8", "surrogateescape")
         name = _name(self.command)
         store, reason = trust.find_store(self.root)
@@ -137,13 +142,6 @@ class Watcher:
         except OSError:
             return False
         return True
-
-    def _look(self, input_paths: list[str]) -> str | None:
-        """The state of the inputs; `None` where it is not reliable."""
-        try:
-            return _state(self.root, input_paths, self.began)
-        except (OSError, _UnclearError):
-            return None
 
 
 def unchanged(root: str, command: tuple[str, ...]) -> str | None:
@@ -159,30 +157,39 @@ def unchanged(root: str, command: tuple[str, ...]) -> str | None:
         header, *lines = head.split("\n")
         if header != _HEADER:
             return None
-        return message if _state(root, lines[1:]) == lines[0] else None
+        state = _State(root)
+        state.add_paths(lines[1:])
+        return message if state.digest() == lines[0] else None
     except (OSError, ValueError, _UnclearError):
         return None
 
 
-def _state(root: str, input_paths: list[str], began: int | None = None) -> str:
-    """A hash over the stat of all that the command depends on.
+class _State:
+    """A hash over the stat of all that a command depends on: the course, the tool, added paths.
 
     Raises:
         _UnclearError: there is a link to a folder, whose content is elsewhere; or a file was
             changed after `began`, or so shortly before that its time proves nothing.
         OSError: something cannot be read.
     """
-    digest = hashlib.blake2b(digest_size=32)
 
-    def add(*parts: object) -> None:
-        digest.update("\0".join(map(str, (*parts, ""))).encode("utf-8", "surrogateescape") + b"\n")
+    def __init__(self, root: str, began: int | None = None) -> None:
+        self._hash = hashlib.blake2b(digest_size=32)
+        self._add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
+        self.add_paths([*(os.path.join(root, name) for name in FOLDERS), *_tool()], began)
 
-    add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
-    course = (os.path.join(root, name) for name in FOLDERS)
-    for path in (*course, *_tool(), *input_paths):
-        for row in _rows(path, began):
-            add(*row)
-    return digest.hexdigest()
+    def add_paths(self, paths: list[str], began: int | None = None) -> None:
+        for path in paths:
+            for row in _rows(path, began):
+                self._add(*row)
+
+    def _add(self, *parts: object) -> None:
+        row = "\0".join(map(str, (*parts, ""))) + "\n"
+        self._hash.update(row.encode("utf-8", "surrogateescape"))
+
+    def digest(self) -> str:
+        """The hash of what has been added until now."""
+        return self._hash.hexdigest()
 
 
 def _tool() -> list[str]:
