@@ -151,6 +151,7 @@ plots = [{ ymax = 3, traces = [{ label = "square", expr = "x**2" }] }]
     assert "leaves its plot: `height`, down to -19.6" in folder.main("check").out
 
 
+@pytest.mark.engine
 def test_models_are_live_on_their_pages_and_seen_in_the_gallery(site: BuiltSite) -> None:
     models = site.public / "models"
     for name, lab in (("ball", "1.2-lab-1"), ("a/still", "model-a-still"), ("lost", "model-lost")):
@@ -162,6 +163,7 @@ def test_models_are_live_on_their_pages_and_seen_in_the_gallery(site: BuiltSite)
     assert "<p>A box that nothing moves.</p>" in gallery
 
 
+@pytest.mark.engine
 def test_model_of_a_lab_is_published_for_the_editor_if_it_is_one_file(
     site: BuiltSite,
 ) -> None:
