@@ -33,14 +33,16 @@ from mjbench.columns import (
 from mjbench.reports.limits import stability_text, stray_timestep
 from mjbench.reports.scene_report import (
     ErrorParts,
+    ErrorQuantity,
     RowVerdict,
     ScenarioReport,
     WorkPrecisionRow,
 )
 from mjbench.reports.shown_errors import (
     ERROR_SLACK,
+    SEEN,
+    STEPPED,
     FrontPoint,
-    Quantity,
     Rows,
     front_point,
     horizon_error_text,
@@ -58,7 +60,7 @@ _NEGLIGIBLE = 0.01
 
 
 def mark_luck(
-    rows: Rows, limits: Mapping[str, float], quantity: Quantity
+    rows: Rows, limits: Mapping[str, float], quantity: ErrorQuantity
 ) -> tuple[WorkPrecisionRow, ...]:
     """Rows that say where their errors are luck.
 
@@ -95,7 +97,7 @@ def mark_luck(
     return tuple(marked_rows)
 
 
-def _luck_of_cone(row: WorkPrecisionRow, rival: WorkPrecisionRow, quantity: Quantity) -> str:
+def _luck_of_cone(row: WorkPrecisionRow, rival: WorkPrecisionRow, quantity: ErrorQuantity) -> str:
     """Why a smaller error than under the scene's own cone is luck; empty where it is none.
 
     Where the model under that cone errs no less, it has cancelled with the error of the timestep.
@@ -149,12 +151,10 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
 _UNRESOLVED = "no setting can be called better: the reference resolves no error of "
 
 
-def quantity_of(report: ScenarioReport) -> Quantity:
+def quantity_of(report: ScenarioReport) -> ErrorQuantity:
     """The error that settings are compared by first."""
-    for matches in report.quantities:
-        if matches.name == report.main:
-            return Quantity(matches.name, matches.label, matches.least)
-    return Quantity("seen", "", report.least_seen)
+    matches = (quantity for quantity in report.quantities if quantity.name == report.main)
+    return next(matches, replace(SEEN, least=report.least_seen))
 
 
 def _judge_rival(
@@ -193,7 +193,7 @@ def _judge_rival(
     text = f"{rival.name} is better: it {price} and {_gain_text(everywhere, figure)}"
     quantity = quantity_of(report)
     if quantity.name == "seen" and rival.step_error is not None:
-        quantity = Quantity("step_error", "", report.least_seen)
+        quantity = replace(STEPPED, least=report.least_seen)
     if not resolved:
         text += _AS_FAR
     elif (value := quantity.value_of(rival)) is not None and value <= quantity.least:
@@ -237,7 +237,7 @@ def _is_cheap(row: WorkPrecisionRow) -> bool:
 
 
 def _describe_rival(
-    report: ScenarioReport, own_place: FrontPoint, quantity: Quantity
+    report: ScenarioReport, own_place: FrontPoint, quantity: ErrorQuantity
 ) -> tuple[str, tuple[str, ...]]:
     """The cheapest setting that would be better by one number, and why it is not; empty if none."""
     row = _cheapest_rival(report, own_place, quantity)
@@ -255,7 +255,7 @@ def _describe_rival(
 
 
 def _cheapest_rival(
-    report: ScenarioReport, own_place: FrontPoint, quantity: Quantity
+    report: ScenarioReport, own_place: FrontPoint, quantity: ErrorQuantity
 ) -> WorkPrecisionRow | None:
     points = [
         (point, row)
@@ -288,8 +288,6 @@ def compared_rows(report: ScenarioReport) -> dict[int, WorkPrecisionRow]:
     rows = [baseline, rival_row(report)]
     if report.parts is not None and report.parts.dominant:
         rows.append(_mending_row(report, baseline, report.parts.dominant))
-    if baseline.seen is not None and baseline.seen >= 1:
-        rows.append(_cheapest_unseen(report.rows))
     numbers = [next(n for n, r in enumerate(report.rows) if r is row) for row in rows if row]
     return {number: report.rows[number] for number in dict.fromkeys(numbers)}
 
@@ -307,7 +305,7 @@ def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
     return text
 
 
-def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> RowVerdict:
+def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: ErrorQuantity) -> RowVerdict:
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
     candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := front_point(r, quantity))]
@@ -316,39 +314,19 @@ def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> R
     better = min(candidates, key=lambda c: (c[0].error, c[0].cost.value, c[1]))[1]
     text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
     text += _AS_FAR if min(p.error for p, _ in candidates) <= quantity.least else ""
-    unseen = [(p.cost.value, n) for p, n in candidates if (rows[n].seen or 0.0) < 1]
-    cost, cheapest = min(unseen, default=(0.0, better))
-    if cheapest != better:
-        share = cost / next(p.cost.value for p, n in candidates if n == better)
-        text += f", {setting_text(rows[cheapest].setting)} the cheapest without an error that is "
-        text += f"seen, at {share:.2g} of its cost"
     return RowVerdict(False, better, None, text)
 
 
 def _describe_error(report: ScenarioReport, own_row: WorkPrecisionRow) -> str:
-    """Whether the own error is seen, and where it is, the cheapest setting with one that is not."""
-    rows, error, least = report.rows, own_row.seen or 0.0, report.least_seen
+    """Whether the own error is seen."""
+    error, least = own_row.seen or 0.0, report.least_seen
     if not error:
         return "; the scene's own setting makes no error"
     if error < 1:
         size = f"{'less than ' if error <= least else ''}{error:.2g}"
         return f"; the scene's own error cannot be seen: it is {size} of what an eye can tell"
-    text = "; the scene's own error can be seen: it is "
-    text += f"{number_text(error)} times what an eye can tell"
-    unseen = _cheapest_unseen(rows)
-    if own_row.cost is None:
-        return text
-    if unseen is not None:
-        text += f"; the cheapest without one that is seen is {unseen.name}, which {_price(unseen)}"
-    elif all(r.seen >= 1 for r in rows if r.seen is not None):
-        text += ", and that of every other setting too"
-    return text
-
-
-def _cheapest_unseen(rows: Rows) -> WorkPrecisionRow | None:
-    """The cheapest setting with an error that cannot be seen; `None` if there is none."""
-    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost and not r.lucky]
-    return min(unseen, key=lambda r: r.cost.value if r.cost else 0.0, default=None)
+    times = number_text(error)
+    return f"; the scene's own error can be seen: it is {times} times what an eye can tell"
 
 
 def five_lines(report: ScenarioReport) -> tuple[str, ...]:

@@ -11,8 +11,6 @@
    shown. Theory is asked only where the scenario comes near to that rest.
 3. Stability need not be monotone. A grid, even in the logarithm, is tried down to a tenth of the
    shortest timestep that is lost, and about it from all starts; a bisection follows.
-4. Where nothing drives a scene, its energy cannot rise. The first timestep at which it does is a
-   limit of its own, often far below the first loss.
 """
 
 from __future__ import annotations
@@ -56,7 +54,6 @@ from mjbench.stability_runs import (
     StabilityTrial,
     kept_motion,
     run_trial,
-    step_count,
 )
 
 _REACH, _NEAR = 10.0, 2.0
@@ -68,9 +65,6 @@ _QUICK_GRID, _COARSE, _QUICK_CLOSER = 6, 1e-2, 8
 timesteps that are tried from half the limit up to it."""
 _SMALL_STEPS = 100_000
 """Steps of the run that says how much energy there can be, at most."""
-_GAIN, _GAIN_RESOLUTION = 0.01, 0.02
-"""The share of the largest kinetic energy that counts as a rise of energy, and the width at which
-its timestep is known."""
 _SHARE = 0.4
 """Of the time that is left, what the search of an integrator may take."""
 _SETTLED_STEPS = 2000
@@ -153,7 +147,7 @@ def with_energy_bound(problem: Problem) -> Problem:
     energy = simulate(longer, compile_model(problem.mjcf, Integrator.RK4, step)).energy
     most, kinetic = float(energy.sum(axis=1).max()), float(energy[:, 1].max())
     bound = most + problem.room * kinetic
-    return replace(problem, energy_bound=bound, energy=most, kinetic=kinetic)
+    return replace(problem, energy_bound=bound)
 
 
 def boundary(
@@ -203,9 +197,8 @@ def search_row(
 
     1. From the own start over the span: a grid, falling, down to a tenth of the largest timestep
        below which nothing was lost, a bisection at its end, and a finer grid below that.
-    2. About that all starts over both spans, which makes the map; then a bisection for the start
-       that is lost first, and one for the own start over the doubled span.
-    3. Where nothing drives the motion, the first timestep at which energy rises.
+    2. About that all starts over both spans; then a bisection for the start that is lost first, and
+       one for the own start over the doubled span.
     """
     low, high = search
     count = max(2, round((_QUICK_GRID if quick else _GRID) * math.log10(high / low)) + 1)
@@ -231,11 +224,9 @@ def search_row(
         estimates.append(estimate(min(by_start, key=lambda n: by_start[n]), resolution))
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
     limit = theory.limit(integrator, search)
-    gain = _first_gain(laboratory, grid, setup)
     near_limit = _limit_of(laboratory, grid, resolution, "astray")
     through_limit = _limit_of(laboratory, grid, resolution, "through")
     steps = laboratory.own_steps()
-    stable_steps = [h for h in steps if h <= largest]
     islands = [h for h in steps if h > largest and not laboratory.is_lost(0, h)]
     lost = [h for h in steps if laboratory.is_lost(0, h)]
     is_all = math.isinf(largest)
@@ -250,14 +241,10 @@ def search_row(
         searched=(steps[0], steps[-1]),
         islands=(islands[0], islands[-1]) if islands and not is_all else None,
         duration=laboratory.span,
-        steps=step_count(laboratory.span, max(stable_steps, default=steps[0])),
-        tried=len(stable_steps),
         energy=_finite(setup.energy_bound),
         bracket=(min(bounds), max(bounds)) if estimates and min(bounds) < grid[-1] else None,
         theory=None if limit is None else reach(limit.timestep),
         formula="" if limit is None else limit.source,
-        gain=gain,
-        tries=_tries(laboratory),
     )
 
 
@@ -326,39 +313,6 @@ def _look_closer(
         grid = [*(step for step in grid if step < lost), lost]
         largest = bisect(is_lost, grid, resolution)
     return largest
-
-
-def _first_gain(
-    laboratory: Laboratory, grid: Sequence[float], setup: Setup
-) -> tuple[float, float] | None:
-    """The first timestep (s) at which energy rises in a scene that nothing drives, and by how much.
-
-    `None` where it does not before the run is lost, or something drives it.
-    """
-    if not math.isfinite(setup.energy):
-        return None
-    least = _GAIN * setup.kinetic
-    lost = [h for h in laboratory.own_steps() if laboratory.is_lost(0, h)]
-    grid = [*(h for h in grid if not lost or h < lost[0]), *lost[:1]]
-
-    def gain(step: float) -> float:
-        trial = laboratory.trial(0, step)
-        return trial.energy - setup.energy
-
-    lossless = bisect(lambda h: not gain(h) <= least, grid, _GAIN_RESOLUTION, _NEAR)
-    if math.isinf(lossless):
-        return None
-    first = min(h for h in laboratory.own_steps() if h > lossless and not gain(h) <= least)
-    return first, gain(first) if math.isfinite(gain(first)) else 0.0
-
-
-def _tries(laboratory: Laboratory) -> tuple[tuple[float, int, int], ...]:
-    """By timestep the number of runs, from all starts over both spans, and of those lost."""
-    counts: dict[float, tuple[int, int]] = {}
-    for (_, step), runs in laboratory.trials.items():
-        total, lost = counts.get(step, (0, 0))
-        counts[step] = total + len(runs), lost + sum(not run.stable for run in runs.values())
-    return tuple((step, *counts[step]) for step in sorted(counts))
 
 
 _SEARCH, _LOWER = (0.25, 64.0), 8.0

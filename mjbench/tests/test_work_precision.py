@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from mjbench.problem import Array
 from mjbench.reports.scene_report import ScenarioReport
-from mjbench.scene import ExactMotion, ExactStates, SceneError, scenes
+from mjbench.scene import ExactMotion, SceneError, scenes
 from mjbench.work_precision import measure_scenario
 from samples.runs import BOX, FLIP, measure, orders, row, with_search
 from samples.surveys import parse_declared
@@ -354,9 +354,9 @@ sample = 0.08
 """
     (scene,) = scenes(model, parse_declared(text), quick=True)
 
-    def states(times: Array, qpos: Array, qvel: Array) -> ExactStates:
+    def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array]:
         turns = np.column_stack([qpos[0] + qvel[0] * times, np.full_like(times, qpos[1])])
-        return ExactStates({"motion": (turns, np.tile(qvel, (len(times), 1)))})
+        return turns, np.tile(qvel, (len(times), 1))
 
     scene = replace(scene, exact=ExactMotion("a.exact.py", states))
     advance, now = mujoco.mj_step, [0]
@@ -402,5 +402,3 @@ def test_where_a_declared_error_is_not_resolved_what_is_seen_is_compared() -> No
     assert {line.figure for line in report.rows} == {(0.0, 0.0)}
     (chart,) = report.charts
     assert [level.text for level in chart.levels] == ["just visible"]
-    titles = [point.title for line in chart.lines for point in line.points]
-    assert any(title.endswith("on the Pareto front") for title in titles)

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.api import Command, Feature, Library, PageKind, urls
-from coursebuild.core.model.measurements import CaseReport, FigureLine, SceneReport
+from coursebuild.core.model.measurements import CaseReport, FigureLine
 from coursebuild.core.model.report_files import STABILITY
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids, scenario_view
@@ -45,8 +45,6 @@ class CaseView(Struct, frozen=True):
     folded_plots: tuple[Markup, ...]
     tables: tuple[grids.Grid, ...]
     notes: tuple[str, ...]
-    page: str
-    """The address of the model's page, for a case of the course's own; else empty."""
 
 
 class MatrixCell(Struct, frozen=True):
@@ -67,7 +65,7 @@ class MatrixRow(Struct, frozen=True):
 
 
 class CaseFamily(Struct, frozen=True):
-    """Cases of one number, or of the course's own, in the picture of all cases."""
+    """Cases of one number, in the picture of all cases."""
 
     title: str
     href: str
@@ -79,9 +77,7 @@ _SHADES = 3
 
 def _families(library: Library) -> dict[str, tuple[CaseReport, ...]]:
     """The cases by the id of their family, which names its page."""
-    scenes: Mapping[str, SceneReport] = library.reports.scenes
-    course_reports = [report for name in sorted(scenes) for report in scenes[name].cases]
-    cases = [*sorted(library.reports.cases, key=attrgetter("case")), *course_reports]
+    cases = sorted(library.reports.cases, key=attrgetter("case"))
     return {
         f"case-{number}": tuple(reports)
         for number, reports in groupby(cases, key=attrgetter("case"))
@@ -89,9 +85,8 @@ def _families(library: Library) -> dict[str, tuple[CaseReport, ...]]:
 
 
 def _family_title(words: Strings, reports: tuple[CaseReport, ...]) -> str:
-    number, key = reports[0].case, f"numerics.case_{reports[0].case}"
-    has_own_title = (not number or len(reports) > 1) and words.has(key)
-    return words(key) if has_own_title else reports[0].title
+    key = f"numerics.case_{reports[0].case}"
+    return words(key) if len(reports) > 1 and words.has(key) else reports[0].title
 
 
 def numerics_values(library: Library) -> dict[str, object]:
@@ -119,7 +114,7 @@ def family_values(library: Library, part: str) -> dict[str, object]:
     return {
         "title": _family_title(words, reports),
         "up": place.href(KIND.path),
-        "cases": tuple(case_view(words, place, report) for report in reports),
+        "cases": tuple(case_view(words, report) for report in reports),
         **_sources(library, place),
     }
 
@@ -165,9 +160,8 @@ def _cells(figures: Mapping[str, tuple[float, str]]) -> tuple[MatrixCell, ...]:
     return tuple(cells)
 
 
-def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
+def case_view(words: Strings, report: CaseReport) -> CaseView:
     """A case as the page shows it."""
-    model = "" if report.case else report.name.rpartition("/")[0]
     label = words("numerics.orders", title=report.title)
     orders = scenario_view.orders_table(words, label, report.orders, merge=True)
     rows = [
@@ -201,7 +195,6 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
         tuple(filter(None, drawings[1:])),
         tuple(grid for grid in tables if grid is not None),
         tuple(_notes(words, report)),
-        place.href(urls.model_page_path(model)) if model else "",
     )
 
 
