@@ -14,6 +14,7 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.api import Command, Feature, Library, PageKind, urls
+from coursebuild.core.model.addresses import document_anchors
 from coursebuild.core.model.measurements import CaseReport, FigureLine
 from coursebuild.core.model.report_files import STABILITY
 from coursebuild.core.pages.renderer import Strings
@@ -45,6 +46,14 @@ class CaseView(Struct, frozen=True):
     folded_plots: tuple[Markup, ...]
     tables: tuple[grids.Grid, ...]
     notes: tuple[str, ...]
+
+
+class LabLink(Struct, frozen=True):
+    """A lab in which a reader tries what a family is about."""
+
+    lesson: str
+    """The title of where it is."""
+    href: str
 
 
 class MatrixCell(Struct, frozen=True):
@@ -114,9 +123,22 @@ def family_values(library: Library, part: str) -> dict[str, object]:
     return {
         "title": _family_title(words, reports),
         "up": place.href(KIND.path),
+        "labs": tuple(_labs(library, place, reports)),
         "cases": tuple(case_view(words, report) for report in reports),
         **_sources(library, place),
     }
+
+
+def _labs(
+    library: Library, place: urls.Place, reports: tuple[CaseReport, ...]
+) -> Iterator[LabLink]:
+    """The first lab of each lesson whose label, `lab:NAME`, names a case or a family of them."""
+    names = tuple(f"lab:{report.name}-" for report in reports)
+    for owner, document in library.course.owned_documents:
+        for anchor, _, _ in document_anchors(document):
+            if anchor.startswith("lab:") and any(name.startswith(f"{anchor}-") for name in names):
+                yield LabLink(owner.title, place.href(urls.owner_path(owner), anchor))
+                break
 
 
 def _sources(library: Library, place: urls.Place) -> dict[str, object]:

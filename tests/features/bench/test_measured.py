@@ -199,6 +199,17 @@ def picture(page: str) -> dict[str, list[str]]:
     }
 
 
+def test_the_page_of_a_family_links_the_labs_with_its_label(make: Make) -> None:
+    lab = 'x = {min = 0, max = 1}\nplots = [{traces = [{label = "y", expr = "x"}]}]'
+    texts = (f"```lab plot {{#lab:{name}}}\n{lab}\n```\n" for name in ("spring", "top"))
+    files = make("## A\n\n" + "\n".join(texts)).site(
+        reports=Reports(cases=(case("spring-1", 5), case("springs", 6), case("top", 3)))
+    )
+    page = files["numerics/case-5.html"].decode()
+    assert re.findall(r'href="[^"]*(#lab[^"]*)">Try it in a lab: ', page) == ["#lab%3Aspring"]
+    assert b"Try it in a lab" not in files["numerics/case-6.html"]
+
+
 def test_the_page_begins_with_a_picture_of_cases_and_integrators(make: Make) -> None:
     lost = replace(case().boundaries[0], largest="none")
     costs = (StepCost("RK4", interval(1e-6)),)
