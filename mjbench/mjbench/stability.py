@@ -84,6 +84,8 @@ class Laboratory(Struct, frozen=True, eq=False):
     anything goes `through` anything, where it can touch."""
     shortest: float = math.inf
     """The shortest timestep at which that is asked, s."""
+    snap: Callable[[float], float] = float
+    """A timestep → the longest one up to it that is tried, s: all of them, or those of a loop."""
     trials: dict[tuple[int, float], dict[int, StabilityTrial]] = field(default_factory=dict)
     """By start and timestep, and by the number of spans."""
 
@@ -202,20 +204,21 @@ def search_row(
     """
     low, high = search
     count = max(2, round((_QUICK_GRID if quick else _GRID) * math.log10(high / low)) + 1)
-    grid: list[float] = np.geomspace(low, high, count).tolist()
+    grid = sorted(set(map(laboratory.snap, np.geomspace(low, high, count).tolist())))
     resolution = _COARSE if quick else _FINE
     for kind in laboratory.questions:  # which matter most; their runs say what is bounded too
         _limit_of(laboratory, grid, resolution, kind)
     is_lost = partial(laboratory.is_lost, 0)
-    largest = bisect(is_lost, grid, _COARSE)
+    largest = bisect(is_lost, grid, _COARSE, snap=laboratory.snap)
     if closer:
-        largest = _look_closer(is_lost, grid, resolution, quick)
+        largest = _look_closer(laboratory, grid, resolution, quick)
     near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
     # A first look asks other starts and times about that limit alone, where most of them fail.
     enough = min(largest, grid[-1]) / _NEAR if quick else 0.0
 
     def estimate(start: int, width: float) -> float:
-        return bisect(partial(laboratory.is_lost, start, spans=2), near, width, _NEAR, enough)
+        is_lost = partial(laboratory.is_lost, start, spans=2)
+        return bisect(is_lost, near, width, _NEAR, enough, laboratory.snap)
 
     estimates = [estimate(0, resolution)] if closer else []
     starts = range(1, laboratory.starts if closer else 1)
@@ -265,7 +268,7 @@ def _limit_of(
     def is_lost(step: float) -> bool:
         return bool(getattr(laboratory.trial(0, step), kind))
 
-    largest = bisect(is_lost, steps, max(resolution, _COARSE), math.inf)
+    largest = bisect(is_lost, steps, max(resolution, _COARSE), math.inf, snap=laboratory.snap)
     lost = [h for h in laboratory.own_steps() if h > largest and is_lost(h)]
     return reach(largest), getattr(laboratory.trial(0, lost[0]), kind) if lost else ""
 
@@ -276,11 +279,12 @@ def bisect(
     resolution: float,
     reach: float = _REACH,
     enough: float = 0.0,
+    snap: Callable[[float], float] = float,
 ) -> float:
     """The largest timestep below which none is lost: infinite for all of the grid, 0 for none.
 
     The grid is tried from above, down to `1 / reach` of the shortest that is lost, or to `enough`
-    (s) where none is.
+    (s) where none is. `snap`: as of a `Laboratory`.
     """
     lost = math.inf
     stable = 0.0
@@ -294,24 +298,28 @@ def bisect(
     if math.isinf(lost) or not stable:
         return math.inf if math.isinf(lost) else 0.0
     while lost / stable > 1 + resolution:
-        middle = math.sqrt(lost * stable)
+        middle = snap(math.sqrt(lost * stable))
+        if middle <= stable:  # none that is tried lies between
+            break
         lost, stable = (middle, stable) if is_lost(middle) else (lost, middle)
     return stable
 
 
 def _look_closer(
-    is_lost: Callable[[float], bool], grid: list[float], resolution: float, quick: bool
+    laboratory: Laboratory, grid: list[float], resolution: float, quick: bool
 ) -> float:
     """`bisect`, until none of many timesteps below is lost: with impacts islands are narrow."""
-    largest = bisect(is_lost, grid, resolution)
+    is_lost, snap = partial(laboratory.is_lost, 0), laboratory.snap
+    largest = bisect(is_lost, grid, resolution, snap=snap)
     while largest:
         top = min(largest, grid[-1])
-        closer = np.geomspace(top / _NEAR, top, _QUICK_CLOSER if quick else _CLOSER).tolist()
+        count = _QUICK_CLOSER if quick else _CLOSER
+        closer = sorted(set(map(snap, np.geomspace(top / _NEAR, top, count).tolist())))
         lost = next((step for step in closer[1:-1] if is_lost(step)), None)
         if lost is None:
             break
         grid = [*(step for step in grid if step < lost), lost]
-        largest = bisect(is_lost, grid, resolution)
+        largest = bisect(is_lost, grid, resolution, snap=snap)
     return largest
 
 
@@ -374,7 +382,9 @@ def stable_rows(
         if search[1] <= search[0]:
             return None
         starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
-        laboratory = Laboratory(run, span, starts, questions, shortest)
+        loop = scene.scenario.loop
+        snap = float if loop is None else loop.timestep_below
+        laboratory = Laboratory(run, span, starts, questions, shortest, snap)
         look = partial(find, laboratory, integrator, search)
         try:
             return look(closer=False), partial(look, closer=True)

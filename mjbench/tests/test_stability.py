@@ -13,10 +13,10 @@ import pytest
 from msgspec.structs import replace
 
 from mjbench import stability
-from mjbench.declarations import Declarations, DeclaredScenario, Place
+from mjbench.declarations import Declarations, DeclaredScenario, Place, is_multiple
 from mjbench.detector import RunStatus
 from mjbench.linearization import Theory, find_rest, find_theory
-from mjbench.loop import TimeLimitError
+from mjbench.loop import Loop, TimeLimitError
 from mjbench.parts import Parts
 from mjbench.pilot import run_pilot
 from mjbench.problem import STANDARD, Integrator, Scenario, Setup
@@ -87,7 +87,10 @@ DISCRETE = "implicit in positions and velocities"
 
 
 def search(
-    lost: Callable[[int, float, float], bool], interval: tuple[float, float], starts: int = 3
+    lost: Callable[[int, float, float], bool],
+    interval: tuple[float, float],
+    starts: int = 3,
+    snap: Callable[[float], float] = float,
 ) -> StableRow:
     """What a laboratory finds whose runs from a start, at a timestep and over a time, are lost."""
 
@@ -96,7 +99,7 @@ def search(
         return StabilityTrial(step, status, 1.0)
 
     setup = Setup(scenario=Scenario(5.0, 5.0))
-    laboratory = Laboratory(run, 5.0, starts)
+    laboratory = Laboratory(run, 5.0, starts, snap=snap)
     return search_row(laboratory, Integrator.RK4, interval, setup, Theory())
 
 
@@ -128,6 +131,19 @@ def test_narrow_islands_below_the_limit_are_looked_for() -> None:
         assert row.largest == pytest.approx(low, rel=2e-4)
     row = search(lambda _, step, __: 600 < step < 620, (1.0, 1000.0))
     assert row.largest == pytest.approx(600, rel=2e-4), "though all of the grid is stable"
+
+
+def test_below_the_period_of_a_controller_only_its_divisors_are_tried() -> None:
+    """At others commands are late, from one period to the next by another part of a step."""
+    loop, steps = Loop("policy.py", compile("", "", "exec"), 0.1), set()
+
+    def is_lost(_: int, step: float, __: float) -> bool:
+        steps.add(step)
+        return step > 0.04
+
+    row = search(is_lost, (0.001, 1.0), snap=loop.timestep_below)
+    assert row.largest == pytest.approx(0.1 / 3)
+    assert all(is_multiple(0.1, step) or step > 0.1 for step in steps)
 
 
 def test_a_limit_is_known_as_far_as_spans_and_starts_agree() -> None:
