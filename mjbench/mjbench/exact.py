@@ -14,7 +14,7 @@ import sys
 import numpy as np
 
 
-def main(file: str, request: str) -> None:
+def answer(file: str, request: str) -> str:
     """Answer a request: the states at its `times`, from its initial `qpos` and `qvel`."""
     query = json.loads(request)
     begin = [np.array(query[name]) for name in ("qpos", "qvel")]
@@ -26,11 +26,10 @@ def main(file: str, request: str) -> None:
             parts = result if isinstance(result, tuple) else (result,)
             states.append([np.asarray(part, dtype=float).ravel().tolist() for part in parts])
     try:
-        text = json.dumps(states, allow_nan=False)
+        return json.dumps(states, allow_nan=False)
     except ValueError:
         raise ValueError("a number that it gives is infinite, or not a number") from None
-    print(text)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    print(answer(*sys.argv[1:]))
