@@ -14,7 +14,13 @@ from typing import TypeAlias
 from msgspec import Struct
 
 from mjbench.reports.scene_report import FLOORS, ScenarioReport, WorkPrecisionRow
-from mjbench.reports.shown_errors import ERROR_SLACK, FrontPoint, Rows, mark_front
+from mjbench.reports.shown_errors import (
+    ERROR_SLACK,
+    Rows,
+    is_cheaper,
+    is_no_dearer,
+    mark_front,
+)
 
 Column: TypeAlias = tuple[str, str]
 """The name of an error, and a stretch of time in words."""
@@ -202,12 +208,12 @@ def mark_dominated(report: ScenarioReport) -> Rows:
     def beats(rival: int, baseline: int) -> bool:
         if rows[rival].parted is not None and rows[baseline].parted is None:
             return False  # it has no error that is known, for it is off
-        prices = [FrontPoint(cost, 0.0) for n in (rival, baseline) if (cost := rows[n].cost)]
+        prices = [cost for n in (rival, baseline) if (cost := rows[n].cost)]
         changes = ratios(columns[baseline], columns[rival], leasts).values()
         if any(change > 1 + ERROR_SLACK for change in changes):
             return False
         is_nearer = any(change * (1 + ERROR_SLACK) < 1 for change in changes)
-        return prices[0].is_cheaper(prices[1]) or (is_nearer and prices[0].is_no_dearer(prices[1]))
+        return is_cheaper(*prices) or (is_nearer and is_no_dearer(*prices))
 
     return mark_front(rows, {n: worth(n) for n in sorted(present)}, beats)
 

@@ -42,10 +42,9 @@ from mjbench.reports.shown_errors import (
     ERROR_SLACK,
     SEEN,
     STEPPED,
-    FrontPoint,
     Rows,
-    front_point,
     horizon_error_text,
+    is_cheaper,
     seconds_text,
     setting_text,
 )
@@ -130,15 +129,14 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
     if not any(map(quantity.value_of, rows)):
         text = "no setting can be called better: none errs, as where nothing moves"
         return RowVerdict(False, None, noticeable, text)
-    own_place = front_point(row, quantity)
-    if own_place is None:
+    if row.cost is None or quantity.value_of(row) is None:
         text = "nothing was timed, so no setting can be called better"
         return RowVerdict(False, None, noticeable, text + remark)
     if row.dominated_by is None and row.lucky:
         text = f"nothing can be said of the scene's own setting: {row.lucky}"
         return RowVerdict(False, None, noticeable, text + remark)
     if row.dominated_by is None:
-        text, worse = _describe_rival(report, own_place, quantity)
+        text, worse = _describe_rival(report)
         scope = " that was measured" if report.failures else ""
         text = text or f"no other setting{scope} is cheaper without being less accurate"
         return RowVerdict(True, None, noticeable, text + remark, worse)
@@ -236,11 +234,9 @@ def _is_cheap(row: WorkPrecisionRow) -> bool:
     return row.cost is not None and row.cost.value <= 1 - _WORTH_SAYING and row.cost.high < 1
 
 
-def _describe_rival(
-    report: ScenarioReport, own_place: FrontPoint, quantity: ErrorQuantity
-) -> tuple[str, tuple[str, ...]]:
+def _describe_rival(report: ScenarioReport) -> tuple[str, tuple[str, ...]]:
     """The cheapest setting that would be better by one number, and why it is not; empty if none."""
-    row = _cheapest_rival(report, own_place, quantity)
+    row = _cheapest_rival(report)
     baseline = report.own_row
     if row is None or baseline is None:
         return "", ()
@@ -254,27 +250,29 @@ def _describe_rival(
     return f"no setting is better: {row.name} {_price(row)}, but {texts[0]}", texts
 
 
-def _cheapest_rival(
-    report: ScenarioReport, own_place: FrontPoint, quantity: ErrorQuantity
-) -> WorkPrecisionRow | None:
-    points = [
-        (point, row)
-        for row in report.rows
-        if row.status == "ok" and (point := front_point(row, quantity))
+def _cheapest_rival(report: ScenarioReport) -> WorkPrecisionRow | None:
+    """The cheapest setting that costs less and errs no more, by the error compared first."""
+    baseline, quantity = report.own_row, quantity_of(report)
+    error = None if baseline is None else quantity.value_of(baseline)
+    if baseline is None or (own_cost := baseline.cost) is None or error is None:
+        return None
+    rivals = [
+        (cost.value, number)
+        for number, row in enumerate(report.rows)
+        if row.status == "ok" and (cost := row.cost) is not None and is_cheaper(cost, own_cost)
+        if (value := quantity.value_of(row)) is not None and value <= error * (1 + ERROR_SLACK)
     ]
-    cheaper = [(p, r) for p, r in points if p.is_cheaper(own_place) and p.beats(own_place)]
-    return min(cheaper, key=lambda pair: pair[0].cost.value)[1] if cheaper else None
+    return report.rows[min(rivals)[1]] if rivals else None
 
 
 def rival_row(report: ScenarioReport) -> WorkPrecisionRow | None:
     """The setting that a verdict compares with the own one; `None` where there is none."""
-    baseline, quantity = report.own_row, quantity_of(report)
+    baseline = report.own_row
     if baseline is None or baseline.status != "ok" or baseline.parted is not None:
         return None
     if baseline.dominated_by is not None:
         return report.rows[baseline.dominated_by]
-    own_place = front_point(baseline, quantity)
-    return None if own_place is None else _cheapest_rival(report, own_place, quantity)
+    return _cheapest_rival(report)
 
 
 def compared_rows(report: ScenarioReport) -> dict[int, WorkPrecisionRow]:
@@ -308,12 +306,16 @@ def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
 def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: ErrorQuantity) -> RowVerdict:
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
-    candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := front_point(r, quantity))]
+    candidates = [
+        (error, row.cost.value, number)
+        for number, row in enumerate(rows)
+        if row.front and row.cost is not None and (error := quantity.value_of(row)) is not None
+    ]
     if not candidates:
         return RowVerdict(False, None, None, text)
-    better = min(candidates, key=lambda c: (c[0].error, c[0].cost.value, c[1]))[1]
+    error, _, better = min(candidates)
     text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
-    text += _AS_FAR if min(p.error for p, _ in candidates) <= quantity.least else ""
+    text += _AS_FAR if error <= quantity.least else ""
     return RowVerdict(False, better, None, text)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench.reports import Interval
@@ -75,34 +74,14 @@ COST_SLACK, ERROR_SLACK = 0.03, 0.05
 Rows: TypeAlias = Sequence[WorkPrecisionRow]
 
 
-class FrontPoint(Struct, frozen=True):
-    """The place of a setting in the plot."""
-
-    cost: Interval
-    error: float
-
-    def beats(self, rival: FrontPoint) -> bool:
-        """Whether this is clearly better in one respect, and no worse in the other."""
-        is_more_accurate = self.error * (1 + ERROR_SLACK) < rival.error
-        is_no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
-        return (self.is_cheaper(rival) and is_no_worse) or (
-            is_more_accurate and self.is_no_dearer(rival)
-        )
-
-    def is_cheaper(self, rival: FrontPoint) -> bool:
-        """Whether this costs less, beyond what timing can tell."""
-        is_separate = self.cost.high < rival.cost.low
-        return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
-
-    def is_no_dearer(self, rival: FrontPoint) -> bool:
-        """Whether this costs no more: where times are uncertain, by the likeliest ones."""
-        return self.cost.value <= rival.cost.value * (1 + COST_SLACK)
+def is_cheaper(cost: Interval, rival: Interval) -> bool:
+    """Whether a cost is less than another, beyond what timing can tell."""
+    return cost.high < rival.low and cost.value * (1 + COST_SLACK) < rival.value
 
 
-def front_point(row: WorkPrecisionRow, quantity: ErrorQuantity) -> FrontPoint | None:
-    """The cost and error of a setting; `None` where it was lost, or not timed."""
-    error = quantity.value_of(row)
-    return None if row.cost is None or error is None else FrontPoint(row.cost, error)
+def is_no_dearer(cost: Interval, rival: Interval) -> bool:
+    """Whether a cost is no more than another: where times are uncertain, by the likeliest ones."""
+    return cost.value <= rival.value * (1 + COST_SLACK)
 
 
 def mark_front(
