@@ -127,9 +127,7 @@ def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...
                 claim, semicolon, remark = verdict.text.partition("; ")
                 claim = claim.replace(" is better: it ", " ", 1)
                 text = f"no difference that holds: here {claim}, but {reason}{semicolon}{remark}"
-                verdict = replace(
-                    verdict, on_front=True, better=None, text=text, worse=(reason, *verdict.worse)
-                )
+                verdict = replace(verdict, better=None, text=text, worse=(reason, *verdict.worse))
                 report = _with_lines(replace(report, verdict=verdict))
         derived.append(report)
     return tuple(derived)

@@ -116,37 +116,28 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
     quantity, rows = quantity_of(report), report.rows
     own_index = next(number for number, row in enumerate(rows) if row.own)
     row = rows[own_index]
-    is_seen = row.seen is not None and max(1.0, row.seen) > report.least_seen
-    noticeable = row.seen is not None and row.seen >= 1 if is_seen else None
     if row.reasons:
         return _verdict_of_lost(rows, row, quantity)
-    remark = "; whether the scene's own error can be seen is not known"
-    if noticeable is not None:
-        remark = _describe_error(report, row)
+    remark = _describe_error(report, row)
     if row.parted is not None:
         text = _verdict_of_chaos(rows, row, horizon_error_text(report.horizon_error))
-        return RowVerdict(False, None, noticeable, text)
+        return RowVerdict(None, text)
     if not any(map(quantity.value_of, rows)):
         text = "no setting can be called better: none errs, as where nothing moves"
-        return RowVerdict(False, None, noticeable, text)
+        return RowVerdict(None, text)
     if row.cost is None or quantity.value_of(row) is None:
         text = "nothing was timed, so no setting can be called better"
-        return RowVerdict(False, None, noticeable, text + remark)
+        return RowVerdict(None, text + remark)
     if row.dominated_by is None and row.lucky:
         text = f"nothing can be said of the scene's own setting: {row.lucky}"
-        return RowVerdict(False, None, noticeable, text + remark)
+        return RowVerdict(None, text + remark)
     if row.dominated_by is None:
         text, worse = _describe_rival(report)
         scope = " that was measured" if report.failures else ""
         text = text or f"no other setting{scope} is cheaper without being less accurate"
-        return RowVerdict(True, None, noticeable, text + remark, worse)
+        return RowVerdict(None, text + remark, worse)
     text, is_better, worse = _judge_rival(report, row.dominated_by, starts)
-    better = row.dominated_by if is_better else None
-    is_known = is_better or not text.startswith(_UNRESOLVED)
-    return RowVerdict(is_known and not is_better, better, noticeable, text + remark, worse)
-
-
-_UNRESOLVED = "no setting can be called better: the reference resolves no error of "
+    return RowVerdict(row.dominated_by if is_better else None, text + remark, worse)
 
 
 def quantity_of(report: ScenarioReport) -> ErrorQuantity:
@@ -168,7 +159,8 @@ def _judge_rival(
     leasts = leasts_of(report)
     resolved = [c for c in own_ratios if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
     if not resolved and (baseline.seen is None or report.least_seen >= 1):
-        return f"{_UNRESOLVED}{rival.name}, or of the scene's own setting", False, ()
+        text = "no setting can be called better: the reference resolves no error of "
+        return f"{text}{rival.name}, or of the scene's own setting", False, ()
     price, is_cheap = _price(rival), _is_cheap(rival)
     claim = f"{rival.name} {price} and {_gain_text([own_ratios], figure)}"
     if not is_cheap and min(own_ratios.values()) > 1 - _WORTH_SAYING:
@@ -312,16 +304,18 @@ def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: ErrorQuantity)
         if row.front and row.cost is not None and (error := quantity.value_of(row)) is not None
     ]
     if not candidates:
-        return RowVerdict(False, None, None, text)
+        return RowVerdict(None, text)
     error, _, better = min(candidates)
     text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
     text += _AS_FAR if error <= quantity.least else ""
-    return RowVerdict(False, better, None, text)
+    return RowVerdict(better, text)
 
 
 def _describe_error(report: ScenarioReport, own_row: WorkPrecisionRow) -> str:
     """Whether the own error is seen."""
-    error, least = own_row.seen or 0.0, report.least_seen
+    error, least = own_row.seen, report.least_seen
+    if error is None or max(1.0, error) <= least:
+        return "; whether the scene's own error can be seen is not known"
     if not error:
         return "; the scene's own setting makes no error"
     if error < 1:

@@ -98,7 +98,6 @@ ERROR_SEEN = "the scene's own error can be seen: it is 2.5 times what an eye can
 def test_verdicts(points: tuple[Point, ...], better: int | None, text: str) -> None:
     verdict = judged(rows_of(*points)).verdict
     assert (verdict.better, verdict.text) == (better, text)
-    assert verdict.on_front == (better is None and points[0] is not None)
 
 
 def masked(**rival: Any) -> list[WorkPrecisionRow]:
@@ -302,7 +301,7 @@ def test_fewer_iterations_that_err_less_are_luck() -> None:
     )
     report = judged([few, many])
     assert report.rows[0].lucky == "its error rises with more iterations"
-    assert report.verdict.on_front and report.verdict.text.startswith(
+    assert report.verdict.text.startswith(
         "no difference that holds: Euler at 2 ms, 1 iteration takes 0.8 of the time and errs 1.4 "
         "times less (what is seen over the whole run) here, but its error rises with more "
         "iterations"
@@ -366,7 +365,7 @@ def test_verdicts_claim_only_what_holds() -> None:
     assert "errs 1000 times less" in (text := verdict_text((1, 1e-3), (0.5, 1e-6), least_seen=1e-6))
     assert "or more: the reference resolves no more" in text
     resting = judged(rows_of((1, 0.0), (0.1, 0.0))).verdict
-    assert resting.better is None and not resting.on_front
+    assert resting.better is None
     assert resting.text == "no setting can be called better: none errs, as where nothing moves"
     untimed = judged([row(own=True, cost=None, seen=0.5)]).verdict.text
     assert untimed.startswith("nothing was timed, so no setting can be called better; ")
@@ -412,7 +411,7 @@ def test_rounding_after_an_error_is_gone_makes_no_setting_better() -> None:
 
 def test_what_is_not_resolved_makes_no_setting_better() -> None:
     verdict = judged(rows_of((1, 2.0), (0.5, 2.0)), least_seen=2.0).verdict
-    assert verdict.better is None and not verdict.on_front
+    assert verdict.better is None
     assert verdict.text == (
         "no setting can be called better: the reference resolves no error of RK4 at 10 ms, or of "
         "the scene's own setting; whether the scene's own error can be seen is not known"

@@ -122,8 +122,6 @@ class EngineCost(Struct, frozen=True):
     ratio: Interval
     """To a step of MuJoCo itself in one world, timed in turn."""
     compile_seconds: float
-    steps: int
-    """Steps of a repeat, from the beginning of the scenario."""
 
 
 _SPREAD = 1e-3
@@ -213,7 +211,6 @@ def run_costs(batch: Batch, trial: EngineTrial, clock: Clock) -> EngineCost:
         timing.nanoseconds.scale(1e-9 / (steps * count)),
         timing.ratio.scale(share),
         batch.compile_seconds,
-        steps,
     )
 
 

@@ -309,11 +309,8 @@ class PhaseProfile(Record, frozen=True):
 class RowVerdict(Record, frozen=True):
     """Whether a scene's own setting is a good choice."""
 
-    on_front: bool
     better: int | None
     """The row that is better in no column worse, from starts nearby too; `None` where none is."""
-    noticeable: bool | None
-    """Whether a learner would see the own setting's error; `None` where it is not known."""
     text: str
     """The same in a sentence or two."""
     worse: tuple[str, ...] = ()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 from msgspec.structs import replace
@@ -82,24 +82,6 @@ def is_cheaper(cost: Interval, rival: Interval) -> bool:
 def is_no_dearer(cost: Interval, rival: Interval) -> bool:
     """Whether a cost is no more than another: where times are uncertain, by the likeliest ones."""
     return cost.value <= rival.value * (1 + COST_SLACK)
-
-
-def mark_front(
-    rows: Rows, worth: Mapping[int, float], beats: Callable[[int, int], bool]
-) -> tuple[WorkPrecisionRow, ...]:
-    """Rows that say whether another beats them, and which: of those the one worth least.
-
-    `worth`: of the rows that are compared, by number; `beats`: whether one beats another.
-    """
-    better = {n: [m for m in worth if m != n and not rows[m].lucky and beats(m, n)] for n in worth}
-    placed_rows = []
-    for n, row in enumerate(rows):
-        rivals = better.get(n, [])
-        unbeaten = [m for m in rivals if not better[m]] or rivals
-        best = min(unbeaten, key=lambda m: (worth[m], m), default=None)
-        on_front = n in better and not rivals and not row.lucky
-        placed_rows.append(replace(row, front=on_front, dominated_by=best))
-    return tuple(placed_rows)
 
 
 def seconds_text(value: float, digits: int = 6) -> str:
