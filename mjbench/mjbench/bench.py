@@ -8,9 +8,9 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import msgspec
 import mujoco
@@ -24,7 +24,7 @@ from mjbench.declarations import (
     Place,
     parse_declarations,
 )
-from mjbench.derive import derive_seeds, derive_sweep, known_cases
+from mjbench.derive import derive_seeds, derive_sweep
 from mjbench.fair import fair_declarations
 from mjbench.host import Host
 from mjbench.loop import Loop, LoopError
@@ -35,16 +35,13 @@ from mjbench.pruning.reachability import possible_pairs
 from mjbench.reports import PartFailure
 from mjbench.reports.model_report import SceneCard, SceneReport
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
-from mjbench.scene import ExactMotion, ExactStates, Scene, SceneError, scenes
+from mjbench.scene import ExactMotion, Scene, SceneError, scenes
 from mjbench.simulation import silent, simulate
-from mjbench.sweep import THREADS, drawn_models, measure_sweep
+from mjbench.sweep import drawn_models, measure_sweep
 from mjbench.work_precision import measure_scenario
 
 EXACT_SECONDS = 20.0
 """Processor time that the file of an exact motion may take for one answer."""
-
-
-SweepPart: TypeAlias = Literal["all", "values", "threads"]
 
 
 class CannotMeasureError(Exception):
@@ -251,41 +248,19 @@ def _check_repeats(model: Any, scenario: Scenario, loop: Loop) -> None:
 
 
 def run_sweep(
-    compiled_model: CompiledModel,
-    name: str,
-    host: Host,
-    *,
-    quick: bool,
-    timed: bool,
-    part: SweepPart = "all",
-    piece: slice | None = None,
+    compiled_model: CompiledModel, name: str, host: Host, *, quick: bool, timed: bool
 ) -> SweepReport:
-    """Measure a sweep, or a part of it; a `CannotMeasureError` if it cannot be done.
-
-    `part`: all, or only the number of threads, or only the other values; `piece`: which of these.
-    """
+    """Measure a sweep; a `CannotMeasureError` if it cannot be done."""
     host.tell(name)
     sweep = next(sweep for sweep in compiled_model.declarations.sweeps if sweep.name == name)
-    clocks = (time.thread_time_ns, time.perf_counter_ns) if timed else None
+    clock = time.thread_time_ns if timed else None
     scenario = next(s for s in compiled_model.scenarios if sweep.scenario in (None, s.name))
-    of_threads = tuple(v for v in sweep.variations if v.parameter == THREADS)
-    of_values = tuple(v for v in sweep.variations if v.parameter != THREADS)
-    groups = {"all": (of_values, of_threads), "values": (of_values,), "threads": (of_threads,)}
-    reports = []
-    with report_errors(compiled_model.subject):
+    with report_errors(compiled_model.subject), one_processor():
         if compiled_model.spec is None:
             raise SceneError(
                 "a compiled model has no parameters to sweep", sweep.variations[0].place
             )
-        for variations in filter(None, groups[part]):
-            part_sweep = replace(sweep, variations=variations)
-            # One processor, unless what is measured is how it goes on several.
-            with one_processor() if variations is of_values else nullcontext():
-                report = measure_sweep(
-                    compiled_model.spec, scenario, part_sweep, clocks, quick=quick, piece=piece
-                )
-            reports.append(report)
-    return replace(reports[0], rows=tuple(row for report in reports for row in report.rows))
+        return measure_sweep(compiled_model.spec, scenario, sweep, clock, quick=quick)
 
 
 def join_parts(
@@ -313,7 +288,6 @@ def join_parts(
         sweeps=tuple(map(derive_sweep, sweeps)),
         failures=tuple(failures),
     )
-    report = replace(report, cases=known_cases(report))
     return replace(report, card=_card(compiled_model, host)) if card and scenarios else report
 
 
@@ -345,16 +319,12 @@ def _exact_motion(subject: Subject, host: Host) -> ExactMotion | None:
     if not path:
         return None
 
-    def states(times: Array, qpos: Array, qvel: Array) -> ExactStates:
+    def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array | None]:
         query = {"times": times.tolist(), "qpos": qpos.tolist(), "qvel": qvel.tolist()}
         run = host.run_exact(path, json.dumps(query), EXACT_SECONDS)
         try:
-            answer = msgspec.json.decode(run.output, type=_Answer)
-            motions = {}
-            for name in ("motion", "acceleration"):
-                if (rows := getattr(answer, name)) is not None:
-                    qpos, *rest = (np.array(part) for part in zip(*rows, strict=True))
-                    motions[name] = (qpos, rest[0] if rest else None)
+            rows = msgspec.json.decode(run.output, type=list[list[list[float]]])
+            positions, *rest = (np.array(part) for part in zip(*rows, strict=True))
         except (msgspec.DecodeError, ValueError):
             reason = run.failure
             if not reason:
@@ -362,17 +332,9 @@ def _exact_motion(subject: Subject, host: Host) -> ExactMotion | None:
             message = f"`{path}` gives no motion: {reason}"
             help = "define `motion(time, qpos, qvel)` there, for the positions at a time in s"
             raise SceneError(message, Place(path), help) from None
-        return ExactStates(motions, answer.expected)
+        return positions, rest[0] if rest else None
 
     return ExactMotion(path, states)
-
-
-class _Answer(Struct, frozen=True):
-    """What the script that evaluates an exact motion says; each part where its file has it."""
-
-    motion: list[list[list[float]]] | None = None
-    acceleration: list[list[list[float]]] | None = None
-    expected: dict[str, float] = {}
 
 
 def _card(compiled_model: CompiledModel, host: Host) -> SceneCard:

@@ -12,15 +12,21 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from mjbench.reports.scene_report import FLOORS, ScenarioReport, WorkPrecisionRow
-from mjbench.reports.shown_errors import ERROR_SLACK, FrontPoint, Rows, mark_front
+from mjbench.reports.shown_errors import (
+    ERROR_SLACK,
+    Rows,
+    is_cheaper,
+    is_no_dearer,
+)
 
 Column: TypeAlias = tuple[str, str]
 """The name of an error, and a stretch of time in words."""
 Columns: TypeAlias = Mapping[Column, float]
 
-WHOLE, HALVES, END = "over the whole run", ("in its first half", "in its second half"), "at its end"
+WHOLE, HALVES = "over the whole run", ("in its first half", "in its second half")
 LOST = "lost"
 """The column of a run that is lost, which has no errors."""
 _ROUNDED = 1e-9
@@ -49,8 +55,6 @@ def columns_of(row: WorkPrecisionRow, contact_model: Mapping[str, float]) -> Col
     for name in ("figure", "position", "attitude", "velocity"):
         if (pair := getattr(row, name)) is not None:
             values[name, WHOLE] = pair[0]
-            if name not in row.halves:
-                values[name, END] = pair[1]
     visible = "seen" if row.step_error is None else "step_error"
     for name in (visible, "energy_drift", "momentum_drift", "slip"):
         if (value := getattr(row, name)) is not None:
@@ -186,7 +190,7 @@ def rounded_text(value: float, digits: int) -> str:
 def mark_dominated(report: ScenarioReport) -> Rows:
     """Rows that say whether another is better in cost or an error, and in no column worse.
 
-    Where none errs there is no front.
+    Of those that are better the one worth least is named. Where none errs there is no front.
     """
     rows, leasts = report.rows, leasts_of(report)
     columns = [columns_of(row, report.contact_model) for row in rows]
@@ -202,14 +206,25 @@ def mark_dominated(report: ScenarioReport) -> Rows:
     def beats(rival: int, baseline: int) -> bool:
         if rows[rival].parted is not None and rows[baseline].parted is None:
             return False  # it has no error that is known, for it is off
-        prices = [FrontPoint(cost, 0.0) for n in (rival, baseline) if (cost := rows[n].cost)]
+        prices = [cost for n in (rival, baseline) if (cost := rows[n].cost)]
         changes = ratios(columns[baseline], columns[rival], leasts).values()
         if any(change > 1 + ERROR_SLACK for change in changes):
             return False
         is_nearer = any(change * (1 + ERROR_SLACK) < 1 for change in changes)
-        return prices[0].is_cheaper(prices[1]) or (is_nearer and prices[0].is_no_dearer(prices[1]))
+        return is_cheaper(*prices) or (is_nearer and is_no_dearer(*prices))
 
-    return mark_front(rows, {n: worth(n) for n in sorted(present)}, beats)
+    better = {
+        n: [m for m in sorted(present) if m != n and not rows[m].lucky and beats(m, n)]
+        for n in present
+    }
+    placed_rows = []
+    for n, row in enumerate(rows):
+        rivals = better.get(n, [])
+        unbeaten = [m for m in rivals if not better[m]] or rivals
+        best = min(unbeaten, key=lambda m: (worth(m), m), default=None)
+        on_front = n in present and not rivals and not row.lucky
+        placed_rows.append(replace(row, front=on_front, dominated_by=best))
+    return tuple(placed_rows)
 
 
 def worse_columns(spread: Iterable[Spread]) -> Iterator[Spread]:

@@ -26,8 +26,7 @@ Expected: TypeAlias = Literal[
     "restitution", "penetration", "slip", "crossing", "last", "largest", "smallest"
 ]
 SweepFigure: TypeAlias = Literal[
-    "change", "figure", "penetration", "slip", "restitution",
-    "residual", "iterations", "cost", "throughput"
+    "change", "figure", "penetration", "slip", "restitution", "residual", "iterations", "cost"
 ]  # fmt: skip
 Pose: TypeAlias = tuple[float, float, float, float, float, float, float]
 SweepValue: TypeAlias = float | str | tuple[float, ...]

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from msgspec.structs import asdict, replace
+from msgspec.structs import replace
 
 from mjbench.columns import (
     mark_dominated,
@@ -28,20 +28,11 @@ from mjbench.judge import (
     rival_row,
 )
 from mjbench.reports import Interval, PartFailure
-from mjbench.reports.case_report import (
-    RIGHT,
-    BoundaryLine,
-    CaseReport,
-    ErrorLine,
-    ReferenceLine,
-    StepCost,
-)
-from mjbench.reports.limits import largest_of, limit_text, map_text
-from mjbench.reports.model_report import SceneReport
+from mjbench.reports.case_report import RIGHT, CaseReport
+from mjbench.reports.limits import largest_of, limit_text
 from mjbench.reports.profile_table import profile_text
 from mjbench.reports.scene_report import (
     ErrorQuantity,
-    MeasuredRun,
     MeasuredSetting,
     PhaseProfile,
     ScenarioReport,
@@ -52,7 +43,6 @@ from mjbench.reports.shown_errors import (
     INTEGRATORS,
     SEEN,
     STEPPED,
-    Quantity,
     is_idle,
     main_quantity,
     quantities,
@@ -60,11 +50,9 @@ from mjbench.reports.shown_errors import (
 )
 from mjbench.reports.work_charts import case_charts, case_quantities, scenario_charts, step_cost
 
-EXACT_SUFFIX = ".exact.py"
-"""Of the file that gives the exact motion of a model."""
 FIGURES = (
     *("change", "parted", "figure", "penetration", "slip", "restitution", "residual"),
-    *("iterations", "cost", "throughput"),
+    *("iterations", "cost"),
 )
 """The figures that a sweep has of every value."""
 
@@ -79,20 +67,20 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
         replace(row, name=setting_text(row.setting, baseline), idle=is_idle(row))
         for row in report.rows
     )
-    figure = Quantity("figure", report.figure or "figure", report.least_figure)
+    figure = ErrorQuantity("figure", report.figure or "figure", report.least_figure, False)
     floors = report.floor, report.velocity_floor
     present = quantities(rows, figure, report.least_seen, floors)
     is_apart = STEPPED.name in {quantity.name for quantity in present}
     if is_apart and all(row.step_error == row.seen for row in rows):  # contacts add nothing to it
         present = tuple(quantity for quantity in present if quantity.name != SEEN.name)
     main = main_quantity(present, rows)
-    stable = tuple(replace(r, shown=limit_text(r), map=map_text(r)) for r in report.stable)
+    stable = tuple(replace(r, shown=limit_text(r)) for r in report.stable)
     report = replace(
         report,
         rows=rows,
         stable=stable,
         quantities=tuple(
-            ErrorQuantity(q.name, q.label, q.least, q.is_resolved(rows)) for q in present
+            replace(quantity, resolved=quantity.is_resolved(rows)) for quantity in present
         ),
         main="" if main is None else main.name,
         cut_short=_is_cut_short(report),
@@ -139,9 +127,7 @@ def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...
                 claim, semicolon, remark = verdict.text.partition("; ")
                 claim = claim.replace(" is better: it ", " ", 1)
                 text = f"no difference that holds: here {claim}, but {reason}{semicolon}{remark}"
-                verdict = replace(
-                    verdict, on_front=True, better=None, text=text, worse=(reason, *verdict.worse)
-                )
+                verdict = replace(verdict, better=None, text=text, worse=(reason, *verdict.worse))
                 report = _with_lines(replace(report, verdict=verdict))
         derived.append(report)
     return tuple(derived)
@@ -187,7 +173,7 @@ def derive_case(report: CaseReport) -> CaseReport:
     """The report on a hard case with all that follows from what was measured."""
     main = next(iter(case_quantities(report)), None)
     costs = ((name, _cost_to(report, name, RIGHT)) for name in INTEGRATORS)
-    lines = tuple(replace(r, shown=limit_text(r), map=map_text(r)) for r in report.boundaries)
+    lines = tuple(replace(r, shown=limit_text(r)) for r in report.boundaries)
     return replace(
         report,
         boundaries=lines,
@@ -233,42 +219,3 @@ def derive_sweep(report: SweepReport) -> SweepReport:
         if values and max(values) > 1.01 * min(values):
             figures.append(name)
     return replace(report, show=tuple(figures))
-
-
-def known_cases(report: SceneReport) -> tuple[CaseReport, ...]:
-    """The scenarios of a model of which the exact motion or theory is given, as hard cases."""
-    cases = []
-    for scenario in report.scenarios:
-        if not scenario.source.endswith(EXACT_SUFFIX) and not scenario.figures:
-            continue
-        baseline = scenario.own_setting
-        usual = None if baseline is None else baseline.solver_settings
-        rows = [row for row in scenario.rows if row.setting.solver_settings == usual]
-        steps = {
-            row.setting.integrator: row.seconds.scale(row.setting.timestep)
-            for row in reversed(rows)
-            if row.seconds is not None
-        }
-        floors = scenario.floor, scenario.floor, scenario.velocity_floor
-        case = CaseReport(
-            name=f"{report.model}/{scenario.name}",
-            title=f"{report.model}: {scenario.title or scenario.name}",
-            case=0,
-            machine=report.machine,
-            note="; ".join(scenario.notes),
-            reference=ReferenceLine(scenario.reference, scenario.source, scenario.second, *floors),
-            boundaries=tuple(BoundaryLine(**asdict(row)) for row in scenario.stable),
-            figures=scenario.figures,
-            orders=scenario.orders,
-            errors=tuple(
-                ErrorLine(
-                    integrator=row.setting.integrator,
-                    timestep=row.setting.timestep,
-                    **{name: getattr(row, name) for name in MeasuredRun.__struct_fields__},
-                )
-                for row in rows
-            ),
-            costs=tuple(StepCost(name, seconds) for name, seconds in steps.items()),
-        )
-        cases.append(derive_case(case))
-    return tuple(cases)

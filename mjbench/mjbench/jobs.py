@@ -21,7 +21,6 @@ from typing import IO, Any, Literal, TypeAlias
 
 import msgspec
 from msgspec import Struct
-from msgspec.structs import replace
 
 from mjbench import bench, diet
 from mjbench.bench import CannotMeasureError, Subject
@@ -73,20 +72,16 @@ class Scenario(Struct, frozen=True, tag_field="job", tag="scenario"):
 
 
 class Sweep(Struct, frozen=True, tag_field="job", tag="sweep"):
-    """Measure a sweep, or a part of it: a `SweepReport`."""
+    """Measure a sweep: a `SweepReport`."""
 
     subject: Subject
     name: str
-    part: bench.SweepPart = "all"
-    first: int = 0
-    end: int = 0
-    """Of `values`, those from `first` to before `end`."""
     quick: bool = False
     timed: bool = True
 
 
 class Join(Struct, frozen=True, tag_field="job", tag="join"):
-    """Make a `SceneReport` of parts; sweeps of one name are pieces of one."""
+    """Make a `SceneReport` of parts."""
 
     subject: Subject
     scenarios: tuple[ScenarioReport, ...]
@@ -271,16 +266,11 @@ def answer(job: Job, host: Host) -> object:
             )
         case Sweep():
             compiled_model = bench.compile_subject(job.subject, host, quick=job.quick)
-            piece = slice(job.first, job.end) if job.part == "values" else None
-            settings = {"quick": job.quick, "timed": job.timed}
-            return bench.run_sweep(
-                compiled_model, job.name, host, part=job.part, piece=piece, **settings
-            )
+            return bench.run_sweep(compiled_model, job.name, host, quick=job.quick, timed=job.timed)
         case Join():
             compiled_model = bench.compile_subject(job.subject, host, quick=job.quick)
-            sweeps = _join_pieces(job.sweeps)
             return bench.join_parts(
-                compiled_model, job.scenarios, sweeps, host, quick=job.quick, card=job.card
+                compiled_model, job.scenarios, job.sweeps, host, quick=job.quick, card=job.card
             )
         case Case():
             with one_processor():
@@ -312,15 +302,6 @@ def answer(job: Job, host: Host) -> object:
             if job.recorded is not None and job.measured is not None:
                 return scene_departures(job.recorded, job.measured, job.bands)
             return case_departures(job.recorded_cases, job.measured_cases)
-
-
-def _join_pieces(pieces: tuple[SweepReport, ...]) -> list[SweepReport]:
-    names = dict.fromkeys(piece.name for piece in pieces)
-    groups = ([piece for piece in pieces if piece.name == name] for name in names)
-    return [
-        replace(group[0], rows=tuple(row for piece in group for row in piece.rows))
-        for group in groups
-    ]
 
 
 def _file_text(job: Write) -> str:

@@ -33,17 +33,18 @@ from mjbench.columns import (
 from mjbench.reports.limits import stability_text, stray_timestep
 from mjbench.reports.scene_report import (
     ErrorParts,
+    ErrorQuantity,
     RowVerdict,
     ScenarioReport,
     WorkPrecisionRow,
 )
 from mjbench.reports.shown_errors import (
     ERROR_SLACK,
-    FrontPoint,
-    Quantity,
+    SEEN,
+    STEPPED,
     Rows,
-    front_point,
     horizon_error_text,
+    is_cheaper,
     seconds_text,
     setting_text,
 )
@@ -58,7 +59,7 @@ _NEGLIGIBLE = 0.01
 
 
 def mark_luck(
-    rows: Rows, limits: Mapping[str, float], quantity: Quantity
+    rows: Rows, limits: Mapping[str, float], quantity: ErrorQuantity
 ) -> tuple[WorkPrecisionRow, ...]:
     """Rows that say where their errors are luck.
 
@@ -95,7 +96,7 @@ def mark_luck(
     return tuple(marked_rows)
 
 
-def _luck_of_cone(row: WorkPrecisionRow, rival: WorkPrecisionRow, quantity: Quantity) -> str:
+def _luck_of_cone(row: WorkPrecisionRow, rival: WorkPrecisionRow, quantity: ErrorQuantity) -> str:
     """Why a smaller error than under the scene's own cone is luck; empty where it is none.
 
     Where the model under that cone errs no less, it has cancelled with the error of the timestep.
@@ -115,46 +116,34 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
     quantity, rows = quantity_of(report), report.rows
     own_index = next(number for number, row in enumerate(rows) if row.own)
     row = rows[own_index]
-    is_seen = row.seen is not None and max(1.0, row.seen) > report.least_seen
-    noticeable = row.seen is not None and row.seen >= 1 if is_seen else None
     if row.reasons:
         return _verdict_of_lost(rows, row, quantity)
-    remark = "; whether the scene's own error can be seen is not known"
-    if noticeable is not None:
-        remark = _describe_error(report, row)
+    remark = _describe_error(report, row)
     if row.parted is not None:
         text = _verdict_of_chaos(rows, row, horizon_error_text(report.horizon_error))
-        return RowVerdict(False, None, noticeable, text)
+        return RowVerdict(None, text)
     if not any(map(quantity.value_of, rows)):
         text = "no setting can be called better: none errs, as where nothing moves"
-        return RowVerdict(False, None, noticeable, text)
-    own_place = front_point(row, quantity)
-    if own_place is None:
+        return RowVerdict(None, text)
+    if row.cost is None or quantity.value_of(row) is None:
         text = "nothing was timed, so no setting can be called better"
-        return RowVerdict(False, None, noticeable, text + remark)
+        return RowVerdict(None, text + remark)
     if row.dominated_by is None and row.lucky:
         text = f"nothing can be said of the scene's own setting: {row.lucky}"
-        return RowVerdict(False, None, noticeable, text + remark)
+        return RowVerdict(None, text + remark)
     if row.dominated_by is None:
-        text, worse = _describe_rival(report, own_place, quantity)
+        text, worse = _describe_rival(report)
         scope = " that was measured" if report.failures else ""
         text = text or f"no other setting{scope} is cheaper without being less accurate"
-        return RowVerdict(True, None, noticeable, text + remark, worse)
+        return RowVerdict(None, text + remark, worse)
     text, is_better, worse = _judge_rival(report, row.dominated_by, starts)
-    better = row.dominated_by if is_better else None
-    is_known = is_better or not text.startswith(_UNRESOLVED)
-    return RowVerdict(is_known and not is_better, better, noticeable, text + remark, worse)
+    return RowVerdict(row.dominated_by if is_better else None, text + remark, worse)
 
 
-_UNRESOLVED = "no setting can be called better: the reference resolves no error of "
-
-
-def quantity_of(report: ScenarioReport) -> Quantity:
+def quantity_of(report: ScenarioReport) -> ErrorQuantity:
     """The error that settings are compared by first."""
-    for matches in report.quantities:
-        if matches.name == report.main:
-            return Quantity(matches.name, matches.label, matches.least)
-    return Quantity("seen", "", report.least_seen)
+    matches = (quantity for quantity in report.quantities if quantity.name == report.main)
+    return next(matches, replace(SEEN, least=report.least_seen))
 
 
 def _judge_rival(
@@ -170,7 +159,8 @@ def _judge_rival(
     leasts = leasts_of(report)
     resolved = [c for c in own_ratios if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
     if not resolved and (baseline.seen is None or report.least_seen >= 1):
-        return f"{_UNRESOLVED}{rival.name}, or of the scene's own setting", False, ()
+        text = "no setting can be called better: the reference resolves no error of "
+        return f"{text}{rival.name}, or of the scene's own setting", False, ()
     price, is_cheap = _price(rival), _is_cheap(rival)
     claim = f"{rival.name} {price} and {_gain_text([own_ratios], figure)}"
     if not is_cheap and min(own_ratios.values()) > 1 - _WORTH_SAYING:
@@ -193,7 +183,7 @@ def _judge_rival(
     text = f"{rival.name} is better: it {price} and {_gain_text(everywhere, figure)}"
     quantity = quantity_of(report)
     if quantity.name == "seen" and rival.step_error is not None:
-        quantity = Quantity("step_error", "", report.least_seen)
+        quantity = replace(STEPPED, least=report.least_seen)
     if not resolved:
         text += _AS_FAR
     elif (value := quantity.value_of(rival)) is not None and value <= quantity.least:
@@ -236,11 +226,9 @@ def _is_cheap(row: WorkPrecisionRow) -> bool:
     return row.cost is not None and row.cost.value <= 1 - _WORTH_SAYING and row.cost.high < 1
 
 
-def _describe_rival(
-    report: ScenarioReport, own_place: FrontPoint, quantity: Quantity
-) -> tuple[str, tuple[str, ...]]:
+def _describe_rival(report: ScenarioReport) -> tuple[str, tuple[str, ...]]:
     """The cheapest setting that would be better by one number, and why it is not; empty if none."""
-    row = _cheapest_rival(report, own_place, quantity)
+    row = _cheapest_rival(report)
     baseline = report.own_row
     if row is None or baseline is None:
         return "", ()
@@ -254,27 +242,29 @@ def _describe_rival(
     return f"no setting is better: {row.name} {_price(row)}, but {texts[0]}", texts
 
 
-def _cheapest_rival(
-    report: ScenarioReport, own_place: FrontPoint, quantity: Quantity
-) -> WorkPrecisionRow | None:
-    points = [
-        (point, row)
-        for row in report.rows
-        if row.status == "ok" and (point := front_point(row, quantity))
+def _cheapest_rival(report: ScenarioReport) -> WorkPrecisionRow | None:
+    """The cheapest setting that costs less and errs no more, by the error compared first."""
+    baseline, quantity = report.own_row, quantity_of(report)
+    error = None if baseline is None else quantity.value_of(baseline)
+    if baseline is None or (own_cost := baseline.cost) is None or error is None:
+        return None
+    rivals = [
+        (cost.value, number)
+        for number, row in enumerate(report.rows)
+        if row.status == "ok" and (cost := row.cost) is not None and is_cheaper(cost, own_cost)
+        if (value := quantity.value_of(row)) is not None and value <= error * (1 + ERROR_SLACK)
     ]
-    cheaper = [(p, r) for p, r in points if p.is_cheaper(own_place) and p.beats(own_place)]
-    return min(cheaper, key=lambda pair: pair[0].cost.value)[1] if cheaper else None
+    return report.rows[min(rivals)[1]] if rivals else None
 
 
 def rival_row(report: ScenarioReport) -> WorkPrecisionRow | None:
     """The setting that a verdict compares with the own one; `None` where there is none."""
-    baseline, quantity = report.own_row, quantity_of(report)
+    baseline = report.own_row
     if baseline is None or baseline.status != "ok" or baseline.parted is not None:
         return None
     if baseline.dominated_by is not None:
         return report.rows[baseline.dominated_by]
-    own_place = front_point(baseline, quantity)
-    return None if own_place is None else _cheapest_rival(report, own_place, quantity)
+    return _cheapest_rival(report)
 
 
 def compared_rows(report: ScenarioReport) -> dict[int, WorkPrecisionRow]:
@@ -288,8 +278,6 @@ def compared_rows(report: ScenarioReport) -> dict[int, WorkPrecisionRow]:
     rows = [baseline, rival_row(report)]
     if report.parts is not None and report.parts.dominant:
         rows.append(_mending_row(report, baseline, report.parts.dominant))
-    if baseline.seen is not None and baseline.seen >= 1:
-        rows.append(_cheapest_unseen(report.rows))
     numbers = [next(n for n, r in enumerate(report.rows) if r is row) for row in rows if row]
     return {number: report.rows[number] for number in dict.fromkeys(numbers)}
 
@@ -307,48 +295,34 @@ def _verdict_of_chaos(rows: Rows, row: WorkPrecisionRow, error: str) -> str:
     return text
 
 
-def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: Quantity) -> RowVerdict:
+def _verdict_of_lost(rows: Rows, row: WorkPrecisionRow, quantity: ErrorQuantity) -> RowVerdict:
     text = f"the scene does not run under its own setting, {setting_text(row.setting)}: "
     text += "; ".join(row.reasons)
-    candidates = [(p, n) for n, r in enumerate(rows) if r.front and (p := front_point(r, quantity))]
+    candidates = [
+        (error, row.cost.value, number)
+        for number, row in enumerate(rows)
+        if row.front and row.cost is not None and (error := quantity.value_of(row)) is not None
+    ]
     if not candidates:
-        return RowVerdict(False, None, None, text)
-    better = min(candidates, key=lambda c: (c[0].error, c[0].cost.value, c[1]))[1]
+        return RowVerdict(None, text)
+    error, _, better = min(candidates)
     text += f"; {setting_text(rows[better].setting)} is the most accurate that does"
-    text += _AS_FAR if min(p.error for p, _ in candidates) <= quantity.least else ""
-    unseen = [(p.cost.value, n) for p, n in candidates if (rows[n].seen or 0.0) < 1]
-    cost, cheapest = min(unseen, default=(0.0, better))
-    if cheapest != better:
-        share = cost / next(p.cost.value for p, n in candidates if n == better)
-        text += f", {setting_text(rows[cheapest].setting)} the cheapest without an error that is "
-        text += f"seen, at {share:.2g} of its cost"
-    return RowVerdict(False, better, None, text)
+    text += _AS_FAR if error <= quantity.least else ""
+    return RowVerdict(better, text)
 
 
 def _describe_error(report: ScenarioReport, own_row: WorkPrecisionRow) -> str:
-    """Whether the own error is seen, and where it is, the cheapest setting with one that is not."""
-    rows, error, least = report.rows, own_row.seen or 0.0, report.least_seen
+    """Whether the own error is seen."""
+    error, least = own_row.seen, report.least_seen
+    if error is None or max(1.0, error) <= least:
+        return "; whether the scene's own error can be seen is not known"
     if not error:
         return "; the scene's own setting makes no error"
     if error < 1:
         size = f"{'less than ' if error <= least else ''}{error:.2g}"
         return f"; the scene's own error cannot be seen: it is {size} of what an eye can tell"
-    text = "; the scene's own error can be seen: it is "
-    text += f"{number_text(error)} times what an eye can tell"
-    unseen = _cheapest_unseen(rows)
-    if own_row.cost is None:
-        return text
-    if unseen is not None:
-        text += f"; the cheapest without one that is seen is {unseen.name}, which {_price(unseen)}"
-    elif all(r.seen >= 1 for r in rows if r.seen is not None):
-        text += ", and that of every other setting too"
-    return text
-
-
-def _cheapest_unseen(rows: Rows) -> WorkPrecisionRow | None:
-    """The cheapest setting with an error that cannot be seen; `None` if there is none."""
-    unseen = [r for r in rows if r.seen is not None and r.seen < 1 and r.cost and not r.lucky]
-    return min(unseen, key=lambda r: r.cost.value if r.cost else 0.0, default=None)
+    times = number_text(error)
+    return f"; the scene's own error can be seen: it is {times} times what an eye can tell"
 
 
 def five_lines(report: ScenarioReport) -> tuple[str, ...]:

@@ -104,20 +104,12 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         place, source = declaration.place("reference"), problem.reference.source
         return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
     exact = None if declaration.reference else pilot.scene.exact
-    scenario, computed = pilot.scene.scenario, reference.states
-    motions = {} if exact is None else exact.engine_states(model, scenario, computed)
-    if exact is None or not motions:
+    if exact is None:
         return reference
-    least, gaps = ROUNDING, []
-    for name, states in motions.items():
-        subject = f"`{exact.path}`, `{name}`," if len(motions) > 1 else f"`{exact.path}`"
-        precision = _check_exact(model, pilot, (exact, subject), states, reference, quick=quick)
-        least = least.at_least(precision)
-        gaps.append(motion_gap(model, states, next(iter(motions.values()))))
-    # The formula comes first, and the equations bound it, where there are both.
-    states, source = next(iter(motions.values())), exact.path
-    least = least.at_least(gaps[-1])
-    return _with_closed_form(model, reference, states, source, least, f"`{source}`", Place(source))
+    states = exact.engine_states(model, pilot.scene.scenario, reference.states)
+    least = _check_exact(model, pilot, exact, states, reference, quick=quick)
+    subject, place = f"`{exact.path}`", Place(exact.path)
+    return _with_closed_form(model, reference, states, exact.path, least, subject, place)
 
 
 def find_nearby(
@@ -139,8 +131,7 @@ def find_nearby(
     exact = pilot.scene.exact if declared_reference.kind == "closed" else None
     if exact is None or reference.kind == "ode":
         return reference.states
-    motions = exact.engine_states(model, pilot.scene.scenario, reference.states)
-    states = next(iter(motions.values()))
+    states = exact.engine_states(model, pilot.scene.scenario, reference.states)
     gap = motion_gap(model, states, reference.states).place
     usual_gap = motion_gap(model, declared_reference.states, declared_reference.second_states).place
     is_usual = gap <= _NEARBY_GAP * max(usual_gap, reference.floor.place)
@@ -174,15 +165,15 @@ def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
 def _check_exact(
     model: Any,
     pilot: Pilot,
-    named_exact: tuple[ExactMotion, str],
+    exact: ExactMotion,
     states: EngineStates,
     second: KnownMotion,
     *,
     quick: bool,
 ) -> Sizes:
-    """How well a course's exact motion, with its name, is known where no integration says it."""
-    exact, name = named_exact
-    subject, gap = f"{name} is not this scene's motion", motion_gap(model, states, second.states)
+    """How well a course's exact motion is known where no integration says it."""
+    subject = f"`{exact.path}` is not this scene's motion"
+    gap = motion_gap(model, states, second.states)
     clause = f"in the scenario `{pilot.scene.name}` it"
     precision = pilot.scene.declaration.precision or PRECISION
     if second.kind == "ode":

@@ -48,6 +48,14 @@ class Loop(Struct, frozen=True, eq=False):
     noise: float = 0.0
     """The standard deviation of commands, relative to their range where they have one."""
 
+    def timestep_below(self, timestep: float) -> float:
+        """The longest timestep up to one (s) at which commands are on time.
+
+        It divides the period, or is longer: then commands come at every step.
+        """
+        count = math.ceil(self.period / timestep * (1 - 1e-9))
+        return timestep if timestep >= self.period else self.period / count
+
 
 def read_loop(file: Path, period: float | None, delay: float, noise: float) -> Loop:
     """The controller in a file; without a `period` (s) the file's own `period` counts.

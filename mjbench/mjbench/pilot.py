@@ -168,8 +168,6 @@ def _pilot_of(model: Any, scene: Scene) -> Pilot:
             kinetic = simulation.simulate(Setup(scenario=scenario), fine).energy[:, 1].max()
         peaks = replace(peaks, energy=energy, kinetic=float(np.fmin(kinetic, peaks.kinetic)))
     setup = replace(_bounds(variant, scene, peaks), passing=passages.pairs())
-    if peaks.energy > energy + _EXCESS * peaks.kinetic:  # as of what a soft weld pulls
-        setup = replace(setup, energy=math.inf)
     horizons, growth_rates = [], []
     for gap, size in zip(gaps, nudge_sizes, strict=True):
         parted = np.flatnonzero(gap >= 1)
@@ -325,14 +323,12 @@ def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
         sunk_bound=max(1.0, DEEPER * peaks.sunk),
     )
     if (bound := scene.declaration.energy_bound) is not None:
-        return replace(setup, energy_bound=bound, energy=peaks.energy, kinetic=peaks.kinetic)
+        return replace(setup, energy_bound=bound)
     if driving_force(model, scenario):
         return replace(setup, velocity_bound=room * max(peaks.velocity, fall, 1e-3))
     rest_energy = float(model.body_mass.sum()) * max(_REST_SPEED * fall, 1e-3) ** 2
     kinetic = max(peaks.kinetic, rest_energy)
-    return replace(
-        setup, energy_bound=peaks.energy + room * kinetic, energy=peaks.energy, kinetic=kinetic
-    )
+    return replace(setup, energy_bound=peaks.energy + room * kinetic)
 
 
 def longer_setup(model: Any, pilot: Pilot, span: float) -> Setup:

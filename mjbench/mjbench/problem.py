@@ -241,10 +241,6 @@ class Setup(Struct, frozen=True, kw_only=True):
     energy_bound: float = float("inf")
     """Most potential and kinetic energy of a run that is not lost, J; infinite where something
     drives the motion."""
-    energy: float = float("inf")
-    """The most potential and kinetic energy in small steps, J; infinite where something drives."""
-    kinetic: float = 0.0
-    """The most kinetic energy in small steps, J."""
     sunk_bound: float = 1.0
     """How deep bodies may lie in each other before it is watched whether they go through, relative
     to the half thickness of the thinner one: more than 1 where they are that soft in small steps

@@ -56,23 +56,14 @@ class SceneError(Exception):
         self.help = help
 
 
-class ExactStates(Struct, frozen=True, eq=False):
-    """What a course knows of a motion, at n times."""
-
-    motions: dict[str, tuple[Array, Array | None]] = {}
-    """`qpos` (n, nq) and `qvel` (n, nv), or `None` where the course gives no velocities: by
-    `motion`, a formula, and `acceleration`, equations that were integrated."""
-    expected: dict[str, float] = {}
-    """Quantities that theory knows."""
-
-
 class ExactMotion(Struct, frozen=True, eq=False):
     """A motion that the course knows."""
 
     path: str
     """Its file."""
-    states: Callable[[Array, Array, Array], ExactStates]
-    """Times (n,) in s, and `qpos` and `qvel` of the beginning → what it says of the times."""
+    states: Callable[[Array, Array, Array], tuple[Array, Array | None]]
+    """Times (n,) in s, and `qpos` and `qvel` of the beginning → the same at these times, (n, nq)
+    and (n, nv); `None` where the course gives no velocities."""
 
     def check_velocities(self, model: Any, times: Array, begin: tuple[Array, Array]) -> None:
         """Check that velocities are the rates of positions; a `SceneError` where they are not.
@@ -81,39 +72,32 @@ class ExactMotion(Struct, frozen=True, eq=False):
         """
         step = 1e-4 * float(times[0])
         looks = np.ravel([times - step, times, times + step], order="F")
-        for qpos, qvel in self.states(looks, *begin).motions.values():
-            if qvel is None:
-                continue
-            rates = np.empty((len(looks) - 1, int(model.nv)))
-            for rate, now, later in zip(rates, qpos[:-1], qpos[1:], strict=True):
-                mujoco.mj_differentiatePos(model, rate, step, now, later)
-            sides, velocities = np.array([rates[::3], rates[1::3]]), qvel[1::3]
-            fastest = np.maximum(np.abs(sides).max(axis=(0, 1)), np.abs(velocities).max(axis=0))
-            gaps = np.abs(sides - velocities).min(axis=0) / np.maximum(fastest, _STILL)
-            if not gaps.max(initial=0.0) <= _OFF_RATE:
-                time, dof = np.unravel_index(int(gaps.argmax()), gaps.shape)
-                message = f"`{self.path}` gives velocities that are not the rates of positions"
-                help = f"number {dof} is {velocities[time, dof]:.3g} at {times[time]:.6g} s"
-                help += f", where the positions give {sides[0, time, dof]:.3g}"
-                raise SceneError(message, Place(self.path), help)
+        qpos, qvel = self.states(looks, *begin)
+        if qvel is None:
+            return
+        rates = np.empty((len(looks) - 1, int(model.nv)))
+        for rate, now, later in zip(rates, qpos[:-1], qpos[1:], strict=True):
+            mujoco.mj_differentiatePos(model, rate, step, now, later)
+        sides, velocities = np.array([rates[::3], rates[1::3]]), qvel[1::3]
+        fastest = np.maximum(np.abs(sides).max(axis=(0, 1)), np.abs(velocities).max(axis=0))
+        gaps = np.abs(sides - velocities).min(axis=0) / np.maximum(fastest, _STILL)
+        if not gaps.max(initial=0.0) <= _OFF_RATE:
+            time, dof = np.unravel_index(int(gaps.argmax()), gaps.shape)
+            message = f"`{self.path}` gives velocities that are not the rates of positions"
+            help = f"number {dof} is {velocities[time, dof]:.3g} at {times[time]:.6g} s"
+            help += f", where the positions give {sides[0, time, dof]:.3g}"
+            raise SceneError(message, Place(self.path), help)
 
-    def engine_states(
-        self, model: Any, scenario: Scenario, states: EngineStates
-    ) -> dict[str, EngineStates]:
-        """Its motions at the times of computed states, whose velocities hold if it gives none."""
+    def engine_states(self, model: Any, scenario: Scenario, states: EngineStates) -> EngineStates:
+        """The motion at the times of computed states, whose velocities hold if it gives none."""
         data = initial_data(scenario, model)
-        motions = self.states(states.times, data.qpos.copy(), data.qvel.copy()).motions
-        own_states = {
-            name: replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
-            for name, (qpos, qvel) in motions.items()
-        }
-        shapes = (states.qpos.shape, states.qvel.shape)
-        if any((motion.qpos.shape, motion.qvel.shape) != shapes for motion in own_states.values()):
+        qpos, qvel = self.states(states.times, data.qpos.copy(), data.qvel.copy())
+        motion = replace(states, qpos=qpos, qvel=states.qvel if qvel is None else qvel)
+        if (motion.qpos.shape, motion.qvel.shape) != (states.qpos.shape, states.qvel.shape):
             message = f"`{self.path}` gives numbers of coordinates that differ from the model's"
-            raise SceneError(
-                message, Place(self.path), "they are those of `qpos`, and perhaps of `qvel`"
-            )
-        return own_states
+            help = "they are those of `qpos`, and perhaps of `qvel`"
+            raise SceneError(message, Place(self.path), help)
+        return motion
 
 
 class Scene(Struct, frozen=True):

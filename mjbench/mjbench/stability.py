@@ -11,8 +11,6 @@
    shown. Theory is asked only where the scenario comes near to that rest.
 3. Stability need not be monotone. A grid, even in the logarithm, is tried down to a tenth of the
    shortest timestep that is lost, and about it from all starts; a bisection follows.
-4. Where nothing drives a scene, its energy cannot rise. The first timestep at which it does is a
-   limit of its own, often far below the first loss.
 """
 
 from __future__ import annotations
@@ -56,7 +54,6 @@ from mjbench.stability_runs import (
     StabilityTrial,
     kept_motion,
     run_trial,
-    step_count,
 )
 
 _REACH, _NEAR = 10.0, 2.0
@@ -68,9 +65,6 @@ _QUICK_GRID, _COARSE, _QUICK_CLOSER = 6, 1e-2, 8
 timesteps that are tried from half the limit up to it."""
 _SMALL_STEPS = 100_000
 """Steps of the run that says how much energy there can be, at most."""
-_GAIN, _GAIN_RESOLUTION = 0.01, 0.02
-"""The share of the largest kinetic energy that counts as a rise of energy, and the width at which
-its timestep is known."""
 _SHARE = 0.4
 """Of the time that is left, what the search of an integrator may take."""
 _SETTLED_STEPS = 2000
@@ -90,6 +84,8 @@ class Laboratory(Struct, frozen=True, eq=False):
     anything goes `through` anything, where it can touch."""
     shortest: float = math.inf
     """The shortest timestep at which that is asked, s."""
+    snap: Callable[[float], float] = float
+    """A timestep → the longest one up to it that is tried, s: all of them, or those of a loop."""
     trials: dict[tuple[int, float], dict[int, StabilityTrial]] = field(default_factory=dict)
     """By start and timestep, and by the number of spans."""
 
@@ -153,7 +149,7 @@ def with_energy_bound(problem: Problem) -> Problem:
     energy = simulate(longer, compile_model(problem.mjcf, Integrator.RK4, step)).energy
     most, kinetic = float(energy.sum(axis=1).max()), float(energy[:, 1].max())
     bound = most + problem.room * kinetic
-    return replace(problem, energy_bound=bound, energy=most, kinetic=kinetic)
+    return replace(problem, energy_bound=bound)
 
 
 def boundary(
@@ -203,26 +199,26 @@ def search_row(
 
     1. From the own start over the span: a grid, falling, down to a tenth of the largest timestep
        below which nothing was lost, a bisection at its end, and a finer grid below that.
-    2. About that all starts over both spans, which makes the map; then a bisection for the start
-       that is lost first, and one for the own start over the doubled span.
-    3. Where nothing drives the motion, the first timestep at which energy rises.
+    2. About that all starts over both spans; then a bisection for the start that is lost first, and
+       one for the own start over the doubled span.
     """
     low, high = search
     count = max(2, round((_QUICK_GRID if quick else _GRID) * math.log10(high / low)) + 1)
-    grid: list[float] = np.geomspace(low, high, count).tolist()
+    grid = sorted(set(map(laboratory.snap, np.geomspace(low, high, count).tolist())))
     resolution = _COARSE if quick else _FINE
     for kind in laboratory.questions:  # which matter most; their runs say what is bounded too
         _limit_of(laboratory, grid, resolution, kind)
     is_lost = partial(laboratory.is_lost, 0)
-    largest = bisect(is_lost, grid, _COARSE)
+    largest = bisect(is_lost, grid, _COARSE, snap=laboratory.snap)
     if closer:
-        largest = _look_closer(is_lost, grid, resolution, quick)
+        largest = _look_closer(laboratory, grid, resolution, quick)
     near = [h for h in grid if h < _NEAR * min(largest, grid[-1])] or grid[:1]
     # A first look asks other starts and times about that limit alone, where most of them fail.
     enough = min(largest, grid[-1]) / _NEAR if quick else 0.0
 
     def estimate(start: int, width: float) -> float:
-        return bisect(partial(laboratory.is_lost, start, spans=2), near, width, _NEAR, enough)
+        is_lost = partial(laboratory.is_lost, start, spans=2)
+        return bisect(is_lost, near, width, _NEAR, enough, laboratory.snap)
 
     estimates = [estimate(0, resolution)] if closer else []
     starts = range(1, laboratory.starts if closer else 1)
@@ -231,11 +227,9 @@ def search_row(
         estimates.append(estimate(min(by_start, key=lambda n: by_start[n]), resolution))
     bounds = [min(h, grid[-1]) for h in (largest, *estimates)]
     limit = theory.limit(integrator, search)
-    gain = _first_gain(laboratory, grid, setup)
     near_limit = _limit_of(laboratory, grid, resolution, "astray")
     through_limit = _limit_of(laboratory, grid, resolution, "through")
     steps = laboratory.own_steps()
-    stable_steps = [h for h in steps if h <= largest]
     islands = [h for h in steps if h > largest and not laboratory.is_lost(0, h)]
     lost = [h for h in steps if laboratory.is_lost(0, h)]
     is_all = math.isinf(largest)
@@ -250,14 +244,10 @@ def search_row(
         searched=(steps[0], steps[-1]),
         islands=(islands[0], islands[-1]) if islands and not is_all else None,
         duration=laboratory.span,
-        steps=step_count(laboratory.span, max(stable_steps, default=steps[0])),
-        tried=len(stable_steps),
         energy=_finite(setup.energy_bound),
         bracket=(min(bounds), max(bounds)) if estimates and min(bounds) < grid[-1] else None,
         theory=None if limit is None else reach(limit.timestep),
         formula="" if limit is None else limit.source,
-        gain=gain,
-        tries=_tries(laboratory),
     )
 
 
@@ -278,7 +268,7 @@ def _limit_of(
     def is_lost(step: float) -> bool:
         return bool(getattr(laboratory.trial(0, step), kind))
 
-    largest = bisect(is_lost, steps, max(resolution, _COARSE), math.inf)
+    largest = bisect(is_lost, steps, max(resolution, _COARSE), math.inf, snap=laboratory.snap)
     lost = [h for h in laboratory.own_steps() if h > largest and is_lost(h)]
     return reach(largest), getattr(laboratory.trial(0, lost[0]), kind) if lost else ""
 
@@ -289,11 +279,12 @@ def bisect(
     resolution: float,
     reach: float = _REACH,
     enough: float = 0.0,
+    snap: Callable[[float], float] = float,
 ) -> float:
     """The largest timestep below which none is lost: infinite for all of the grid, 0 for none.
 
     The grid is tried from above, down to `1 / reach` of the shortest that is lost, or to `enough`
-    (s) where none is.
+    (s) where none is. `snap`: as of a `Laboratory`.
     """
     lost = math.inf
     stable = 0.0
@@ -307,58 +298,29 @@ def bisect(
     if math.isinf(lost) or not stable:
         return math.inf if math.isinf(lost) else 0.0
     while lost / stable > 1 + resolution:
-        middle = math.sqrt(lost * stable)
+        middle = snap(math.sqrt(lost * stable))
+        if middle <= stable:  # none that is tried lies between
+            break
         lost, stable = (middle, stable) if is_lost(middle) else (lost, middle)
     return stable
 
 
 def _look_closer(
-    is_lost: Callable[[float], bool], grid: list[float], resolution: float, quick: bool
+    laboratory: Laboratory, grid: list[float], resolution: float, quick: bool
 ) -> float:
     """`bisect`, until none of many timesteps below is lost: with impacts islands are narrow."""
-    largest = bisect(is_lost, grid, resolution)
+    is_lost, snap = partial(laboratory.is_lost, 0), laboratory.snap
+    largest = bisect(is_lost, grid, resolution, snap=snap)
     while largest:
         top = min(largest, grid[-1])
-        closer = np.geomspace(top / _NEAR, top, _QUICK_CLOSER if quick else _CLOSER).tolist()
+        count = _QUICK_CLOSER if quick else _CLOSER
+        closer = sorted(set(map(snap, np.geomspace(top / _NEAR, top, count).tolist())))
         lost = next((step for step in closer[1:-1] if is_lost(step)), None)
         if lost is None:
             break
         grid = [*(step for step in grid if step < lost), lost]
-        largest = bisect(is_lost, grid, resolution)
+        largest = bisect(is_lost, grid, resolution, snap=snap)
     return largest
-
-
-def _first_gain(
-    laboratory: Laboratory, grid: Sequence[float], setup: Setup
-) -> tuple[float, float] | None:
-    """The first timestep (s) at which energy rises in a scene that nothing drives, and by how much.
-
-    `None` where it does not before the run is lost, or something drives it.
-    """
-    if not math.isfinite(setup.energy):
-        return None
-    least = _GAIN * setup.kinetic
-    lost = [h for h in laboratory.own_steps() if laboratory.is_lost(0, h)]
-    grid = [*(h for h in grid if not lost or h < lost[0]), *lost[:1]]
-
-    def gain(step: float) -> float:
-        trial = laboratory.trial(0, step)
-        return trial.energy - setup.energy
-
-    lossless = bisect(lambda h: not gain(h) <= least, grid, _GAIN_RESOLUTION, _NEAR)
-    if math.isinf(lossless):
-        return None
-    first = min(h for h in laboratory.own_steps() if h > lossless and not gain(h) <= least)
-    return first, gain(first) if math.isfinite(gain(first)) else 0.0
-
-
-def _tries(laboratory: Laboratory) -> tuple[tuple[float, int, int], ...]:
-    """By timestep the number of runs, from all starts over both spans, and of those lost."""
-    counts: dict[float, tuple[int, int]] = {}
-    for (_, step), runs in laboratory.trials.items():
-        total, lost = counts.get(step, (0, 0))
-        counts[step] = total + len(runs), lost + sum(not run.stable for run in runs.values())
-    return tuple((step, *counts[step]) for step in sorted(counts))
 
 
 _SEARCH, _LOWER = (0.25, 64.0), 8.0
@@ -420,7 +382,9 @@ def stable_rows(
         if search[1] <= search[0]:
             return None
         starts, shortest = QUICK_STARTS if quick else STARTS, min(scene.timesteps)
-        laboratory = Laboratory(run, span, starts, questions, shortest)
+        loop = scene.scenario.loop
+        snap = float if loop is None else loop.timestep_below
+        laboratory = Laboratory(run, span, starts, questions, shortest, snap)
         look = partial(find, laboratory, integrator, search)
         try:
             return look(closer=False), partial(look, closer=True)

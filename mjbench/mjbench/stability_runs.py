@@ -42,8 +42,6 @@ class StabilityTrial(Struct, frozen=True):
     growth: float
     """The factor by which velocities grow in a step, from half the run to its end; NaN where the
     run was lost before."""
-    energy: float = -math.inf
-    """The most potential and kinetic energy on the way, J."""
     reason: str = ""
     """Why it was lost."""
     astray: str = ""
@@ -132,7 +130,7 @@ def run_trial(
     )
     passages, astray = Passages(model, setup), ""
     sizes: list[tuple[int, float]] = []
-    limits, count, excess_end, energy, is_lost = setup, 0, 0.0, -math.inf, False
+    limits, count, excess_end, is_lost = setup, 0, 0.0, False
     peak_speed = 0.0
     for stop in (stop for stop in stops if stop <= steps):
         try:
@@ -140,11 +138,10 @@ def run_trial(
                 watch_steps(model, data, stop - count, passages)
         except mujoco.FatalError:  # MuJoCo does not run it
             reason = "MuJoCo does not run it"
-            return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan, -math.inf, reason, reason)
+            return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan, reason, reason)
         count, now = stop, update_peaks(data, Peaks())
         if not count:  # before the first step MuJoCo has computed no energy: it says 0
             now = replace(now, energy=-math.inf)
-        energy = max(energy, now.energy)
         if count <= _TRANSIENT:
             fastest = max(limits.velocity_bound, now.velocity)
             most = max(limits.energy_bound, now.energy)
@@ -169,7 +166,7 @@ def run_trial(
         status, reason = RunStatus.SLOW_GROWTH, "what shot up in the first steps did not come down"
     through = "; ".join(passages.texts())
     astray = astray or ("it is lost" if is_lost else "")
-    return StabilityTrial(timestep, status, _growth(sizes), energy, reason, astray, through)
+    return StabilityTrial(timestep, status, _growth(sizes), reason, astray, through)
 
 
 def _nearest_samples(times: Sequence[float], timestep: float) -> dict[int, int]:

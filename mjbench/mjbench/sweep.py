@@ -6,7 +6,6 @@
    geoms touch again within a sample: what rolls or slides over a stiff surface hops on it.
 3. In chaos the size of a change says nothing of the parameter once it is visible: two runs whose
    beginnings differ by 1e-10 are as far apart later. When it becomes visible is told instead.
-4. The parameter `threads` is that of `mujoco.rollout`, which runs copies of the scenario.
 """
 
 from __future__ import annotations
@@ -14,17 +13,14 @@ from __future__ import annotations
 import copy
 import re
 import zlib
-from collections.abc import Iterator
-from itertools import islice
 from typing import Any
 
 import mujoco
-import mujoco.rollout
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import replace
 
-from mjbench.costs import Clock, Job, scenario_job, time_jobs
+from mjbench.costs import Clock, scenario_job, time_jobs
 from mjbench.declarations import DeclaredScenario, DeclaredSweep, SweepValue, Variation
 from mjbench.measure import (
     Pair,
@@ -37,7 +33,6 @@ from mjbench.measure import (
 )
 from mjbench.pilot import NUDGE, nudges
 from mjbench.problem import Scenario, Setup
-from mjbench.reports import Interval
 from mjbench.reports.scene_report import (
     SweepReport,
     SweepRow,
@@ -53,7 +48,6 @@ from mjbench.simulation import (
     with_integrator,
 )
 
-THREADS = "threads"
 _PARAMETER = re.compile(r"(?P<kind>[a-z]+)(:(?P<name>.+))?\.(?P<field>\w+)(\[(?P<at>\d+)\])?")
 _PLURALS = {"body": "bodies", "equality": "equalities", "mesh": "meshes"}
 _ENUMS = {
@@ -62,46 +56,40 @@ _ENUMS = {
     "jacobian": mujoco.mjtJacobian,
     "solver": mujoco.mjtSolver,
 }
-_COPIES, _MOST_STEPS = 8, 2000
-"""Scenarios that each thread runs in a rollout, and steps of one at most."""
 
 
 def measure_sweep(
     spec: Any,
     scene: Scene,
     sweep: DeclaredSweep,
-    clocks: tuple[Clock, Clock] | None,
+    clock: Clock | None,
     *,
     quick: bool = False,
-    piece: slice | None = None,
 ) -> SweepReport:
     """Measure a model (`MjSpec`) with its parameters at other values.
 
-    `clocks`: processor time of the thread and wall time, in ns; `None`: nothing is timed. `piece`:
-    which of the values, over all parameters. A `SceneError` where a value is none of the model.
+    `clock`: as of `measure_scenario`. A `SceneError` where a value is none of the model.
     """
     base = _runnable(spec.compile())
-    threads = [part for part in sweep.variations if part.parameter == THREADS]
-    parts = [part for part in sweep.variations if part.parameter != THREADS]
-    values = [(part, value) for part in parts for value in part.values]
-    values = values if piece is None else values[piece]
-    variants = [_variant(spec, scene.scenario, part, value) for part, value in values]
+    variants = [
+        _variant(spec, scene.scenario, part, value)
+        for part in sweep.variations
+        for value in part.values
+    ]
     base_run = simulate(Setup(scenario=scene.scenario), base)
     states = base_run.states if base_run.judgement.ok else None
     chaotic = states is not None and _is_chaotic(scene, base, states)
     rows = [_measure_variant(scene, base, states, chaotic, row, model) for row, model in variants]
-    if clocks is not None:
+    if clock is not None:
         with silent():
             usable = [n for n, row in enumerate(rows) if row.status == "ok"]
             jobs = [
                 scenario_job(model, [scene.scenario], float(model.opt.timestep))
                 for model in (base, *(variants[n][1] for n in usable))
             ]
-            timings = time_jobs(jobs, 0, clocks[0], quick=quick)
+            timings = time_jobs(jobs, 0, clock, quick=quick)
             for n, timing in zip(usable, timings[1:], strict=True):
                 rows[n] = replace(rows[n], cost=timing.ratio)
-            for part in threads:
-                rows += _rollouts(scene.scenario, base, part, clocks[1], quick=quick)
     show = tuple("parted" if chaotic and name == "change" else name for name in sweep.show)
     return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, show, tuple(rows))
 
@@ -344,35 +332,3 @@ def _follow_hits(
         hit = previous[pair]
         hit.parting = max(0.0, contact_speeds(model, data, hit.contact)[0])
     return current
-
-
-def _rollouts(
-    scenario: Scenario, model: Any, part: Variation, clock: Clock, *, quick: bool
-) -> Iterator[SweepRow]:
-    counts = [int(value) for value in part.values if not isinstance(value, str | tuple)]
-    batch, step = _COPIES * max(counts, default=1), float(model.opt.timestep)
-    steps = min(_MOST_STEPS, scenario.steps(step) * len(scenario.times))
-    state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
-    data = initial_data(scenario, model)
-    mujoco.mj_getState(model, data, state, int(mujoco.mjtState.mjSTATE_FULLPHYSICS))
-    begins, control = np.tile(state, (batch, 1)), None
-    if scenario.forces or scenario.poses:
-        raise SceneError("a rollout has no pushes and no poses", part.place)
-    if scenario.controls:
-        rows = [inputs.controls for inputs in islice(scenario.inputs(step), steps)]
-        control = np.tile(rows, (batch, 1, 1))
-
-    def job(pool: mujoco.rollout.Rollout) -> Job:
-        datas = [mujoco.MjData(model) for _ in range(max(1, pool.nthread))]
-        return lambda: pool.rollout(model, datas, begins, control, nstep=steps)
-
-    pools = [mujoco.rollout.Rollout(nthread=count) for count in counts]
-    try:
-        timings = time_jobs([job(pool) for pool in pools], 0, clock, quick=quick)
-    finally:
-        for pool in pools:
-            pool.close()
-    for count, timing in zip(counts, timings, strict=True):
-        took, simulated = timing.nanoseconds, batch * steps * step * 1e9
-        speed = Interval(simulated / took.value, simulated / took.high, simulated / took.low)
-        yield SweepRow(THREADS, f"{count}", own=False, status="ok", throughput=speed)

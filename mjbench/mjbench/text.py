@@ -41,7 +41,6 @@ _HEADS = {
     "position": "position",
     "attitude": "attitude",
     "velocity": "velocity",
-    "throughput": "× real time",
 }
 """Short titles of figures; plots have the long ones."""
 
@@ -157,12 +156,10 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("near small steps", [reach_text(row.near, row.searched) for row in rows]),
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
         ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
-        ("gains energy from", ["" if r.gain is None else seconds_text(r.gain[0], 2) for r in rows]),
         (
             "stable again",
             [" to ".join(seconds_text(step, 3) for step in row.islands or ()) for row in rows],
         ),
-        ("starts lost: · none, ∘ some, • all", [row.map for row in rows]),
     ]
     yield from fitted_table(columns, style.width)
     reasons: dict[str, list[str]] = {}
@@ -225,8 +222,7 @@ def _lost(status: str, reasons: Iterable[str]) -> str:
 
 def case_text(report: CaseReport, style: Style = _PLAIN) -> str:
     """A hard case."""
-    number = f"case {report.case}: " if report.case else ""
-    lines = [f"{style.strong(report.name)}  {number}{report.title}"]
+    lines = [f"{style.strong(report.name)}  case {report.case}: {report.title}"]
     costs = [f"{name} {seconds_text(cost, 3)}" for name, cost in report.reached]
     if costs:
         text = f"to err by 0.001, a simulated second takes {', '.join(costs)}"

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
 
-from mjbench.declarations import Expected, Place
+from mjbench.declarations import Expected
 from mjbench.measure import quantity_name, quantity_values
 from mjbench.problem import STANDARD, Setup
 from mjbench.reports.scene_report import FigureLine, MeasuredSetting, SweepRow
@@ -26,33 +26,22 @@ from mjbench.sweep import with_contacts
 
 def measure_expected(model: Any, scene: Scene, baseline: MeasuredSetting) -> Iterator[FigureLine]:
     """What is known in theory, under every integrator at the scene's own timestep."""
-    expected: dict[str, tuple[float, str]] = {
-        name: (value, "as declared") for name, value in scene.declaration.expected.items()
-    }
-    if scene.exact is not None:
-        data = initial_data(scene.scenario, model)
-        quantities = scene.exact.states(np.zeros(1), data.qpos.copy(), data.qvel.copy()).expected
-        unknown = sorted(quantities.keys() - set(get_args(Expected)))
-        if unknown:
-            message = f"`{scene.exact.path}` expects `{unknown[0]}`, which is not measured"
-            help = f"known: {', '.join(get_args(Expected))}"
-            raise SceneError(message, Place(scene.exact.path), help)
-        expected |= {name: (value, scene.exact.path) for name, value in quantities.items()}
+    expected = scene.declaration.expected
     if expected:
         _check_expected(model, scene, baseline, expected)
     for integrator in STANDARD if expected else ():
         setting = replace(baseline, integrator=integrator.value)
         values = _measure_quantities(scene, with_setting(model, setting), expected)
-        for name, (exact, source) in expected.items():
+        for name, exact in expected.items():
             unit = {"penetration": "m", "slip": "m"}.get(name, "")
             if name in _OF_READINGS:
                 unit = "s" if name == "crossing" else _UNIT.sub(r"\1", quantity_name(model, scene))
-            yield FigureLine(name, unit, integrator.value, values[name], exact, source)
+            yield FigureLine(name, unit, integrator.value, values[name], exact, "as declared")
 
 
 def _measure_quantities(
-    scene: Scene, model: Any, names: Collection[str]
-) -> dict[str, float | None]:
+    scene: Scene, model: Any, names: Collection[Expected]
+) -> dict[Expected, float | None]:
     """The quantities of these names in a run of a model under its own options."""
     values: dict[str, float | None] = {}
     if _OF_READINGS.intersection(names):
@@ -76,7 +65,7 @@ def _check_expected(
     model: Any,
     scene: Scene,
     baseline: MeasuredSetting,
-    expected: Mapping[str, tuple[float, str]],
+    expected: Mapping[Expected, float],
 ) -> None:
     """Check that small steps tend to what is expected; a `SceneError` where they do not.
 
@@ -85,7 +74,7 @@ def _check_expected(
     """
     step = min(scene.timesteps) / _FINER
 
-    def measure(times: float, integrator: str) -> dict[str, float | None]:
+    def measure(times: float, integrator: str) -> dict[Expected, float | None]:
         stiff = model if times == 1 else stiffened(model, times)
         fine = replace(baseline, integrator=integrator, timestep=step / times)
         return _measure_quantities(scene, with_setting(stiff, fine), expected)
@@ -93,7 +82,7 @@ def _check_expected(
     runs = [measure(1.0, name) for name in ("implicitfast", "RK4")]
     precision = scene.declaration.precision or 0.0
     doubtful = {}
-    for name, (exact, _) in expected.items():
+    for name, exact in expected.items():
         values = [value for run in runs if (value := run[name]) is not None]
         if not values:
             continue  # nothing to compare with, which the table shows
@@ -106,20 +95,19 @@ def _check_expected(
         stiff_run = measure(times, "implicitfast")
         for name, gaps in doubtful.items():
             value = stiff_run[name]
-            gaps.append(math.inf if value is None else abs(value - expected[name][0]))
+            gaps.append(math.inf if value is None else abs(value - expected[name]))
         if any(gaps[-1] > _NEARER * gaps[-2] for gaps in doubtful.values()):
             break  # stiffer ones take longer, and would say the same
     for name, gaps in doubtful.items():
         if gaps[-1] > _NEARER * gaps[-2]:
-            exact, source = expected[name]
+            exact = expected[name]
             value = next(run[name] for run in runs if run[name] is not None)
             message = f"the expected {name}, {exact:g}, is not this scene's: it is {value:.6g}"
             message += " in small steps"
             stiffer = ", ".join(f"{times:g}" for times in _STIFFER[: len(gaps) - 1])
             help = f"with contacts and equalities as they are, and {stiffer} times as stiff, it is "
             help += f"off by {', '.join(f'{gap:.2g}' for gap in gaps)}; `precision` says how far"
-            is_declared = source == "as declared"
-            place = scene.declaration.place("expected") if is_declared else Place(source)
+            place = scene.declaration.place("expected")
             raise SceneError(message, place, f"{help} it may be off")
 
 

@@ -73,7 +73,7 @@ def measure_scenario(
     runs = _measure_settings(basis, choices, tell)
     rows = parts.collect(f"{scene.name}: settings", runs, share=0.25)
     rows.sort(key=lambda row: choices.index(row.setting))
-    cost_of, no_verdict = None, scene_report.RowVerdict(False, None, None, "")
+    cost_of, no_verdict = None, scene_report.RowVerdict(None, "")
     if clock is not None and rows:
         timed = partial(_with_costs, basis, rows, clock, quick)
         result = parts.run(f"{scene.name}: times", timed, None, share=0.3)

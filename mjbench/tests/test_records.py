@@ -220,9 +220,7 @@ def test_largest_stable_timesteps(
     was: Reach, now: Reach, expected: tuple[str, str, str] | None
 ) -> None:
     def stable(largest: Reach) -> ScenarioReport:
-        return scenario(
-            [], stable=(StableRow("Euler", largest, (1e-3, 0.1), None, 1.0, 9, 9, None),)
-        )
+        return scenario([], stable=(StableRow("Euler", largest, (1e-3, 0.1), None, 1.0, None),))
 
     departures = [
         (d.recorded, d.measured, d.band) for d in departures_between(stable(was), stable(now))
@@ -260,7 +258,7 @@ def test_what_is_known_exactly_is_compared_by_how_far_it_is_off() -> None:
 
 def test_boundaries_and_runs_of_cases() -> None:
     line = BoundaryLine(
-        "Euler", "all", (1e-3, 1.0), (0.3, 0.4), 9.0, 9, 9, None, beyond="through", growth=1.5
+        "Euler", "all", (1e-3, 1.0), (0.3, 0.4), 9.0, None, beyond="through", growth=1.5
     )
     old, run = case(), replace(case().errors[0], status="through")
     new = replace(old, boundaries=(line, *old.boundaries[1:]), errors=(run, *old.errors[1:]))

@@ -30,6 +30,7 @@ from coursebuild.core.pages.context import PageContext
 from coursebuild.core.pages.document_inputs import document_inputs
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import make_library
+from coursebuild.core.pages.numbering import items_of
 from coursebuild.core.pages.page_writer import PageWriter
 from coursebuild.core.pages.renderer import known_mathml
 from coursebuild.core.pages.urls import Place, lesson_path
@@ -144,7 +145,11 @@ class Make(Struct, frozen=True):
         results = results_of(rendered, runs or {}, status)
         typeset = known_mathml(dict(results.formulas))
         summarized = {
-            id: replace(document, summaries=summarize(document, typeset).value)
+            id: replace(
+                document,
+                summaries=summarize(document, typeset).value,
+                numbered_items=items_of(document, typeset),
+            )
             for id, document in documents.items()
         }
         return RenderedCourse(with_documents(rendered, summarized), results, self.assets)

@@ -52,7 +52,6 @@ class SweepRow(Struct, frozen=True):
     residual: float | None = None
     iterations: float | None = None
     cost: Interval | None = None
-    throughput: Interval | None = None
 
 
 class SweepReport(Struct, frozen=True):
@@ -162,16 +161,12 @@ class StableRow(Struct, frozen=True):
     searched: tuple[float, float]
     islands: tuple[float, float] | None
     duration: float
-    steps: int
-    tried: int
     energy: float | None
     theory: Reach | None = None
     formula: str = ""
-    gain: tuple[float, float] | None = None
     near: Reach | None = None
     through: Reach | None = None
     shown: str = ""
-    map: str = ""
 
 
 class FigureLine(Struct, frozen=True):
@@ -355,7 +350,6 @@ class SceneReport(Struct, frozen=True):
     scenarios: tuple[ScenarioReport, ...]
     card: SceneCard | None = None
     sweeps: tuple[SweepReport, ...] = ()
-    cases: tuple[CaseReport, ...] = ()
 
 
 class BatchCost(Struct, frozen=True):

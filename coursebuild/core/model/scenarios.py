@@ -230,8 +230,7 @@ class Variation(Struct, frozen=True):
 
 
 SweepFigure: TypeAlias = Literal[
-    "change", "figure", "penetration", "slip", "restitution",
-    "residual", "iterations", "cost", "throughput"
+    "change", "figure", "penetration", "slip", "restitution", "residual", "iterations", "cost"
 ]  # fmt: skip
 _WORD: TypeAlias = Annotated[
     str, matching(r"^[^±%]*$", "a number or a word of MuJoCo's; a share stands alone: `±1 %`")
@@ -249,7 +248,7 @@ class SweepTable(Struct, frozen=True, forbid_unknown_fields=True):
             Annotated[tuple[float | _WORD | _NUMBERS, ...], Meta(min_length=1)]
             | Annotated[str, matching(_SHARE, "values, or a share: `±1 %`")],
         ],
-        describe("values by parameter, such as `geom.solref[0]`, `option.cone`, `threads`"),
+        describe("values by parameter, such as `geom.solref[0]`, `option.cone`"),
     ]
     title: Annotated[fields.Text | None, describe("shown over its figures")] = None
     scenario: Annotated[Slug | None, describe("the first one where it is left out")] = None

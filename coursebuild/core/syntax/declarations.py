@@ -37,8 +37,8 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.source import Source
 
 MOST_SAMPLES = 100_000
-MOST_VALUES, MOST_THREADS = 100, 256
-"""The most values of a sweep, those of all parameters together, and the most threads."""
+MOST_VALUES = 100
+"""The most values of a sweep, those of all parameters together."""
 _TOLERANCE = 1e-9
 """A relative tolerance, as decimal fractions are not exact."""
 
@@ -126,10 +126,6 @@ def _check_sweeps(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
         if count > MOST_VALUES:
             message, help = f"the sweep has {count} values", f"{MOST_VALUES} are the most"
             yield diagnose("field-value", node.place("vary"), message, help=help)
-        counts = table.vary.get("threads", ())
-        if not all(values in range(1, MOST_THREADS + 1) for values in counts):
-            message = f"`threads` are whole numbers from 1 to {MOST_THREADS}"
-            yield diagnose("field-value", node.object("vary").place("threads"), message)
 
 
 def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:

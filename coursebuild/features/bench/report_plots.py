@@ -24,7 +24,6 @@ from coursebuild.features.bench.chart import (
     FINE,
     MARK,
     NARROW_SIZE,
-    PAIR_SIZE,
     ROW,
     SIZE,
     TICK_SIZE,
@@ -53,12 +52,8 @@ from coursebuild.features.bench.shown_errors import (
 
 def plot_svgs(report: ScenarioReport, *, name: str, narrow: bool = False) -> tuple[str, ...]:
     """The charts of a report as `svg` elements, with a `name` that is unique on the page."""
-    sizes = [WIDE_SIZE, PAIR_SIZE, PAIR_SIZE] if not narrow else [NARROW_SIZE] * 3
-    return tuple(
-        svg_text
-        for number, (chart, size) in enumerate(zip(report.charts, sizes, strict=False))
-        if (svg_text := chart_svg(chart, f"{name}-{number}" if number else name, size))
-    )
+    size = NARROW_SIZE if narrow else WIDE_SIZE
+    return tuple(filter(None, (chart_svg(chart, name, size) for chart in report.charts)))
 
 
 _SPREAD = 20.0

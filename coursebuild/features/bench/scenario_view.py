@@ -241,9 +241,7 @@ def integrator_table(
     rows = grids.merge_rows(rows) if merge else rows
     columns = [(words("measured.integrator"), [name for name, _ in rows])]
     columns += [(words(key), [cells[n] for _, cells in rows]) for n, key in enumerate(titles)]
-    return grids.grid(
-        label, columns, words=(words("measured.map"), words("measured.remark")), parts=parts
-    )
+    return grids.grid(label, columns, words=(words("measured.remark"),), parts=parts)
 
 
 STABLE = (
@@ -251,10 +249,6 @@ STABLE = (
     "measured.near",
     "measured.through",
     "measured.theory",
-    "measured.gain",
-    "measured.map",
-    "measured.steps",
-    "measured.tried",
 )
 """Keys of the titles of `stable_cells`."""
 
@@ -270,24 +264,12 @@ def stable_title(words: Strings, rows: Sequence[StableRow]) -> str:
 
 
 def stable_cells(words: Strings, row: StableRow) -> tuple[str, ...]:
-    """Write a largest stable timestep, what else is known of it, and the search for it."""
-    low = seconds_text(float(f"{row.searched[0]:.3g}"))
-    search = words("measured.tried_from", count=row.tried, time=low) if row.tried else ""
-    gain = ""
-    if row.gain is not None:
-        step, energy = row.gain
-        bound = "≤ " if step <= row.searched[0] else ""  # the shortest that was tried gains too
-        time = bound + seconds_text(step, 2)
-        gain = words("measured.gained", time=time, energy=grids.factor(energy, 2))
+    """Write a largest stable timestep, and what else is known of it."""
     return (
         _reach(words, row.largest, row) if isinstance(row.largest, str) else row.shown,
         _reach(words, row.near, row),
         _reach(words, row.through, row),
         _theory(words, row.theory),
-        gain,
-        row.map,
-        str(row.steps),
-        search,
     )
 
 

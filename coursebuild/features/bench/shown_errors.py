@@ -62,7 +62,6 @@ FIGURES = {
     "residual": "solver residual",
     "iterations": "iterations a step",
     "cost": "cost",
-    "throughput": "× real time",
 }
 """The figures that are measured for every value, with their labels."""
 

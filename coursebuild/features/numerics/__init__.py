@@ -14,7 +14,8 @@ from markupsafe import Markup
 from msgspec import Struct
 
 from coursebuild.api import Command, Feature, Library, PageKind, urls
-from coursebuild.core.model.measurements import CaseReport, FigureLine, SceneReport
+from coursebuild.core.model.addresses import document_anchors
+from coursebuild.core.model.measurements import CaseReport, FigureLine
 from coursebuild.core.model.report_files import STABILITY
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids, scenario_view
@@ -45,8 +46,14 @@ class CaseView(Struct, frozen=True):
     folded_plots: tuple[Markup, ...]
     tables: tuple[grids.Grid, ...]
     notes: tuple[str, ...]
-    page: str
-    """The address of the model's page, for a case of the course's own; else empty."""
+
+
+class LabLink(Struct, frozen=True):
+    """A lab in which a reader tries what a family is about."""
+
+    lesson: str
+    """The title of where it is."""
+    href: str
 
 
 class MatrixCell(Struct, frozen=True):
@@ -67,7 +74,7 @@ class MatrixRow(Struct, frozen=True):
 
 
 class CaseFamily(Struct, frozen=True):
-    """Cases of one number, or of the course's own, in the picture of all cases."""
+    """Cases of one number, in the picture of all cases."""
 
     title: str
     href: str
@@ -79,9 +86,7 @@ _SHADES = 3
 
 def _families(library: Library) -> dict[str, tuple[CaseReport, ...]]:
     """The cases by the id of their family, which names its page."""
-    scenes: Mapping[str, SceneReport] = library.reports.scenes
-    course_reports = [report for name in sorted(scenes) for report in scenes[name].cases]
-    cases = [*sorted(library.reports.cases, key=attrgetter("case")), *course_reports]
+    cases = sorted(library.reports.cases, key=attrgetter("case"))
     return {
         f"case-{number}": tuple(reports)
         for number, reports in groupby(cases, key=attrgetter("case"))
@@ -89,9 +94,8 @@ def _families(library: Library) -> dict[str, tuple[CaseReport, ...]]:
 
 
 def _family_title(words: Strings, reports: tuple[CaseReport, ...]) -> str:
-    number, key = reports[0].case, f"numerics.case_{reports[0].case}"
-    has_own_title = (not number or len(reports) > 1) and words.has(key)
-    return words(key) if has_own_title else reports[0].title
+    key = f"numerics.case_{reports[0].case}"
+    return words(key) if len(reports) > 1 and words.has(key) else reports[0].title
 
 
 def numerics_values(library: Library) -> dict[str, object]:
@@ -119,9 +123,22 @@ def family_values(library: Library, part: str) -> dict[str, object]:
     return {
         "title": _family_title(words, reports),
         "up": place.href(KIND.path),
-        "cases": tuple(case_view(words, place, report) for report in reports),
+        "labs": tuple(_labs(library, place, reports)),
+        "cases": tuple(case_view(words, report) for report in reports),
         **_sources(library, place),
     }
+
+
+def _labs(
+    library: Library, place: urls.Place, reports: tuple[CaseReport, ...]
+) -> Iterator[LabLink]:
+    """The first lab of each lesson whose label, `lab:NAME`, names a case or a family of them."""
+    names = tuple(f"lab:{report.name}-" for report in reports)
+    for owner, document in library.course.owned_documents:
+        for anchor, _, _ in document_anchors(document):
+            if anchor.startswith("lab:") and any(name.startswith(f"{anchor}-") for name in names):
+                yield LabLink(owner.title, place.href(urls.owner_path(owner), anchor))
+                break
 
 
 def _sources(library: Library, place: urls.Place) -> dict[str, object]:
@@ -165,9 +182,8 @@ def _cells(figures: Mapping[str, tuple[float, str]]) -> tuple[MatrixCell, ...]:
     return tuple(cells)
 
 
-def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView:
+def case_view(words: Strings, report: CaseReport) -> CaseView:
     """A case as the page shows it."""
-    model = "" if report.case else report.name.rpartition("/")[0]
     label = words("numerics.orders", title=report.title)
     orders = scenario_view.orders_table(words, label, report.orders, merge=True)
     rows = [
@@ -201,7 +217,6 @@ def case_view(words: Strings, place: urls.Place, report: CaseReport) -> CaseView
         tuple(filter(None, drawings[1:])),
         tuple(grid for grid in tables if grid is not None),
         tuple(_notes(words, report)),
-        place.href(urls.model_page_path(model)) if model else "",
     )
 
 

@@ -1,8 +1,6 @@
 """`coursebuild stability`: MuJoCo on hard cases, beside what theory says.
 
-1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios), or a
-   model of the course whose exact motion it gives, or of which it knows theory: what `bench`
-   measures of it is a hard case too.
+1. A name means a problem, or a family of them (`damped-spring` is all of its damping ratios).
 2. All problems are recorded in one file. Where some are named, recording them leaves the others as
    they are, and checking them ignores the others.
 3. Where the two references of a case are further apart than they may be, it is an error, and
@@ -19,12 +17,10 @@ import msgspec
 from msgspec.structs import replace
 
 from coursebuild.api import Options, UsageError
-from coursebuild.core.model.measurements import CaseReport, SceneReport
+from coursebuild.core.model.measurements import CaseReport
 from coursebuild.core.model.report_files import STABILITY, ReportFailure
-from coursebuild.core.model.scenarios import exact_file
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.near import nearest
-from coursebuild.features.bench.commands import bench
 from coursebuild.features.bench.commands.measurement import (
     Departure,
     Measurement,
@@ -41,13 +37,12 @@ from coursebuild.features.bench.commands.measurement import (
 )
 from coursebuild.features.bench.commands.measuring import Mjbench
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
-from coursebuild.pipeline.scenes import find_scenes, read_record
+from coursebuild.pipeline.scenes import read_record
 from coursebuild.report.values import json_text
 
 EXAMPLES = """\
 examples:
   coursebuild stability damped-spring    one family of hard cases
-  coursebuild stability falling_ball     a model of the course whose exact motion it gives
 """
 
 
@@ -58,7 +53,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "problems",
         nargs="*",
         metavar="PROBLEM",
-        help="a hard case, a family of them, or a model of the course (default: all)",
+        help="a hard case, or a family of them (default: all)",
     )
     add_format(parser, "text", "json")
     add_report_options(parser)
@@ -88,17 +83,11 @@ def stability(
     options: Options, mjbench: Mjbench, names: tuple[str, ...] = (), *, record: bool = False
 ) -> Measurement[CaseReport]:
     """Measure the cases of these names, or all without names; `record` writes them down."""
-    own_models, built_in = _split(options, names)
-    measurement: Measurement[CaseReport] = Measurement(())
-    if built_in or not own_models:
-        run = _CaseRun(options, mjbench)
-        problems = _select_problems(options, run.facts.problems, built_in)
-        measurement = run.measure_each(problems)
-        if record and not measurement.failures:
-            measurement = _record(options, mjbench, run.facts.problems, measurement, names)
-    if not own_models:
-        return measurement
-    return _join_reports(measurement, bench.bench(options, mjbench, own_models, record=record))
+    run = _CaseRun(options, mjbench)
+    measurement = run.measure_each(_select_problems(run.facts.problems, names))
+    if record and not measurement.failures:
+        return _record(options, mjbench, run.facts.problems, measurement, names)
+    return measurement
 
 
 def _record(
@@ -121,65 +110,30 @@ def _record(
     return write_records(options.root, measurement, [(STABILITY.path(), data)])
 
 
-def _join_reports(
-    measurement: Measurement[CaseReport], of_course: Measurement[SceneReport]
-) -> Measurement[CaseReport]:
-    return Measurement(
-        reports=(*measurement.reports, *(c for scene in of_course.reports for c in scene.cases)),
-        values=(*measurement.values, *(c for value in of_course.values for c in value["cases"])),
-        diagnostics=of_course.diagnostics,
-        failures=(*measurement.failures, *of_course.failures),
-        checked=(*measurement.checked, *of_course.checked),
-        remarks=(*measurement.remarks, *of_course.remarks),
-    )
-
-
-def _split(options: Options, names: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """The names of models of the course, and those of hard cases."""
-    models = tuple(name for name in names if (options.root / f"models/{name}.xml").is_file())
-    for scene in find_scenes(options.root, models).value if models else ():
-        has_theory = any(
-            scenario.expected or scenario.closed_form for scenario in scene.declarations.scenarios
-        )
-        if not has_theory and not (options.root / exact_file(scene.name)).is_file():
-            help = f"give its motion in {exact_file(scene.name)}, or `expected` of a scenario"
-            raise UsageError(f"no theory is known for `{scene.name}`", help=help)
-    return models, tuple(name for name in names if name not in models)
-
-
 def check_stability(
     options: Options, mjbench: Mjbench, names: tuple[str, ...] = ()
 ) -> Measurement[CaseReport]:
     """Measure again, and compare with the record; without a record nothing is measured."""
-    own_models, built_in = _split(options, names)
-    measurement: Measurement[CaseReport] = Measurement(())
-    if built_in or not own_models:
-        run = _CaseRun(options, mjbench, use_store=False)
-        problems = _select_problems(options, run.facts.problems, built_in)
-        recorded = read_record(options.root, STABILITY)
-        if isinstance(recorded, ReportFailure):
-            measurement = Measurement((), failures=(recorded,))
-        else:
-            measurement = run.measure_each(problems)
-            new = {case.name for case in measurement.reports}
-            old = [case for case in recorded if not built_in or case.name in new]
-            engine = engine_version()
-            other_engines = sorted({case.machine.engine for case in old} - {engine})
-            remarks = tuple(
-                f"recorded with MuJoCo {name}, measured with {engine}" for name in other_engines
-            )
-            names_of_old = {case.name for case in old}
-            values = recorded_value(options.root, STABILITY)
-            old_values = [value for value in values if value["name"] in names_of_old]
-            data = mjbench.do(
-                "compare", recorded_cases=old_values, measured_cases=measurement.values
-            )
-            departures = msgspec.json.decode(data, type=tuple[Departure, ...])
-            check = RecordCheck("stability", STABILITY.path(), departures, remarks)
-            measurement = replace(measurement, checked=(check,))
-    if not own_models:
-        return measurement
-    return _join_reports(measurement, bench.check(options, mjbench, own_models))
+    run = _CaseRun(options, mjbench, use_store=False)
+    problems = _select_problems(run.facts.problems, names)
+    recorded = read_record(options.root, STABILITY)
+    if isinstance(recorded, ReportFailure):
+        return Measurement((), failures=(recorded,))
+    measurement = run.measure_each(problems)
+    new = {case.name for case in measurement.reports}
+    old = [case for case in recorded if not names or case.name in new]
+    engine = engine_version()
+    other_engines = sorted({case.machine.engine for case in old} - {engine})
+    remarks = tuple(
+        f"recorded with MuJoCo {name}, measured with {engine}" for name in other_engines
+    )
+    names_of_old = {case.name for case in old}
+    values = recorded_value(options.root, STABILITY)
+    old_values = [value for value in values if value["name"] in names_of_old]
+    data = mjbench.do("compare", recorded_cases=old_values, measured_cases=measurement.values)
+    departures = msgspec.json.decode(data, type=tuple[Departure, ...])
+    check = RecordCheck("stability", STABILITY.path(), departures, remarks)
+    return replace(measurement, checked=(check,))
 
 
 class _CaseRun(MeasuringRun[CaseReport]):
@@ -202,18 +156,15 @@ class _CaseRun(MeasuringRun[CaseReport]):
             yield task_of("case", None, name=name)
 
 
-def _select_problems(
-    options: Options, problem_names: tuple[str, ...], names: tuple[str, ...]
-) -> list[str]:
+def _select_problems(problem_names: tuple[str, ...], names: tuple[str, ...]) -> list[str]:
     """The names of all problems that these names mean; of all problems without names."""
     selection = set() if names else set(problem_names)
     for name in names:
         matches = {p for p in problem_names if p == name or p.startswith(f"{name}-")}
         if not matches:
-            models = [path.stem for path in (options.root / "models").glob("*.xml")]
-            suggestion = nearest(name, (*problem_names, *models))
+            suggestion = nearest(name, problem_names)
             all_of_them = "known: " + ", ".join(problem_names)
             help = all_of_them if suggestion is None else f"did you mean `{suggestion}`?"
-            raise UsageError(f"no hard case or model is called `{name}`", help=help)
+            raise UsageError(f"no hard case is called `{name}`", help=help)
         selection |= matches
     return [problem for problem in problem_names if problem in selection]

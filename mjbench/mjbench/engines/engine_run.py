@@ -25,8 +25,7 @@ from mjbench.bench import (
     report_errors,
 )
 from mjbench.engines import MODULES
-from mjbench.engines.child import EngineChild
-from mjbench.engines.engine_main import Reply
+from mjbench.engines.child import EngineChild, Reply, Request
 from mjbench.engines.engine_trial import (
     Engine,
     EngineBasis,
@@ -148,7 +147,7 @@ class _ScenarioRun(Struct, frozen=True, eq=False):
             velocity=None,
         )
         with self._child(choice) as child:
-            reply = child.reply(action="list")
+            reply = child.reply(Request())
         if reply.refusal:
             yield _refuse(row, reply)
             return
@@ -157,25 +156,25 @@ class _ScenarioRun(Struct, frozen=True, eq=False):
             name = f"{choice.engine.title}, {variant.bits} bits, {variant.label or variant.device}"
             self.host.tell(f"{self.basis.pilot.scene.name}: {name}")
             with self._child(choice) as child:
-                reply = child.reply(action="motion", variant=variant, trial=self.trial)
+                request = Request(variant, self.trial, moves=True)
+                reply = child.reply(request)
                 if reply.motion is None:
                     yield _refuse(named_row, reply)
                     continue
                 named_row = judge_motion(self.basis, named_row, reply.motion)
                 costs = [_batch_cost(1, reply)]
                 if choice.engine.batched:
-                    request = {"action": "costs", "variant": variant, "trial": self.trial}
-                    costs += self._batch_costs(child, request)
+                    costs += self._batch_costs(child, replace(request, moves=False))
                 yield replace(named_row, costs=tuple(costs))
 
-    def _batch_costs(self, child: EngineChild, request: dict[str, object]) -> Iterator[BatchCost]:
+    def _batch_costs(self, child: EngineChild, request: Request) -> Iterator[BatchCost]:
         expected = 0.0
         for worlds in WORLDS[1:2] if self.quick else WORLDS[1:]:
             if expected * worlds * _ROUNDS > self.seconds:
                 remark = f"not tried: a step would take about {expected * worlds:.2g} s"
                 yield BatchCost(worlds, remark=remark)
                 continue
-            reply = child.reply(**request, worlds=worlds)
+            reply = child.reply(replace(request, worlds=worlds))
             expected = 0.0 if reply.cost is None else reply.cost.seconds.value
             yield _batch_cost(worlds, reply)
 

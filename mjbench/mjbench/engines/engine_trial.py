@@ -11,7 +11,6 @@ It is asked for one motion, and for what a step of many worlds costs.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Literal, Protocol, TypeAlias
@@ -108,12 +107,11 @@ class EngineTrial(Struct, frozen=True):
     """The number of samples up to which the motion is compared."""
 
 
-class EngineMotion(Struct, frozen=True):
+class EngineMotion(Struct, frozen=True, eq=False):
     """The motion of one world, at each sample."""
 
-    qpos: list[list[float | None]]
-    """`None` for what is not finite, which JSON cannot say."""
-    qvel: list[list[float | None]]
+    qpos: Array
+    qvel: Array
     compile_seconds: float
 
 
@@ -124,8 +122,6 @@ class EngineCost(Struct, frozen=True):
     ratio: Interval
     """To a step of MuJoCo itself in one world, timed in turn."""
     compile_seconds: float
-    steps: int
-    """Steps of a repeat, from the beginning of the scenario."""
 
 
 _SPREAD = 1e-3
@@ -175,12 +171,7 @@ def run_motion(batch: Batch, trial: EngineTrial) -> EngineMotion:
             worlds.advance(steps)
             states.append(worlds.state())
     qpos, qvel = (np.array(part) for part in zip(*states, strict=True))
-    return EngineMotion(_finite(qpos), _finite(qvel), batch.compile_seconds)
-
-
-def _finite(table: Array) -> list[list[float | None]]:
-    rows: list[list[float]] = table.tolist()
-    return [[value if math.isfinite(value) else None for value in row] for row in rows]
+    return EngineMotion(qpos, qvel, batch.compile_seconds)
 
 
 def run_costs(batch: Batch, trial: EngineTrial, clock: Clock) -> EngineCost:
@@ -220,7 +211,6 @@ def run_costs(batch: Batch, trial: EngineTrial, clock: Clock) -> EngineCost:
         timing.nanoseconds.scale(1e-9 / (steps * count)),
         timing.ratio.scale(share),
         batch.compile_seconds,
-        steps,
     )
 
 
@@ -274,7 +264,7 @@ def judge_motion(basis: EngineBasis, row: EngineRow, motion: EngineMotion) -> En
     model, scenario, reference = basis.model, basis.pilot.scene.scenario, basis.reference
     row = replace(row, compile_seconds=motion.compile_seconds)
     times = scenario.times[: len(motion.qpos)]
-    qpos, qvel = (np.array(part, dtype=np.float64) for part in (motion.qpos, motion.qvel))
+    qpos, qvel = motion.qpos, motion.qvel
     states = EngineStates(times, qpos, qvel, np.zeros((len(times), int(model.na))))
     if not (np.isfinite(qpos).all() and np.isfinite(qvel).all()):
         lost = int(np.argmin(np.isfinite(np.hstack([qpos, qvel])).all(axis=1)))

@@ -1,4 +1,4 @@
-"""The report on a hard case, or on a scenario of the course whose exact motion is known."""
+"""The report on a hard case."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class CaseReport(Record, frozen=True):
     name: str
     title: str
     case: int
-    """Its number on the list of hard cases; 0 for one of the course's own."""
+    """Its number on the list of hard cases."""
     machine: Machine
     note: str
     reference: ReferenceLine

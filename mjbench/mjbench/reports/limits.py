@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 from mjbench.reports import Reach, reach_bound
 from mjbench.reports.scene_report import ScenarioReport, StableRow, WorkPrecisionRow
 from mjbench.reports.shown_errors import seconds_text
 
-_TOGETHER, _MOST_DIGITS = 0.1, 4
-"""How far theory at rest may be above runs, relative, and the most digits of a limit."""
-_SIGNS = "·∘•"
-"""Of a timestep in a map: none, some or all of its runs were lost."""
+_TOGETHER, _MOST_DIGITS, _FEW_DIGITS = 0.1, 4, 2
+"""How far theory at rest may be above runs, relative, and the most digits of a limit: few where
+longer timesteps are stable again."""
 
 
 def limit_text(row: StableRow) -> str:
     """The largest stable timestep with the digits on which theory and all runs agree.
 
     Theory at rest counts up to a tenth above: else the motion is lost far from rest. Where limits
-    have islands, no digit is finer than the gaps between timesteps that were tried. It is never
+    have islands, there are two: others may lie between timesteps that were tried. It is never
     above them all: whoever takes it would lose the run. Where two digits do not hold, it is the
     least limit, and what allows more is said: the own start, theory, or elsewhere, another start or
     another time.
@@ -28,14 +26,13 @@ def limit_text(row: StableRow) -> str:
     if row.bracket is None or row.largest == "none":
         return reach_text(row.largest, row.searched)
     low, high = row.bracket
-    if row.islands is not None:
-        low = min(low, high / _widest_gap(row))
     if isinstance(row.theory, float) and row.theory < high * (1 + _TOGETHER):
         low, high = min(low, row.theory), max(high, row.theory)
     if low <= 0:
         return f"none from every start; from its own {reach_text(row.largest, row.searched)}"
     least = max(high - low, low * 10.0**-_MOST_DIGITS)
     digits = math.floor(math.log10(low)) - math.ceil(math.log10(least) - 1e-9) + 1
+    digits = digits if row.islands is None else min(digits, _FEW_DIGITS)
     if digits < 2:
         most = seconds_text(high, 2)
         if row.theory == high:
@@ -61,23 +58,6 @@ def reach_text(limit: Reach | None, searched: tuple[float, float], digits: int =
         return f"none from {seconds_text(searched[0], 3)} on"
     assert isinstance(limit, float)
     return seconds_text(limit, digits)
-
-
-def _widest_gap(row: StableRow) -> float:
-    """The largest ratio of timesteps tried next to each other, from half the largest stable one."""
-    top = min(reach_bound(row.largest), row.searched[1])
-    steps = [step for step, _, _ in row.tries if top / 2 <= step <= top * (1 + 1e-9)]
-    return max((following / step for step, following in pairwise(steps)), default=1.0)
-
-
-def map_text(row: StableRow) -> str:
-    """A sign for each timestep that was tried from all starts, from the shortest to the longest."""
-    most = max((runs for _, runs, _ in row.tries), default=0)
-    tries = [(step, runs, lost) for step, runs, lost in row.tries if 2 * runs > most > 2]
-    if not any(lost for _, _, lost in tries):
-        return ""
-    signs = "".join(_SIGNS[(lost > 0) + (lost == runs)] for _, runs, lost in tries)
-    return f"{seconds_text(tries[0][0], 2)} {signs} {seconds_text(tries[-1][0], 2)}"
 
 
 def stability_text(report: ScenarioReport) -> str:

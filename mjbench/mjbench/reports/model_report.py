@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from mjbench.machine import Machine
 from mjbench.reports import PartFailure, Record
-from mjbench.reports.case_report import CaseReport
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
 
 
@@ -45,5 +44,3 @@ class SceneReport(Record, frozen=True):
     card: SceneCard | None = None
     """`None` in a report that is about speed and error alone."""
     sweeps: tuple[SweepReport, ...] = ()
-    cases: tuple[CaseReport, ...] = ()
-    """Scenarios whose exact motion is given, or of which theory is, as hard cases."""

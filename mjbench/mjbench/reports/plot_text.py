@@ -43,7 +43,7 @@ def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
     yield f"{'':>11}{''.join(axis)}".rstrip()
     yield f"{'':>11}{chart.axes[0]}"
     names = [f"{_LETTERS[line.number % len(_LETTERS)]} {line.name}" for line in chart.lines]
-    keys = [f"{_OWN} the model's own", f"{_LOST} lost", "capital: on the front"]
+    keys = [f"{_OWN} the model's own", f"{_LOST} lost", "capital: nothing is better"]
     yield "  ".join([*names, *keys])
     texts = [level.text for level, at in zip(levels, heights, strict=True) if at in near]
     if texts:

@@ -180,8 +180,7 @@ def scene_departures(
                 parts = {"status": _Figure(status_text(row.status))}
                 for name in ("change", "parted", "penetration", "slip", "restitution"):
                     parts[name] = _Figure(getattr(row, name), bench.band, _INVISIBLE)
-                if row.parameter != "threads":
-                    table[f"{row.parameter} {row.value}", "value"] = parts
+                table[f"{row.parameter} {row.value}", "value"] = parts
             tables.append((sweep.name, table))
         return _by_name(tables)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping
 
 from mjbench.reports import Interval, PartFailure, Reach, Record
 from mjbench.reports.charts import Chart
@@ -12,7 +13,7 @@ class SweepRow(Record, frozen=True):
     """The model with one parameter at one value."""
 
     parameter: str
-    """As the course names it, such as `geom.solref[0]`; `threads` is that of a rollout."""
+    """As the course names it, such as `geom.solref[0]`."""
     value: str
     own: bool
     """Whether it is the value that the model has."""
@@ -39,8 +40,6 @@ class SweepRow(Record, frozen=True):
     """Of the solver, mean of all steps."""
     cost: Interval | None = None
     """Time for the scenario, relative to the model as it is."""
-    throughput: Interval | None = None
-    """Simulated time over wall time, of all that a rollout simulates at once."""
 
 
 class SweepReport(Record, frozen=True):
@@ -217,11 +216,6 @@ class StableRow(Record, frozen=True):
     """The shortest and longest stable timesteps beyond the largest, s; `None` where none is."""
     duration: float
     """Simulated time of each run, s."""
-    steps: int
-    """Of a run with the largest stable timestep; with the longest, or shortest, where all or none
-    is stable."""
-    tried: int
-    """How many timesteps up to the largest were tried."""
     energy: float | None
     """Most energy that a stable run may have, J; `None` where it is not judged."""
     bracket: tuple[float, float] | None = None
@@ -231,11 +225,6 @@ class StableRow(Record, frozen=True):
     """As `largest`, of linear theory; `None` where there is none for what the scenario visits."""
     formula: str = ""
     """Where the theory comes from; empty where there is none."""
-    gain: tuple[float, float] | None = None
-    """The first timestep (s) with which a scene that nothing drives gains energy, and how much (J);
-    `None` where none does, or something drives it."""
-    tries: tuple[tuple[float, int, int], ...] = ()
-    """The map: by timestep (s), how many runs there were, and how many of them were lost."""
     reason: str = ""
     """Why the first timestep beyond the largest is lost."""
     near: Reach | None = None
@@ -246,8 +235,6 @@ class StableRow(Record, frozen=True):
     through_reason: str = ""
     shown: str = ""
     """The largest stable timestep in words, with the digits on which all runs agree."""
-    map: str = ""
-    """A sign for each timestep that was tried from all starts; see `limits.map_text`."""
 
     @property
     def monotone(self) -> bool:
@@ -322,11 +309,8 @@ class PhaseProfile(Record, frozen=True):
 class RowVerdict(Record, frozen=True):
     """Whether a scene's own setting is a good choice."""
 
-    on_front: bool
     better: int | None
     """The row that is better in no column worse, from starts nearby too; `None` where none is."""
-    noticeable: bool | None
-    """Whether a learner would see the own setting's error; `None` where it is not known."""
     text: str
     """The same in a sentence or two."""
     worse: tuple[str, ...] = ()
@@ -347,6 +331,17 @@ class ErrorQuantity(Record, frozen=True):
     """Errors that are not larger are not resolved by the reference."""
     resolved: bool
     """Whether any row has a larger one."""
+
+    def value_of(self, row: MeasuredRun) -> float | None:
+        """The largest error of a row over the horizon; `None` where the row has none."""
+        error: tuple[float, float] | float | None = getattr(row, self.name)
+        value = error[0] if isinstance(error, tuple) else error
+        return None if value is None or not math.isfinite(value) else abs(value)
+
+    def is_resolved(self, rows: Iterable[MeasuredRun]) -> bool:
+        """Whether any of the rows has an error above the floor."""
+        errors = (self.value_of(row) for row in rows)
+        return any(error is not None and error > self.least * (1 + 1e-9) for error in errors)
 
 
 class ScenarioReport(Record, frozen=True):
@@ -416,7 +411,7 @@ class ScenarioReport(Record, frozen=True):
     main: str = ""
     """The name of the error that settings are compared by first, and that is drawn."""
     charts: tuple[Chart, ...] = ()
-    """Error against cost, evaluations, and iterations of the solver."""
+    """Error against cost, or evaluations where nothing was timed."""
     profile: tuple[PhaseProfile, ...] = ()
     """Where the time goes under the settings that the verdict compares, the own first; empty where
     it was not asked for."""

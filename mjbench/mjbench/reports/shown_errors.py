@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench.reports import Interval
 from mjbench.reports.scene_report import (
     FLOORS,
+    ErrorQuantity,
     MeasuredRun,
     MeasuredSetting,
     WorkPrecisionRow,
@@ -23,42 +22,20 @@ FEWEST_STEPS = 20
 """Steps of a scenario at the longest timestep that is tried for stability."""
 
 
-class Quantity(Struct, frozen=True):
-    """An error that can be drawn."""
-
-    name: str
-    """The field of a row, as of an `ErrorQuantity`."""
-    label: str
-    """What it is, with its unit."""
-    least: float = 0.0
-    """The floor of the reference: smaller errors mean nothing."""
-
-    def value_of(self, row: MeasuredRun) -> float | None:
-        """The largest error of a row over the horizon; `None` where the row has none."""
-        error: tuple[float, float] | float | None = getattr(row, self.name)
-        value = error[0] if isinstance(error, tuple) else error
-        return None if value is None or not math.isfinite(value) else abs(value)
-
-    def is_resolved(self, rows: Iterable[MeasuredRun]) -> bool:
-        """Whether any of the rows has an error above the floor."""
-        errors = (self.value_of(row) for row in rows)
-        return any(error is not None and error > self.least * (1 + 1e-9) for error in errors)
-
-
-SEEN = Quantity("seen", "what is seen (1: just visible)")
+SEEN = ErrorQuantity("seen", "what is seen (1: just visible)", 0.0, False)
 """What a learner sees: it is compared where no other error is declared and resolved."""
 
 
-STEPPED = Quantity("step_error", "what is seen of steps (1: just visible)")
+STEPPED = ErrorQuantity("step_error", "what is seen of steps (1: just visible)", 0.0, False)
 """The same without the error of the model of contacts, which no timestep mends."""
 
 
 def quantities(
     rows: Sequence[WorkPrecisionRow],
-    figure: Quantity,
+    figure: ErrorQuantity,
     least_seen: float,
     floors: tuple[float, float],
-) -> tuple[Quantity, ...]:
+) -> tuple[ErrorQuantity, ...]:
     """The errors that some row has, what the scenario declares to be measured first.
 
     `floors`: those of the reference, of places and velocities.
@@ -68,14 +45,16 @@ def quantities(
         figure,
         replace(STEPPED, least=least_seen),
         replace(SEEN, least=least_seen),
-        Quantity("position", "position (m or rad)", place),
-        Quantity("attitude", "attitude (rad)", place),
-        Quantity("velocity", "velocity (m/s or rad/s)", speed),
+        ErrorQuantity("position", "position (m or rad)", place, False),
+        ErrorQuantity("attitude", "attitude (rad)", place, False),
+        ErrorQuantity("velocity", "velocity (m/s or rad/s)", speed, False),
     )
     return tuple(q for q in candidates if any(q.value_of(row) is not None for row in rows))
 
 
-def main_quantity(present: Sequence[Quantity], rows: Sequence[MeasuredRun]) -> Quantity | None:
+def main_quantity(
+    present: Sequence[ErrorQuantity], rows: Sequence[MeasuredRun]
+) -> ErrorQuantity | None:
     """The first error that is resolved, else the first; `None` where no row has an error."""
     resolved = (quantity for quantity in present if quantity.is_resolved(rows))
     return next(resolved, next(iter(present), None))
@@ -95,69 +74,14 @@ COST_SLACK, ERROR_SLACK = 0.03, 0.05
 Rows: TypeAlias = Sequence[WorkPrecisionRow]
 
 
-class FrontPoint(Struct, frozen=True):
-    """The place of a setting in the plot."""
-
-    cost: Interval
-    error: float
-
-    def beats(self, rival: FrontPoint) -> bool:
-        """Whether this is clearly better in one respect, and no worse in the other."""
-        is_more_accurate = self.error * (1 + ERROR_SLACK) < rival.error
-        is_no_worse = self.error <= rival.error * (1 + ERROR_SLACK)
-        return (self.is_cheaper(rival) and is_no_worse) or (
-            is_more_accurate and self.is_no_dearer(rival)
-        )
-
-    def is_cheaper(self, rival: FrontPoint) -> bool:
-        """Whether this costs less, beyond what timing can tell."""
-        is_separate = self.cost.high < rival.cost.low
-        return is_separate and self.cost.value * (1 + COST_SLACK) < rival.cost.value
-
-    def is_no_dearer(self, rival: FrontPoint) -> bool:
-        """Whether this costs no more: where times are uncertain, by the likeliest ones."""
-        return self.cost.value <= rival.cost.value * (1 + COST_SLACK)
+def is_cheaper(cost: Interval, rival: Interval) -> bool:
+    """Whether a cost is less than another, beyond what timing can tell."""
+    return cost.high < rival.low and cost.value * (1 + COST_SLACK) < rival.value
 
 
-def front_point(row: WorkPrecisionRow, quantity: Quantity) -> FrontPoint | None:
-    """The cost and error of a setting; `None` where it was lost, or not timed."""
-    error = quantity.value_of(row)
-    return None if row.cost is None or error is None else FrontPoint(row.cost, error)
-
-
-def front(rows: Rows, quantity: Quantity) -> tuple[WorkPrecisionRow, ...]:
-    """Rows that say whether they are on the front of cost and an error, and what is better there.
-
-    A row is dominated where another costs no more and errs no more, and is clearly better in one of
-    the two. A lucky row is on no front, and dominates none. Where none errs there is no front.
-    """
-    points = ((n, front_point(row, quantity)) for n, row in enumerate(rows))
-    places = {n: point for n, point in points if point is not None}
-    if not any(place.error for place in places.values()):
-        places = {}
-    return mark_front(
-        rows,
-        {n: place.cost.value * place.error for n, place in places.items()},
-        lambda rival, baseline: places[rival].beats(places[baseline]),
-    )
-
-
-def mark_front(
-    rows: Rows, worth: Mapping[int, float], beats: Callable[[int, int], bool]
-) -> tuple[WorkPrecisionRow, ...]:
-    """Rows that say whether another beats them, and which: of those the one worth least.
-
-    `worth`: of the rows that are compared, by number; `beats`: whether one beats another.
-    """
-    better = {n: [m for m in worth if m != n and not rows[m].lucky and beats(m, n)] for n in worth}
-    placed_rows = []
-    for n, row in enumerate(rows):
-        rivals = better.get(n, [])
-        unbeaten = [m for m in rivals if not better[m]] or rivals
-        best = min(unbeaten, key=lambda m: (worth[m], m), default=None)
-        on_front = n in better and not rivals and not row.lucky
-        placed_rows.append(replace(row, front=on_front, dominated_by=best))
-    return tuple(placed_rows)
+def is_no_dearer(cost: Interval, rival: Interval) -> bool:
+    """Whether a cost is no more than another: where times are uncertain, by the likeliest ones."""
+    return cost.value <= rival.value * (1 + COST_SLACK)
 
 
 def seconds_text(value: float, digits: int = 6) -> str:

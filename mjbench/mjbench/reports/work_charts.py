@@ -2,9 +2,8 @@
 
 1. A line for each integrator goes from long timesteps to short ones, over those rows that have the
    scene's own solver, iterations and cone; the rows with others are small marks beside it. A mark
-   is filled where the setting is on the Pareto front; a ring is around the scene's own.
-2. Beside the cost, which is time, work is counted as it is on every machine: in evaluations of the
-   forward dynamics, and in iterations of the solver. Each has a front of its own.
+   is filled where no other is better; a ring is around the scene's own.
+2. Where nothing was timed, work is counted in evaluations of the forward dynamics.
 """
 
 from __future__ import annotations
@@ -12,18 +11,14 @@ from __future__ import annotations
 import statistics
 from collections.abc import Iterator, Sequence
 
-from msgspec.structs import replace
-
 from mjbench.reports import Interval
 from mjbench.reports.case_report import CaseReport, ErrorLine
 from mjbench.reports.charts import Chart, ChartLevel, ChartLine, ChartMark, ChartPoint, chart_point
-from mjbench.reports.scene_report import FLOORS, ScenarioReport, WorkPrecisionRow
+from mjbench.reports.scene_report import FLOORS, ErrorQuantity, ScenarioReport, WorkPrecisionRow
 from mjbench.reports.shown_errors import (
     INTEGRATORS,
     SEEN,
     STEPPED,
-    Quantity,
-    front,
     horizon_error_text,
     interval_text,
     seconds_text,
@@ -31,40 +26,22 @@ from mjbench.reports.shown_errors import (
     status_text,
 )
 
-_WORKS = {
-    "cost": "cost",
-    "evaluations": "evaluations of the forward dynamics",
-    "iterations": "iterations of the solver",
-}
-"""What a setting costs: time, and what is the same on every machine."""
-_AMOUNTS = {"cost": "at costs of {}", "evaluations": "with {}", "iterations": "with {}"}
+_COST, _EVALUATIONS = "cost", "evaluations of the forward dynamics"
 
 
 def scenario_charts(report: ScenarioReport) -> tuple[Chart, ...]:
-    """The charts of error against cost, evaluations, and where a solver runs, its iterations.
-
-    None where no row errs.
-    """
-    match = next((q for q in report.quantities if q.name == report.main), None)
-    if match is None:
+    """The chart of error against cost, or evaluations; none where no row errs."""
+    quantity = next((q for q in report.quantities if q.name == report.main), None)
+    if quantity is None or not any(quantity.value_of(row) for row in report.rows):
         return ()
-    quantity = Quantity(match.name, match.label, match.least)
-    if not any(quantity.value_of(row) for row in report.rows):
-        return ()
-    return tuple(
-        _chart(report, quantity, work, works)
-        for work in _WORKS
-        if any(works := _find_works(report, work))
-    )
+    is_timed = any(row.cost is not None and row.cost.value > 0 for row in report.rows)
+    return (_chart(report, quantity, _COST if is_timed else _EVALUATIONS),)
 
 
-def _chart(
-    report: ScenarioReport, quantity: Quantity, work: str, works: Sequence[Interval | None]
-) -> Chart:
-    pairs = zip(report.rows, works, strict=True)
-    places = front([replace(row, cost=x) for row, x in pairs], quantity)
-    label = axis = _WORKS[work]
-    if work == "cost":
+def _chart(report: ScenarioReport, quantity: ErrorQuantity, work: str) -> Chart:
+    works = _find_works(report)
+    axis = work
+    if work == _COST:
         base = "the scene’s own setting"
         if report.cost_of is not None:
             base = setting_text(report.cost_of, report.own_setting)
@@ -72,12 +49,12 @@ def _chart(
     lines = tuple(
         ChartLine(name, INTEGRATORS.index(name), points)
         for name in INTEGRATORS
-        if (points := tuple(_points(report, places, quantity, works, name)))
+        if (points := tuple(_points(report, quantity, works, name)))
     )
     visible = [point for line in lines for point in line.points if point.y is not None]
-    marks = [ChartMark("front", "on the Pareto front")] if any(p.full for p in visible) else []
+    marks = [ChartMark("front", "nothing is better")] if any(p.full for p in visible) else []
     if not all(point.full for point in visible):
-        marks.append(ChartMark("beaten", "another costs less, or errs less for no more"))
+        marks.append(ChartMark("beaten", "another is better, and worse in nothing"))
     if any(point.small for point in visible):
         marks.append(ChartMark("other", "other solver, iterations or cone"))
     own_names = (setting_text(row.setting, row.setting) for row in report.rows if row.own)
@@ -86,7 +63,7 @@ def _chart(
     if words := [text for text, names in losses.items() if names]:
         marks.append(ChartMark("lost", ", or ".join(words)))
     return Chart(
-        title=f"{report.title or report.name}: error of {quantity.label} against {label}",
+        title=f"{report.title or report.name}: error of {quantity.label} against {work}",
         text=" ".join(_describe(report, quantity, lines, work)),
         axes=(axis, f"error: {quantity.label}"),
         lines=lines,
@@ -96,7 +73,7 @@ def _chart(
     )
 
 
-def _levels(report: ScenarioReport, quantity: Quantity) -> Iterator[ChartLevel]:
+def _levels(report: ScenarioReport, quantity: ErrorQuantity) -> Iterator[ChartLevel]:
     if quantity.name not in (SEEN.name, STEPPED.name):
         return
     yield ChartLevel(1.0, "just visible")
@@ -108,47 +85,39 @@ def _levels(report: ScenarioReport, quantity: Quantity) -> Iterator[ChartLevel]:
 
 def _points(
     report: ScenarioReport,
-    places: Sequence[WorkPrecisionRow],
-    quantity: Quantity,
-    works: Sequence[Interval | None],
+    quantity: ErrorQuantity,
+    works: Sequence[Interval],
     name: str,
 ) -> Iterator[ChartPoint]:
     """The points of an integrator, from long timesteps to short ones."""
     baseline = report.own_setting
     rows = [
-        (row, place, x)
-        for row, place, x in zip(report.rows, places, works, strict=True)
+        (row, x)
+        for row, x in zip(report.rows, works, strict=True)
         if row.setting.integrator == name and not row.idle
     ]
-    for row, place, x in sorted(rows, key=lambda part: -part[0].setting.timestep):
-        if x is None:
-            continue
+    for row, x in sorted(rows, key=lambda part: -part[0].setting.timestep):
         error = quantity.value_of(row) if row.status == "ok" else None
         yield chart_point(
             x,
             error,
-            " · ".join(_point_title(report, row, place, error)),
-            full=place.front,
+            " · ".join(_point_title(report, row, error)),
+            full=row.front,
             small=baseline is not None and row.setting.solver_settings != baseline.solver_settings,
             ringed=row.own,
         )
 
 
-def _find_works(report: ScenarioReport, work: str) -> list[Interval | None]:
-    """What each row costs; nothing where that is not known of any."""
-    rows = report.rows
-    if work == "iterations":
-        return [Interval(n, n, n) if n else None for n in (row.iterations for row in rows)]
-    if work == "evaluations":
-        return [Interval(n, n, n) for n in (float(row.work) for row in rows)]
-    timed = [row for row in rows if row.cost is not None and row.cost.value > 0]
-    works: list[Interval | None] = []
-    for row in rows if timed else ():
+def _find_works(report: ScenarioReport) -> list[Interval]:
+    """What each row costs; its evaluations where nothing was timed."""
+    timed = [row for row in report.rows if row.cost is not None and row.cost.value > 0]
+    works: list[Interval] = []
+    for row in report.rows:
         x = row.cost
         if x is None or not x.value:  # its evaluations say about how much it would be
             alike = [peer for peer in timed if peer.setting.integrator == row.setting.integrator]
             rates = [peer.cost.value / peer.work for peer in alike or timed if peer.cost]
-            value = row.work * statistics.median(rates)
+            value = row.work * (statistics.median(rates) if rates else 1.0)
             x = Interval(value, value, value)
         works.append(x)
     return works
@@ -165,15 +134,14 @@ def _parted(report: ScenarioReport) -> list[str]:
 
 
 def _describe(
-    report: ScenarioReport, quantity: Quantity, lines: Sequence[ChartLine], work: str
+    report: ScenarioReport, quantity: ErrorQuantity, lines: Sequence[ChartLine], work: str
 ) -> Iterator[str]:
     for line in lines:
         if visible := [point for point in line.points if point.y is not None]:
             errors = _range([point.y or 0.0 for point in visible], 2, "{1} to {0}")
             costs = _range([point.x for point in visible], 3, "{0} to {1}")
-            yield f"{line.name}: errors {errors} {_AMOUNTS[work].format(costs)}."
-    if work != "cost":
-        return  # the rest is said with the costs
+            amount = f"at costs of {costs}" if work == _COST else f"with {costs}"
+            yield f"{line.name}: errors {errors} {amount}."
     if lost := _lost(report):
         yield f"Runs were lost under {', '.join(lost)}."
     if parted := _parted(report):
@@ -191,7 +159,7 @@ def _range(values: Sequence[float], digits: int, words: str) -> str:
 
 
 def _point_title(
-    report: ScenarioReport, row: WorkPrecisionRow, place: WorkPrecisionRow, error: float | None
+    report: ScenarioReport, row: WorkPrecisionRow, error: float | None
 ) -> Iterator[str]:
     yield setting_text(row.setting)
     if row.parted is not None:
@@ -213,11 +181,11 @@ def _point_title(
         yield f"luck: {row.lucky}"
     if row.own:
         yield "the scene’s own setting"
-    if place.front:
-        yield "on the Pareto front"
-    elif place.dominated_by is not None:
-        rival = setting_text(report.rows[place.dominated_by].setting, row.setting)
-        yield f"{rival} costs less, or errs less for no more"
+    if row.front:
+        yield "nothing is better"
+    elif row.dominated_by is not None:
+        rival = setting_text(report.rows[row.dominated_by].setting, row.setting)
+        yield f"{rival} is better, and worse in nothing"
 
 
 def case_charts(report: CaseReport) -> tuple[Chart, ...]:
@@ -226,14 +194,16 @@ def case_charts(report: CaseReport) -> tuple[Chart, ...]:
     return tuple(_case_chart(report, quantity) for quantity in quantities)
 
 
-def case_quantities(report: CaseReport) -> tuple[Quantity, ...]:
+def case_quantities(report: CaseReport) -> tuple[ErrorQuantity, ...]:
     """The first error that is resolved, and energy drift where energy is conserved."""
     units = {"position": "m or rad", "attitude": "rad", "velocity": "m/s or rad/s"}
     errors = (
-        Quantity(part, f"error of {part} ({unit})", FLOORS * getattr(report.reference, part))
+        ErrorQuantity(
+            part, f"error of {part} ({unit})", FLOORS * getattr(report.reference, part), False
+        )
         for part, unit in units.items()
     )
-    drift = Quantity("energy_drift", "energy drift, relative")
+    drift = ErrorQuantity("energy_drift", "energy drift, relative", 0.0, False)
     runs = [line for line in report.errors if line.status == "ok"]
     return (
         *[quantity for quantity in errors if quantity.is_resolved(runs)][:1],
@@ -248,7 +218,7 @@ def step_cost(report: CaseReport, line: ErrorLine) -> Interval | None:
     return None if step is None else step.scale(1 / line.timestep)
 
 
-def _case_chart(report: CaseReport, quantity: Quantity) -> Chart:
+def _case_chart(report: CaseReport, quantity: ErrorQuantity) -> Chart:
     lines = []
     for number, integrator in enumerate(INTEGRATORS):
         points = []

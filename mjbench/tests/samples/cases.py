@@ -29,7 +29,7 @@ def run(**overrides: object) -> ErrorLine:
 
 
 def case(name: str = "spring", number: int = 5, **overrides: object) -> CaseReport:
-    search = ((1e-3, 1.0), None, 50.0, 250, 60, 2.5)
+    search = ((1e-3, 1.0), None, 50.0, 2.5)
     fields: dict[str, object] = {
         "name": name,
         "title": f"A <{name}>",
@@ -57,8 +57,6 @@ def case(name: str = "spring", number: int = 5, **overrides: object) -> CaseRepo
                 *search,
                 beyond="slow-growth",
                 bracket=(0.25, 0.29),
-                gain=(0.1, 0.02),
-                tries=((0.2, 10, 0), (0.25, 10, 2), (0.3, 10, 10)),
             ),
             BoundaryLine("implicit", "all", *search),
             BoundaryLine("discrete", "all", *search),

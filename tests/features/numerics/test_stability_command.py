@@ -81,43 +81,16 @@ def test_stability_prints_text_and_then_json_without_measuring_again(
 def test_stability_of_a_family_and_of_an_unknown_case(course: Path, capsys: Capture) -> None:
     assert main(["-C", str(course), "stability", "tumbling-bocks"]) == 2
     message = capsys.readouterr().err
-    assert "case or model is called `tumbling-bocks`; did you mean `tumbling-box`?" in message
+    assert "no hard case is called `tumbling-bocks`; did you mean `tumbling-box`?" in message
     assert main(["-C", str(course), "stability", "nope"]) == 2
     message = capsys.readouterr().err
     assert message.startswith(
-        "coursebuild: no hard case or model is called `nope`; known: tumbling-box, pendulum-hin"
+        "coursebuild: no hard case is called `nope`; known: tumbling-box, pendulum-hin"
     )
     assert run(course, "flat", "millimetre") == 0
     out = capsys.readouterr().out
     heads = [line.split()[0] for line in out.splitlines() if line[:1] not in (" ", "")]
     assert heads == ["millimetre-cube", "flat-plate"]
-
-
-def test_model_of_the_course_is_a_case_if_something_is_known_of_it(
-    course: Path, capsys: Capture
-) -> None:
-    (course / "models").mkdir()
-    joint, geom = '<joint type="slide"/>', '<geom size=".1" contype="0" conaffinity="0"/>'
-    (course / "models" / "drop.xml").write_text(
-        f"<mujoco><worldbody><body>{joint}{geom}</body></worldbody></mujoco>"
-    )
-    folder = course / "models" / "meshes"
-    folder.mkdir()
-    (folder / "drapes.xml").write_text("<mujoco/>")
-    assert run(course, "drap") == 2
-    error = capsys.readouterr().err
-    assert error.endswith("is called `drap`; did you mean `drop`?\n"), "folders hold no models"
-    assert run(course, "drop") == 2
-    assert capsys.readouterr().err == (
-        "coursebuild: no theory is known for `drop`; "
-        "give its motion in models/drop.exact.py, or `expected` of a scenario\n"
-    )
-    (course / "models" / "drop.toml").write_text(
-        '[[scenario]]\nname = "fall"\nduration = 0.2\nsample = 0.02\n'
-        "timesteps = [0.002]\nsearch = [0.005, 0.01]\nexpected = { penetration = 0 }\n"
-    )
-    assert run(course, "drop", "--check") == 1
-    assert "drop.bench.json" in capsys.readouterr().out, "there is none yet to compare with"
 
 
 def test_recorded_then_checked(course: Path, capsys: Capture) -> None:

@@ -9,8 +9,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import msgspec
@@ -20,7 +19,7 @@ from msgspec.structs import replace
 from coursebuild.api import Diagnostic, Options, UsageError
 from coursebuild.core.model.measurements import EngineReport, SceneReport
 from coursebuild.core.model.report_files import BENCH, ENGINES, ReportFailure
-from coursebuild.core.model.scenarios import DeclaredSweep, keyframe_scenarios
+from coursebuild.core.model.scenarios import keyframe_scenarios
 from coursebuild.features.bench.commands.measurement import (
     Departure,
     Measurement,
@@ -39,10 +38,6 @@ from coursebuild.features.bench.commands.measuring import FailedJobError, Mjbenc
 from coursebuild.pipeline.arguments import add_cache, add_executors, add_format, add_quiet
 from coursebuild.pipeline.scenes import CourseScene, find_scenes, read_record
 
-THREADS = "threads"
-"""The parameter of a sweep that is measured on all processors."""
-_PIECE = 16
-"""Settings of a sweep that are measured together."""
 EXAMPLES = """\
 examples:
   coursebuild bench --quick              a first look at all models
@@ -195,73 +190,39 @@ class SceneRun(MeasuringRun[SceneReport]):
         return scene.name, scene.digest, self.quick, self.code, self.facts.pinned
 
     def tasks(self, scene: CourseScene) -> Iterator[tuple[Any, ...]]:
-        """The scenarios of a scene, and its sweeps in pieces, that are not stored."""
+        """The scenarios of a scene, and its sweeps, that are not stored."""
         parts = self._parts(scene)
         if self.load(self.kind, (*parts, self.cards), bytes) is not None:
             return
-        for number in range(_scenario_count(scene)):
-            if self.load("bench-scenarios", (*parts, number), tuple[bytes, ...]) is None:
-                yield task_of("scenario", scene, number=number, **self._settings())
-        for sweep in scene.declarations.sweeps:
-            if self.load("bench-sweeps", (*parts, sweep.name), tuple[bytes, ...]) is None:
-                yield from (task_of("sweep", scene, **piece) for piece in self._pieces(sweep))
+        for job, key in self._jobs(scene):
+            if self.load(f"bench-{job}", (*parts, *key.values()), bytes) is None:
+                yield task_of(job, scene, **key, **self._settings())
 
-    def _pieces(self, sweep: DeclaredSweep) -> Iterator[dict[str, Any]]:
-        count = sum(len(part.values) for part in sweep.variations if part.parameter != THREADS)
-        for first in range(0, count, _PIECE):
-            piece = {"part": "values", "first": first, "end": min(first + _PIECE, count)}
-            yield {"name": sweep.name, **piece, **self._settings()}
+    def _jobs(self, scene: CourseScene) -> Iterator[tuple[str, dict[str, Any]]]:
+        """The sweeps of a scene, and its scenarios."""
+        # Sweeps come first, since a value that the model cannot have is told at once.
+        yield from (("sweep", {"name": sweep.name}) for sweep in scene.declarations.sweeps)
+        yield from (("scenario", {"number": number}) for number in range(_scenario_count(scene)))
 
     def _report(self, scene: CourseScene, parts: tuple[object, ...]) -> bytes:
-        # First, since a value that the model cannot have is told at once.
-        sweeps = [
-            piece
-            for sweep in scene.declarations.sweeps
-            for piece in self._load_or_measure_part(
-                "bench-sweeps",
-                (*parts, sweep.name),
-                partial(self._measure_sweep, scene, sweep),
-            )
-        ]
-        scenarios = [
-            part
-            for n in range(_scenario_count(scene))
-            for part in self._load_or_measure_part(
-                "bench-scenarios", (*parts, n), partial(self._measure_scenario, scene, n)
-            )
-        ]
+        reports: dict[str, list[Raw]] = {"sweep": [], "scenario": []}
+        for job, key in self._jobs(scene):
+            place = f"bench-{job}", (*parts, *key.values())
+            data = self.load(*place, bytes)
+            if data is None:
+                data = self.do_job(job, scene, **key, **self._settings())
+                self.save(*place, data)
+            reports[job].append(Raw(data))
         values = {
-            "scenarios": list(map(Raw, scenarios)),
-            "sweeps": list(map(Raw, sweeps)),
+            "scenarios": reports["scenario"],
+            "sweeps": reports["sweep"],
             "quick": self.quick,
         }
         return self.mjbench.do("join", scene, **values, card=self.cards)
 
-    def _measure_scenario(self, scene: CourseScene, number: int) -> tuple[bytes, ...]:
-        return (self.do_job("scenario", scene, number=number, **self._settings()),)
-
-    def _measure_sweep(self, scene: CourseScene, sweep: DeclaredSweep) -> tuple[bytes, ...]:
-        tasks = (task_of("sweep", scene, **piece) for piece in self._pieces(sweep))
-        pieces = [self.results.pop(task, b"") for task in tasks]
-        settings = {"name": sweep.name, **self._settings()}
-        if not pieces or not all(pieces):
-            return (self.mjbench.do("sweep", scene, **settings),)
-        if any(part.parameter == THREADS for part in sweep.variations):
-            pieces.append(self.mjbench.do("sweep", scene, part="threads", **settings))
-        return tuple(pieces)
-
     def _settings(self) -> dict[str, bool]:
         # A check compares no times, so it measures none.
         return {"quick": self.quick, "timed": self.use_store}
-
-    def _load_or_measure_part(
-        self, kind: str, parts: tuple[object, ...], measure: Callable[[], tuple[bytes, ...]]
-    ) -> tuple[bytes, ...]:
-        pieces = self.load(kind, parts, tuple[bytes, ...])
-        if pieces is None:
-            pieces = measure()
-            self.save(kind, parts, pieces)
-        return pieces
 
 
 def _scenario_count(scene: CourseScene) -> int:
