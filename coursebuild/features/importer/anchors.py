@@ -76,17 +76,23 @@ def figure_of(source: str, caption: str, label: str, alt: str) -> str:
     return f"Figure: ![{alt}]({source}) {caption}{mark}"
 
 
-TABLE_CAPTION = re.compile(
-    r"^(?P<table>(?:\|.*\n)+)\n?:[ ]+(?P<caption>.*?)[ ]*(?:\{#tbl-(?P<label>[\w-]+)[^{}]*\})?$",
-    re.MULTILINE,
+CAPTION = re.compile(
+    r"(?:Table)?:[ ]+(?P<caption>.*?)[ ]*(?:\{(?:#tbl-(?P<label>[\w-]+))?[^{}\n]*\})?"
 )
-"""A caption of Quarto, below its table."""
+"""The caption of a table of Pandoc, with attributes."""
+TABLE_CAPTION = re.compile(rf"^(?P<table>(?:\|.*\n)+)\n?{CAPTION.pattern}$", re.MULTILINE)
+"""A table of Quarto above its caption."""
 
 
 def move_caption(match: re.Match[str]) -> str:
     """Return a table below its caption."""
+    return f"{write_caption(match)}\n\n{match['table']}".lstrip("\n")
+
+
+def write_caption(match: re.Match[str]) -> str:
+    """Return the caption of a table; nothing where it holds attributes alone."""
     label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
-    return f"Table: {match['caption']}{label}\n\n{match['table']}"
+    return f"Table: {match['caption']}{label}" if match["caption"] or label else ""
 
 
 def write_target(match: re.Match[str]) -> str:

@@ -29,6 +29,7 @@ from coursebuild.features.importer.directives import (
 from coursebuild.features.importer.jsx import without_jsx
 from coursebuild.features.importer.other_cells import language_of, write_other_cell
 from coursebuild.features.importer.prose import rewrite_prose
+from coursebuild.features.importer.roles import fill_shortcodes
 from coursebuild.features.importer.segments import change_prose, lower_titles, read_markdown
 from coursebuild.features.importer.source_files import Segment
 from coursebuild.features.lab.model import BUILT_IN_KINDS
@@ -68,6 +69,9 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
 
 def _convert(segment: Segment, context: LessonContext) -> str:
     context, head, text = context.at(segment.place), segment.head, segment.text
+    if segment.kind != "prose" and segment.mark[0] in "`~":
+        text = fill_shortcodes(text, context)
+        segment = replace(segment, text=text)
 
     def name_callouts(text: str) -> str:
         return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
@@ -182,7 +186,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         if raw[1] == "markdown":
             return _convert_nested(text, context)
         if raw[1] == "html":
-            return text
+            return rewrite_prose(text, context)
         context.leave("block that is raw", f"a block of raw {raw[1]}, shown as text")
         return marks.fence("text", text)
     if kind == "admonish":
@@ -220,7 +224,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
             context.leave(f"block of `{language}`", message)
             language = "json"
     cell = Segment(kind="block", place="", text=text)
-    if head.startswith("{") and (options := options_of(cell)):
+    if re.match(r"\{\w", head) and (options := options_of(cell)):
         text = code_for_readers(cell)
         caption = options.get("fig-cap") or options.get("lst-cap") or ""
         head += f' title="{caption}"' if caption else ""

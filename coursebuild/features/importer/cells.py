@@ -350,9 +350,9 @@ def how_shown(cell: Segment) -> str:
     """Return the word for a cell whose code its tool folds or hides, after a blank."""
     options = options_of(cell)
     tags = cell.head + options.get("tags", "")
-    if "remove-input" in tags or "false" in (options.get("echo"), options.get("include")):
+    if re.search("remove-(?:input|cell)", tags) or "false" in (options.get("echo"), options.get("include")):
         return " hidden"
-    return " folded" if "hide-input" in tags or options.get("code-fold") == "true" else ""
+    return " folded" if re.search("hide-(?:input|cell)", tags) or options.get("code-fold") == "true" else ""
 
 
 def code_for_readers(cell: Segment) -> str:

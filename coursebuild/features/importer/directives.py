@@ -118,6 +118,9 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             new = {**options, "alt": alt, "name": argument}
             figure = replace(directive, name="figure", argument=source, options=new, text=caption)
             return _write_figure(figure, context)
+        case "glue:figure":
+            context.leave(kind, f"the figure `{argument}`: save it in its cell, as `figure=` says")
+            return directive.nested(text)
         case "doctest" | "plot":
             return marks.fence("pycon" if name == "doctest" else "python", text.strip("\n"))
         case "line-block":

@@ -53,6 +53,13 @@ def without_jsx(text: str, context: LessonContext) -> str:
     return _PART.sub(lambda part: _convert_part(part, context), text)
 
 
+def label_of(attributes: str) -> str:
+    """Return what the attributes of a component have readers see; empty for nothing."""
+    labels = (pattern.search(attributes) for pattern in _LABELS)
+    label = next(filter(None, labels), None)
+    return (label[1] or label[2] or "") if label else ""
+
+
 def _convert_part(part: re.Match[str], context: LessonContext) -> str:
     name, attributes = part["name"], part["attributes"]
     if part["code"]:
@@ -70,8 +77,7 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
     if name[0].isupper():
         if not part["end"]:
             context.leave("component", f"the component `<{name}>`; what it holds is shown")
-        label = next(filter(None, (pattern.search(attributes) for pattern in _LABELS)), None)
-        words = (label[1] or label[2] or "") if label else ""
+        words = label_of(attributes)
         if picture := _ADDRESS.search(attributes):
             return f"![{words}]({picture[1]})"
         before, after = part.string[: part.start()], part.string[part.end() :]

@@ -16,7 +16,7 @@ from unicodedata import east_asian_width
 from msgspec import Struct
 
 from coursebuild.api import marks
-from coursebuild.features.importer.context import to_anchor
+from coursebuild.features.importer.anchors import CAPTION, write_caption
 
 _QUOTE = re.compile(r"(?:[ ]{0,3}>[ ]?)*")
 _INDENT = re.compile(rf"{_QUOTE.pattern}[ ]{{0,3}}")
@@ -25,7 +25,6 @@ _RULE = re.compile(r"[ ]{0,3}-{2,}(?:[ ]+-{2,})+[ ]*")
 """What stands above the cells of a table without bars, a run of hyphens for each column."""
 _LINE = re.compile(r"[ ]{0,3}-{5,}[ ]*")
 _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
-_CAPTION = re.compile(r"(?:Table)?:[ ]+(?P<words>.*?)[ ]*(?:\{#tbl-(?P<label>[\w-]+)[^{}]*\})?")
 _DELIMITERS = re.compile(r"\|?[ \t]*:?-+:?[ \t]*(?:\|[ \t]*:?-+:?[ \t]*)*\|?[ \t]*")
 _WIDE = "\0"
 """What stands behind a character that takes two columns."""
@@ -121,14 +120,11 @@ def _stripped(lines: Sequence[str], at: int, lead: str) -> Iterator[str]:
 def _read_caption(lines: Sequence[str]) -> tuple[list[str], int]:
     """Return the caption of the table that ends above, and the lines that it takes."""
     start = next((n for n, line in enumerate(lines[:2]) if line.strip()), None)
-    if start is None or not _CAPTION.match(lines[start].lstrip()):
+    if start is None or not CAPTION.match(lines[start].lstrip()):
         return [], 0
     end = next((n for n in range(start, len(lines)) if not lines[n].strip()), len(lines))
-    caption = _CAPTION.fullmatch(" ".join(line.strip() for line in lines[start:end]))
-    if caption is None:
-        return [], 0
-    label = f" {{#tab:{to_anchor(caption['label'])}}}" if caption["label"] else ""
-    return [f"Table: {caption['words']}{label}", ""], end
+    caption = CAPTION.fullmatch(" ".join(line.strip() for line in lines[start:end]))
+    return ([write_caption(caption), ""], end) if caption else ([], 0)
 
 
 def _join(lines: Sequence[str]) -> str:

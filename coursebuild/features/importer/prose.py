@@ -108,6 +108,8 @@ _FIELDS = re.compile(
 _ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
 _EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
+_PICTURE_LINE = re.compile(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)
+"""A picture of HTML above words, which would be HTML as well."""
 _EMPTY_HEADING = re.compile(r"[ ]{0,3}#{1,6}[ \t]*$")
 _ENDS = {"<!--": "-->", "$$": "$$"}
 _COMMENT = re.compile(
@@ -241,7 +243,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         elif edge is not None and edge[1].startswith(mark):
             mark = "" if mark else edge[1]
         out.append(line)
-    return FIGURE.sub(write_figure, "\n".join(out))
+    return FIGURE.sub(write_figure, _PICTURE_LINE.sub(r"\g<0>\n", "\n".join(out)))
 
 
 def _write_comment(match: re.Match[str]) -> str:
@@ -442,7 +444,7 @@ _STATEMENTS = re.compile(r"\s*(?:\{%[^%\n]*%\}\s*)+")
 """A line of nothing but statements of Jinja or Liquid."""
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
-_CITED_KEY = re.compile(rf"(?<![\w@])@({_KEY})")
+_CITED_KEY = re.compile(rf"(?<![\w@`])@({_KEY})")
 _TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
 """A formula with blanks at its ends, which some tools allow."""
 _WORD = re.compile(r"(?<![\\A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")

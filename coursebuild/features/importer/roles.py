@@ -15,6 +15,7 @@ from coursebuild.features.importer.context import (
     label_anchor,
     to_anchor,
 )
+from coursebuild.features.importer.jsx import label_of
 from coursebuild.features.importer.source_files import title_of_file
 
 
@@ -59,7 +60,8 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             if ":" in address.rpartition("#")[2]:  # what has a number is called by it
                 rest = words.partition("%s")[2] if "%s" in words else ""
                 return write_link("" if "%s" in words else words, address) + rest
-            words = words.replace("%s", "").strip()
+            lesson = re.match(r"lesson:([\w.]+)", address)
+            words = words.replace("%s", lesson[1] if lesson else "").strip()
             return write_link(words if address else words or title_of_file(target), address)
         case _ if name.partition(":")[0] in ("cite", "citep", "citet"):
             keys = [key.strip() for key in body.split(",")]
@@ -106,6 +108,19 @@ _LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)[\w-]+[ ]+")
 """The language of code in a line, as MkDocs marks it."""
 
 
+_SHORTCODE = re.compile(r"(\{?)\{\{<\s*(?:(?:var|meta)\s+([\w.-]+)|[^{}]*?)\s*>\}\}(\}?)")
+
+
+def fill_shortcodes(code: str, context: LessonContext) -> str:
+    """Return code of Quarto with the values that it names, without the braces that keep a name."""
+
+    def fill(name: re.Match[str]) -> str:
+        is_kept = name[1] and name[3]
+        return name[0][1:-1] if is_kept else context.substitutions.get(name[2] or "", name[0])
+
+    return _SHORTCODE.sub(fill, code) if context.path.endswith(".qmd") else code
+
+
 def convert_code(whole: str, context: LessonContext) -> str:
     """Return code in a line, without the mark of a tool that replaces it by its value."""
     if raw := re.fullmatch(r"(`+)(.+?)\1\{=(\w+)\}", whole):
@@ -115,7 +130,7 @@ def convert_code(whole: str, context: LessonContext) -> str:
         return ""
     run = _INLINE_RUN.fullmatch(whole)
     if run is None:
-        return _LANGUAGE.sub(r"\1", whole)
+        return _LANGUAGE.sub(r"\1", fill_shortcodes(whole, context))
     if run[1] is None and re.match(r"[\w.]+[ ]*(?:<-|=(?!=))", run[2]):
         context.leave("code in a line", f"{whole}, which shows nothing: set the name in a cell")
         return ""
@@ -173,7 +188,7 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     if name.removeprefix("end") in _FRAMES and name != "embed":
         return ""
     if name == "kbd" and arguments:
-        return arguments[-1]
+        return arguments[-1].rpartition("=")[2]
     key = address if name in ("var", "meta") else name
     if (value := context.substitutions.get(key)) is not None:
         return value
@@ -220,6 +235,12 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     A class names a look that its tool gives; here it could be that of another thing.
     """
     tag = _LOOK.sub("", tag)
+    name = tag[1:].split()[0]
+    if name[0].isupper() and not name.isupper():  # no element of HTML
+        context.leave("component", f"the component `<{name}>`; what it holds is shown")
+        number = re.search(r"\snumber=\"([^\"]+)", tag)
+        words = f"{name} {number[1]}: {label_of(tag)}" if number else label_of(tag)
+        return f"**{words}**" if words else ""
     kind = _WITH_FILE.match(tag)
     attribute = _ATTRIBUTE.search(tag) if kind else None
     if attribute and kind and kind["frame"]:

@@ -141,11 +141,15 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
 def _raise_title(segments: list[Segment], title: str) -> list[Segment]:
     """Bring headings up where the title of the map begins the text as one of a lower level."""
     start = segments[0].text if segments and segments[0].kind == "prose" else ""
-    first = re.match(r"\s*\#(\#+)[ \t]+(.*?)[ \t#]*(?:\n|\Z)", start)
+    first = re.match(rf"{_MARKS}#(#+)[ \t]+(.*?)[ \t#]*(?:\n|\Z)", start)
     if first is None or first[2].casefold() != title.casefold():
         return segments
     surplus = re.compile(rf"^{first[1]}(?=\#)", re.MULTILINE)
     return [*change_prose(segments, lambda prose: surplus.sub("", prose))]
+
+
+_MARKS = r"\s*(?:(?:<!--(?:(?!-->)[\s\S])*-->|<a id=[^<>]*></a>)\s*)*"
+"""Comments and anchors, which no reader sees."""
 
 
 def change_prose(segments: Iterable[Segment], change: Callable[[str], str]) -> Iterator[Segment]:
