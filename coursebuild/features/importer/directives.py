@@ -121,6 +121,9 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
         case "glue:figure":
             context.leave(kind, f"the figure `{argument}`: save it in its cell, as `figure=` says")
             return directive.nested(text)
+        case "todo" if "conf.py" in context.files:
+            context.leave(kind, "a note of the authors, which readers did not see: a comment now")
+            return f"<!-- {argument} {text.replace('-->', '--›')} -->"
         case "doctest" | "plot":
             return marks.fence("pycon" if name == "doctest" else "python", text.strip("\n"))
         case "line-block":

@@ -97,6 +97,8 @@ def expand_includes(
             part_text, problem = None, TOO_MUCH
         if part_text is None:
             files.leave(path, f"`{name}`: {problem}", "file that is included", line)
+            if mark["mkdocs"] and not re.search(r"check_paths\W+true", files.mkdocs):
+                return ""  # as there
             before = text[: mark.start()]
             is_in_code = (
                 len(_FENCE.findall(before)) % 2 or before.rpartition("\n")[2].count("`") % 2

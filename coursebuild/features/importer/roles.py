@@ -196,7 +196,8 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     texts = ["".join(text) for text in _QUOTED.findall(call["arguments"])] if call else []
     message = f"`{whole}`, which its tool replaces: write what it stands for"
     context.leave("substitution", message)
-    return "" if is_statement else ", ".join(f"`{text}`" for text in texts or [whole])
+    texts = texts or [whole[3:-3].strip() if whole.startswith("{{<") else whole]
+    return "" if is_statement else ", ".join(f"`{text}`" for text in texts)
 
 
 def tell_emoji(name: str, context: LessonContext) -> str:

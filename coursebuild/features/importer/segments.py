@@ -114,7 +114,8 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
         if heading["lower"]:  # what stands below a second title stays below it
             return heading["lower"] + "#" * (len(titles) > 1)
         titles.append(_text_of(heading))
-        if len(titles) == 1 and own_title in ("", titles[0]):
+        words = re.sub(r"\[([^\[\]]*)\]\([^()]*\)|[*_`]", r"\1", titles[0])
+        if len(titles) == 1 and own_title in ("", titles[0], words):
             return f"({heading['label']})=\n" if heading["label"] else ""
         return f"## {_text_of(heading)}" if heading["text"] is None else f"#{heading[0].strip()}"
 

@@ -268,7 +268,7 @@ class SourceFiles:
     @cached_property
     def mkdocs(self) -> str:
         """The settings of MkDocs; empty where it is no project of it."""
-        path = self.find_settings("mkdocs.yml")
+        path = self.find_settings("mkdocs.yml") or "zensical.toml" * ("zensical.toml" in self)
         return path and (self.read_text(path) or "\n")
 
     @cached_property
