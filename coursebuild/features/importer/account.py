@@ -77,7 +77,7 @@ class Account:
         self._words[kind, change].append(" ".join(words.split()))
 
     def replace(
-        self, old: re.Pattern[str], new: str | Replacement, text: str, kind: str, change: str
+        self, text: str, old: re.Pattern[str], new: str | Replacement, kind: str, change: str
     ) -> str:
         """Return a text with what a pattern matches replaced, and note each as changed."""
         text, count = old.subn(new, text)

@@ -115,14 +115,14 @@ def _convert(segment: Segment, context: LessonContext) -> str:
 
 def _write_tabs(text: str, context: LessonContext) -> str:
     """Return a set of tabs of Quarto with their titles, which are headings, in bold."""
-    context.files.account.changed[_TAB] += 1
+    context.change(*_TAB)
     first = re.search(r"^#{1,6}(?=[ \t])", text, re.MULTILINE)
     pattern = rf"^{first[0] if first else '#'}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
     return _convert_nested(text, context, re.compile(pattern, re.MULTILINE))
 
 
 def _write_tab(title: str, text: str, context: LessonContext) -> str:
-    context.files.account.changed[_TAB] += 1
+    context.change(*_TAB)
     return f"**{rewrite_prose(title, context).strip()}**\n\n{_convert_nested(text, context)}"
 
 
@@ -156,7 +156,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
     if "panel-tabset" in classes:
         return _write_tabs(text, context)
-    context.files.account.changed["division", "what it holds, without a frame"] += 1
+    context.change("division", "what it holds, without a frame")
     if figure := re.search(r"#fig-([\w-]+)", head):
         return f'<a id="fig-{to_anchor(figure[1])}"></a>\n\n{_convert_nested(text, context)}'
     return _convert_nested(text, context)
@@ -195,7 +195,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         is_folded = "collapsible=true" in head
         return _write_callout(name, title[1] if title else "", text, context, is_folded)
     if listing := re.search(r"\bfile=((?!examples/)\S+)", head) if kind == "python" else None:
-        context.files.account.changed["listing of a file", "its name, and its code, not run"] += 1
+        context.change("listing of a file", "its name, and its code, not run")
         return f"**`{listing[1]}`**\n\n{marks.fence('python', text)}"
     if kind in ("lab", "quiz") and context.camera_is_position:
         text = _CAMERA.sub(_reverse_camera, text)
@@ -229,7 +229,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         caption = options.get("fig-cap") or options.get("lst-cap") or ""
         head += f' title="{caption}"' if caption else ""
     change = "dropped: its tool colours the lines beside it"
-    text = context.files.account.replace(_HIGHLIGHT, "", text, "comment in code", change)
+    text = context.files.account.replace(text, _HIGHLIGHT, "", "comment in code", change)
     words = re.sub(r"(\$[^$]+\$)|(?<!\\)([][_*`{}<])", _escape, _title_of(head))
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
@@ -277,7 +277,7 @@ def _write_callout(
     title, brace, label = title.partition("{#")
     title = " ".join(f"{rewrite_prose(title, context)} {brace}{label}".split())
     head = f"[!{_callout_kind(kind, context)}]{'-' * is_folded} {title}".rstrip()
-    context.files.account.changed["callout", "a quotation that begins with its kind"] += 1
+    context.change("callout", "a quotation that begins with its kind")
     return marks.block_quote(f"{head}\n{_convert_nested(text, context)}".rstrip("\n"))
 
 

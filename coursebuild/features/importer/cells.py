@@ -70,7 +70,7 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
             figure = "\n\n".join(write_outputs(replace(cell, printed="", value=""), context))
     word = " part" if context.parts else ""
     context.parts.append(code)
-    account.changed["cell", "a part of the lesson's script"] += 1
+    context.change("cell", "a part of the lesson's script")
     options = options_of(cell)
     title = caption_of_code(options, context, ("lst-cap", "tbl-cap"))
     label = re.sub("^lst-", "", options.get("lst-label", ""))
@@ -164,7 +164,7 @@ def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tup
         if cell.picture is not None and cell.picture[0] == f".{extension}":
             data = data or cell.picture[1]
         _copy_figure(name, data, context)
-        context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
+        context.change("figure of a cell", "saved by the script, and recorded")
     code = _SAVED.sub(lambda match: f'{match["call"]}"{names[match["path"]]}"', code)
     caption = _caption_of(cell, code, context)
     label = len(names) == 1
@@ -203,7 +203,7 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
     """Return code that saves what it draws, and the paragraph that shows it."""
     name = _keep_picture(cell, context) or f"{_picture_stem(context)}.svg"
     context.figures.append(name)
-    context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
+    context.change("figure of a cell", "saved by the script, and recorded")
     code = f'{_without_window(code)}\n{pyplot}.savefig("{name}")\n{pyplot}.close("all")'.lstrip()
     return code, _write_figure(cell, name, _caption_of(cell, code, context))
 
@@ -211,7 +211,7 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
 def write_outputs(cell: Segment, context: LessonContext) -> Iterator[str]:
     """Yield what is recorded below code that is only shown: its text, its picture."""
     if text := plain_output(f"{cell.printed}{cell.value}"):
-        context.files.account.changed["output of code that is shown", "a block of text"] += 1
+        context.change("output of code that is shown", "a block of text")
         yield marks.fence("text", text)
     if name := _keep_picture(cell, context):
         yield f"![{context.title}]({name})"
@@ -278,7 +278,7 @@ def _with_new_paths(code: str, context: LessonContext) -> str:
         is_plain = line[start:end] in (f'"{value}"'.encode(), f"'{value}'".encode())
         if path and path != value and is_plain:
             lines[at] = line[:start] + f'"{path}"'.encode() + line[end:]
-            context.files.account.changed["path in a cell", "the new place of the file"] += 1
+            context.change("path in a cell", "the new place of the file")
     return b"\n".join(lines).decode()
 
 
@@ -302,7 +302,7 @@ def _without_host(text: str, context: LessonContext) -> str:
                 first, end = statement.lineno, statement.end_lineno or statement.lineno
                 lines[first:end] = [""] * (end - first)
                 change = "printed by its cell: bind the number where the text has it"
-                context.files.account.changed["value that is glued", change] += 1
+                context.change("value that is glued", change)
                 continue
             case ast.Expr() if names & {
                 n.id for n in ast.walk(statement) if isinstance(n, ast.Name)

@@ -151,7 +151,7 @@ def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
     if not path:
         return {}
     value = read_yaml(files.read_text(path))
-    files.account.changed["map", "content/course.toml"] += 1
+    files.change("map", "content/course.toml")
     if value is None:
         raise UsageError(f"{path} is not YAML, or too large")
     return value if isinstance(value, dict) else {"chapters": value}

@@ -170,7 +170,7 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
     for path in texts:
         lack = lacks.get(path)
         if path in included:
-            files.account.changed["fragment of a model", "beside the models that include it"] += 1
+            files.change("fragment of a model", "beside the models that include it")
         elif lack or path in pieces or _FRAGMENT.search(texts[path]):
             message = "a fragment of a model, which no whole one includes: it is compiled with none"
             if lack:
@@ -264,7 +264,7 @@ def _cited_works(files: SourceFiles, cited: Set[str]) -> str:
         if key in cited or not key:
             selection.setdefault(key or text, text)
     uncited = {key for key, _ in works if key} - cited
-    files.account.changed["source", "left out: no text cites it"] += len(uncited)
+    files.change("source", "left out: no text cites it", len(uncited))
     files.account.taken["source"] += len(cited)
     return "".join(f"{text}\n\n" for text in selection.values())
 
@@ -354,7 +354,7 @@ def _convert_texts(
             head = f'<a id="{to_anchor(text.label)}"></a>\n\n' if text.label else ""
             if macros:
                 head += f"$${macros}$$\n\n"
-                files.account.changed["macros", "defined in the formulas that use them"] += 1
+                files.change("macros", "defined in the formulas that use them")
             new[text.link] = text.title, head + _convert_text(text, context)
         except RecursionError:
             raise UsageError(f"{text.file} is nested too deeply") from None

@@ -104,7 +104,7 @@ def expand_includes(
                 len(_FENCE.findall(before)) % 2 or before.rpartition("\n")[2].count("`") % 2
             )
             return mark[0] if is_in_code else f"`{name}`"
-        files.account.changed["file that is included", "its lines stand in the text"] += 1
+        files.change("file that is included", "its lines stand in the text")
         expanded = expand_includes(part_text, target, files, depth + 1, lesson=lesson or path)
         included = expanded.strip("\n")
         if mark["listing"] or mark["command"] == "playground":

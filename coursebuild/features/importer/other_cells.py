@@ -104,7 +104,7 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
         return "\n\n".join((*head, marks.fence(language, code), *write_outputs(cell, context)))
     word = how_shown(replace(cell, text="\n".join(f"#| {n}: {v}" for n, v in options.items())))
     if not (language in _SHELLS or language in context.single_languages):
-        context.files.account.changed[kind, "lines of one script, which ends the text"] += 1
+        context.change(kind, "lines of one script, which ends the text")
         cells = context.joined.setdefault(language, JoinedCells(_new_path(language, context)))
         lines = cells.add(code, cell.printed + (cell.value if language in _PRINTING else ""))
         block = marks.fence(f"{language} show={cells.path}#{lines}", code)

@@ -30,6 +30,9 @@ _WIDE = "\0"
 """What stands behind a character that takes two columns."""
 _ITEM = re.compile(r"[-+*][ ]+|(?=\d+[.)][ ])")
 
+_MOST_LINES = 2_000
+"""Lines that a table may take: else a long text of what begins as one could be read without end."""
+
 Cells = Sequence[Sequence[str]]
 """The cells of a row, each with its lines."""
 
@@ -49,13 +52,12 @@ def rewrite_tables(text: str, leave: Callable[[int], None]) -> tuple[str, int]:
     `leave` is told the line, from 0, of a grid whose bars do not stand in columns: it is a text.
     """
     lines, out, count, at, fence = text.split("\n"), list[str](), 0, 0, ""
-    regions: dict[str, tuple[int, Sequence[str]]] = {}
     while at < len(lines):
         if mark := _FENCE.match(lines[at]):
             fence = "" if fence and mark[1].startswith(fence) else fence or mark[1]
         is_first = at == 0 or not lines[at - 1].strip("> ")
         may_begin = is_first and not fence and _may_begin(lines, at)
-        size, new = _read_block(lines, at, regions) if may_begin else (0, ())
+        size, new = _read_block(lines[at : at + _MOST_LINES]) if may_begin else (0, ())
         if size and not new:
             leave(at)
             lead = (_INDENT.match(lines[at]) or [""])[0]
@@ -73,44 +75,27 @@ def _may_begin(lines: Sequence[str], at: int) -> bool:
     return first.startswith(("+", "|", "--")) or second.startswith("--")
 
 
-def _read_block(
-    lines: Sequence[str], at: int, regions: dict[str, tuple[int, Sequence[str]]]
-) -> tuple[int, Sequence[str]]:
+def _read_block(lines: Sequence[str]) -> tuple[int, Sequence[str]]:
     """Return how many lines a table or verse takes, and as many new ones; none for a bad grid."""
     for pattern, read in _READERS:
-        lead = (pattern.match(lines[at]) or [""])[0]
-        below = _below(lines, at, lead, regions)
+        lead = (pattern.match(lines[0]) or [""])[0]
+        below = [*_stripped(lines, lead)]
         if table := read(below):
             caption, caption_size = _read_caption(below[table.size :])
             rows = (map(_join, cells) for cells in table.rows)
             new = marks.table(map(_join, table.head), rows, table.sides).split("\n")
             new, size = [*caption, *new], table.size + caption_size
             return size, [(lead + line).rstrip() for line in (*new, *[""] * (size - len(new)))]
-    lead = (_INDENT.match(lines[at]) or [""])[0]
-    below = _below(lines, at, lead, regions)
+    lead = (_INDENT.match(lines[0]) or [""])[0]
+    below = [*_stripped(lines, lead)]
     if verse := _read_verse(below):
         return len(verse), [lead + line for line in verse]
     return len(_find_grid(below)), ()
 
 
-def _below(
-    lines: Sequence[str], at: int, lead: str, regions: dict[str, tuple[int, Sequence[str]]]
-) -> Sequence[str]:
-    """Return the line at an index, and those below it that begin as it does, without that.
-
-    `regions` keeps for each beginning the lines found last, and the index behind them, so that a
-    long text is read once.
-    """
-    end, region = regions.get(lead, (0, ()))
-    if not end - len(region) <= at < end:
-        region = [*_stripped(lines, at, lead)]
-        end = at + len(region)
-        regions[lead] = end, region
-    return region[at - end :]
-
-
-def _stripped(lines: Sequence[str], at: int, lead: str) -> Iterator[str]:
-    for line in lines[at:]:
+def _stripped(lines: Sequence[str], lead: str) -> Iterator[str]:
+    """Yield the first line, and those below it that begin as it does, without that."""
+    for line in lines:
         is_empty = not line.strip("> ")
         if not (is_empty or line.startswith(lead)):
             return

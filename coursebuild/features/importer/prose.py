@@ -83,7 +83,6 @@ _LINE = re.compile(
     r"(?:\[(?P<name_of>[^\[\]\n]*)\])?)"
     r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
-    r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:(?:\{[^{}\n]*\})?(?:[ ]|&nbsp;)*)"
     r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
@@ -160,7 +159,6 @@ _KINDS = {
     "role": ("", "Markdown"),
     "code": ("code in a line", "code without the tool's mark"),
     "image": ("picture", "its file is in content/files"),
-    "link": ("link", "its new address"),
     "digits": ("formula", "the digits behind it are in it"),
     "math": ("formula", "without blanks at its ends"),
     "paren": ("formula", "between dollar signs"),
@@ -176,12 +174,8 @@ _KINDS = {
     "substitution": ("substitution", "the words that it stands for"),
     "marked": ("marked words", "a tag of HTML"),
     "change": ("suggested change", "as if it had been accepted"),
-    "wiki": ("link", "its new address"),
-    "auto": ("link", "its new address"),
     "latex": ("command of LaTeX", "dropped: it changes no word"),
     "mention": ("mention of a lesson", "its new number"),
-    "route": ("link", "its new address"),
-    "tail": ("link", "its new address"),
     "icon": ("icon", "dropped: it is a picture of its tool"),
     "emoji": ("emoji", ""),
     "block": ("block of Obsidian", "an anchor"),
@@ -205,36 +199,26 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
 
     text, count = rewrite_tables(text, leave_grid)
     change = "its rows between bars, a cell in one line; or a verse in lines that end"
-    account.changed["table or verse of Pandoc", change] += count
-    change = "a picture with its caption"
-    text = account.replace(MARKDOWN_FIGURE, write_captioned, text, "figure", change)
-    change = "dropped: the site has its own"
-    text = account.replace(_CONTENTS, "", text, "table of contents", change)
+    context.change("table or verse of Pandoc", change, count)
     if context.path.endswith((".qmd", ".Rmd")):
         text = _SETTINGS.sub("", text)
-    change = "the words of a heading or term that has no others: its tool replaces it"
-    text = account.replace(_COMMENT_AS_HEADING, r"\1`\2`", text, "comment", change)
     for pattern, kind in _KEPT.items():
         account.taken[kind] += len(pattern.findall(text))
-    change = "a comment of HTML"
-    text = account.replace(_COMMENT, _write_comment, text, "comment of MyST", change)
+    for change in _BLOCKS:
+        text = account.replace(text, *change)
     if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
         text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
     text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
-    text = account.replace(TARGET, write_target, text, "label", "an anchor")
     for abbreviation in _ABBREVIATION.finditer(text):
         message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
         context.leave("abbreviation", message)
     text = _ABBREVIATION.sub("", text)
     if "conf.py" in context.files:
         change = "a list; dropped where no field says a word"
-        text = account.replace(_FIELDS, _write_fields, text, "list of fields", change)
-    change = "behind its term, which is bold"
-    text = account.replace(_MEANING, _write_meanings, text, "definition", change)
-    text = account.replace(
-        TABLE_CAPTION, move_caption, text, "caption of a table", "stands above it"
-    )
+        text = account.replace(text, _FIELDS, _write_fields, "list of fields", change)
+    for change in _PARAGRAPHS:
+        text = account.replace(text, *change)
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         edge = _EDGE.match(line)
@@ -252,6 +236,15 @@ def _write_comment(match: re.Match[str]) -> str:
     """Return a comment as one of HTML; nothing for a mark that says nothing."""
     words = (match["inner"] or match["lines"] or match["line"] or match["data"] or "").strip()
     return f"<!-- {words.replace('-->', '--›')} -->" if words else ""
+
+
+_BLOCKS = (
+    (MARKDOWN_FIGURE, write_captioned, "figure", "a picture with its caption"),
+    (_CONTENTS, "", "table of contents", "dropped: the site has its own"),
+    (_COMMENT_AS_HEADING, r"\1`\2`", "comment", "words of a heading or term that has no others"),
+    (_COMMENT, _write_comment, "comment of MyST", "a comment of HTML"),
+)
+"""What is changed before the lines of a text are read, and how the account calls it."""
 
 
 def _join_lines(match: re.Match[str]) -> str:
@@ -274,10 +267,18 @@ def _write_meanings(match: re.Match[str]) -> str:
     return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
 
 
+_PARAGRAPHS = (
+    (TARGET, write_target, "label", "an anchor"),
+    (_MEANING, _write_meanings, "definition", "behind its term, which is bold"),
+    (TABLE_CAPTION, move_caption, "caption of a table", "stands above it"),
+)
+"""What is changed once formulas and tags are on lines of their own."""
+
+
 def _rewrite_line(line: str, context: LessonContext) -> str:
     def rewrite(match: re.Match[str]) -> str:
         group = match.lastgroup or ""
-        kind, change = _KINDS[group]
+        kind, change = _KINDS.get(group, ("link", "its new address"))
         if group == "role":
             kind = f"role `{{{match['name']}}}`"
         return context.files.account.convert(
@@ -418,8 +419,6 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "keys":
             keys = re.findall(r"[^+\"]+", match["stroke"])
             return "+".join(key.capitalize() if key.islower() else key for key in keys)
-        case "route":
-            return context.resolve_link(whole) or whole
         case "tail":
             return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":

@@ -15,7 +15,7 @@ from coursebuild.features.importer.context import (
     label_anchor,
     to_anchor,
 )
-from coursebuild.features.importer.jsx import label_of
+from coursebuild.features.importer.jsx import write_component
 from coursebuild.features.importer.source_files import title_of_file
 
 
@@ -238,10 +238,7 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     tag = _LOOK.sub("", tag)
     name = tag[1:].split()[0]
     if name[0].isupper() and not name.isupper():  # no element of HTML
-        context.leave("component", f"the component `<{name}>`; what it holds is shown")
-        number = re.search(r"\snumber=\"([^\"]+)", tag)
-        words = f"{name} {number[1]}: {label_of(tag)}" if number else label_of(tag)
-        return f"**{words}**" if words else ""
+        return write_component(name, tag, context)
     kind = _WITH_FILE.match(tag)
     attribute = _ATTRIBUTE.search(tag) if kind else None
     if attribute and kind and kind["frame"]:

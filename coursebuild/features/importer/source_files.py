@@ -425,6 +425,10 @@ class SourceFiles:
         is_public = not any(map(_is_skipped, (*path.split("/"), *real.split("/"))))
         return is_public and Path(self.folder, real).is_file()
 
+    def change(self, kind: str, change: str, count: int = 1) -> None:
+        """Note that things of a kind were changed in a way."""
+        self.account.changed[kind, change] += count
+
     def leave(self, path: str, message: str, kind: str = "file", place: str = "") -> None:
         """Note that something is not imported, and why."""
         self.account.leave(Leftover(path, place, " ".join(message.split()), kind))
