@@ -9,22 +9,22 @@ import textwrap
 
 from msgspec.structs import replace
 
-from coursebuild.api import marks, model
+from coursebuild.api import marks
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.absent_labs import write_absent_lab
 from coursebuild.features.importer.cells import (
     code_for_readers,
-    options_of,
+    read_options,
     write_cell,
     write_outputs,
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.directives import (
+    CALLOUTS,
     Directive,
     convert_directive,
     highlighted_languages,
-    split_options,
 )
 from coursebuild.features.importer.jsx import without_jsx
 from coursebuild.features.importer.other_cells import language_of, write_other_cell
@@ -34,17 +34,6 @@ from coursebuild.features.importer.segments import change_prose, lower_titles, r
 from coursebuild.features.importer.source_files import Segment
 from coursebuild.features.lab.model import BUILT_IN_KINDS
 
-_CALLOUTS = {
-    **{name: name for name in model.CALLOUTS},
-    "hint": "tip",
-    **dict.fromkeys(("attention", "failure", "bug"), "caution"),
-    **dict.fromkeys(("danger", "error"), "warning"),
-    **dict.fromkeys(("seealso", "info", "abstract", "summary", "quote", "topic"), "note"),
-    **dict.fromkeys(("admonition", "margin", "sidebar", "dropdown", "example"), "note"),
-    **dict.fromkeys(("aside", "details", "toggle", "todo"), "note"),
-    **dict.fromkeys(("exercise", "question"), "try"),
-    **dict.fromkeys(("answer", "success"), "solution"),
-}
 _MAX_DEPTH = 20
 """Blocks that may be around another."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
@@ -137,7 +126,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     kind = kind or next((name for name in classes if name in _PROOF_CLASSES), "")
     if callout is not None:
         kind = callout[1]
-    elif plain is not None and plain[1].lower() in _CALLOUTS:
+    elif plain is not None and plain[1].lower() in CALLOUTS:
         kind, title = plain[1].lower(), plain[2] or plain[3] or ""
     if kind:
         if not (title or plain):
@@ -223,9 +212,8 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
             message = f"a block `{language}`, which is shown as JSON"
             context.leave(f"block of `{language}`", message)
             language = "json"
-    cell = Segment(kind="block", place="", text=text)
-    if re.match(r"\{\w", head) and (options := options_of(cell)):
-        text = code_for_readers(cell)
+    if re.match(r"\{\w", head) and (options := read_options(text)[0]):
+        text = code_for_readers(text)
         caption = options.get("fig-cap") or options.get("lst-cap") or ""
         head += f' title="{caption}"' if caption else ""
     change = "dropped: its tool colours the lines beside it"
@@ -262,10 +250,10 @@ def _convert_nested(text: str, context: LessonContext, title: re.Pattern[str] | 
 
 
 def _callout_kind(kind: str, context: LessonContext) -> str:
-    callout_kind = _CALLOUTS.get(kind.lower())
+    callout_kind = CALLOUTS.get(kind.lower())
     if callout_kind is None:
         callout_kind = slug_of(kind).lstrip("0123456789-") or "note"
-        if callout_kind not in _CALLOUTS:
+        if callout_kind not in CALLOUTS:
             label = kind if kind.isprintable() else callout_kind
             context.callouts[callout_kind] = label.replace("-", " ").capitalize()
     return callout_kind
@@ -282,7 +270,7 @@ def _write_callout(
 
 
 def _convert_directive(name: str, argument: str, text: str, context: LessonContext) -> str:
-    options, body = split_options(text)
+    options, body = read_options(text) if text.lstrip()[:1] in (":", "-") else ({}, text)
     directive = Directive(
         name.lower(),
         argument,
@@ -297,7 +285,7 @@ def _convert_directive(name: str, argument: str, text: str, context: LessonConte
         f"directive `{{{name}}}`",
         "Markdown",
         f"{{{name}}} {argument}\n{text}",
-        lambda: convert_directive(directive, context, tuple(_CALLOUTS)),
+        lambda: convert_directive(directive, context),
     )
 
 
