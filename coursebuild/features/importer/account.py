@@ -16,6 +16,8 @@ from msgspec import Struct
 from coursebuild.report.values import plural
 
 Replacement = Callable[[re.Match[str]], str]
+Rules = tuple[tuple[re.Pattern[str], str | Replacement, str, str], ...]
+"""What is replaced by what, the kind of thing that it is, and how it is changed."""
 
 
 class Leftover(Struct, frozen=True, order=True):

@@ -1,4 +1,4 @@
-"""Tables and verses that Pandoc reads, as the Markdown that all tools read.
+"""Tables, verses and definitions that Pandoc reads, as the Markdown that all tools read.
 
 A grid has its cells between bars and crosses; another table has them below runs of hyphens, and
 empty lines between its rows where these go over several lines. A cell is what stands between the
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import re
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, groupby, pairwise
 from unicodedata import east_asian_width
@@ -259,6 +260,22 @@ def _read_verse(lines: Sequence[str]) -> list[str]:
 
 _READERS = ((_INDENT, _read_grid), (_QUOTE, _read_ruled))
 """What reads tables, and what stands before each of their lines."""
+
+
+MEANING = re.compile(
+    r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
+    r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
+    re.MULTILINE,
+)
+"""A term in a paragraph of its own, and what it means, once or more, each behind a colon."""
+
+
+def write_meanings(match: re.Match[str]) -> str:
+    """Return what a term means, as paragraphs of which the first begins with the term."""
+    meanings = re.split(r"^:[ \t]+", match["meanings"].lstrip("\n"), flags=re.MULTILINE)[1:]
+    parts = (textwrap.dedent(f"    {part.lstrip()}").strip() for part in meanings)
+    lines = (re.sub(r"^[ ]{2,4}", "", part, flags=re.MULTILINE) for part in parts)
+    return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
 
 
 _EXAMPLE = re.compile(r"^([ ]{0,3})\(@([\w-]*)\)(?=[ \t]+\S)", re.MULTILINE)

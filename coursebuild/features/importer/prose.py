@@ -7,8 +7,8 @@ not recognized here.
 from __future__ import annotations
 
 import re
-import textwrap
 
+from coursebuild.features.importer.account import Rules
 from coursebuild.features.importer.anchors import (
     FIGURE,
     MARKDOWN_FIGURE,
@@ -21,7 +21,7 @@ from coursebuild.features.importer.anchors import (
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.displays import WORDS, normalize_formulas
-from coursebuild.features.importer.pandoc_tables import rewrite_tables
+from coursebuild.features.importer.pandoc_tables import MEANING, rewrite_tables, write_meanings
 from coursebuild.features.importer.roles import (
     address_of_label,
     convert_attributes,
@@ -94,12 +94,6 @@ _LINE = re.compile(
 )
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
-_MEANING = re.compile(
-    r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
-    r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
-    re.MULTILINE,
-)
-"""A term in a paragraph of its own, and what it means, once or more, each behind a colon."""
 _FIELDS = re.compile(
     r"(?<![^\n]\n)(?:^:[A-Za-z][\w -]*:(?:[ \t]+\S[^\n]*)?(?:\n[ \t]+\S[^\n]*)*\n?)+^(?!.)",
     re.MULTILINE,
@@ -148,6 +142,7 @@ _OVER_LINES = re.compile(
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
+    r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
     r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
     r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
 )
@@ -204,8 +199,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = _SETTINGS.sub("", text)
     for pattern, kind in _KEPT.items():
         account.taken[kind] += len(pattern.findall(text))
-    for change in _BLOCKS:
-        text = account.replace(text, *change)
+    for rule in _BLOCKS:
+        text = account.replace(text, *rule)
     if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
         text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
     text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
@@ -217,8 +212,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     if "conf.py" in context.files:
         change = "a list; dropped where no field says a word"
         text = account.replace(text, _FIELDS, _write_fields, "list of fields", change)
-    for change in _PARAGRAPHS:
-        text = account.replace(text, *change)
+    for rule in _PARAGRAPHS:
+        text = account.replace(text, *rule)
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         edge = _EDGE.match(line)
@@ -238,7 +233,7 @@ def _write_comment(match: re.Match[str]) -> str:
     return f"<!-- {words.replace('-->', '--›')} -->" if words else ""
 
 
-_BLOCKS = (
+_BLOCKS: Rules = (
     (MARKDOWN_FIGURE, write_captioned, "figure", "a picture with its caption"),
     (_CONTENTS, "", "table of contents", "dropped: the site has its own"),
     (_COMMENT_AS_HEADING, r"\1`\2`", "comment", "words of a heading or term that has no others"),
@@ -259,17 +254,9 @@ def _write_fields(match: re.Match[str]) -> str:
     return "".join(f"- **{name}**: {' '.join(words.split())}\n" for name, words in fields)
 
 
-def _write_meanings(match: re.Match[str]) -> str:
-    """Return what a term means, as paragraphs of which the first begins with the term."""
-    meanings = re.split(r"^:[ \t]+", match["meanings"].lstrip("\n"), flags=re.MULTILINE)[1:]
-    parts = (textwrap.dedent(f"    {part.lstrip()}").strip() for part in meanings)
-    lines = (re.sub(r"^[ ]{2,4}", "", part, flags=re.MULTILINE) for part in parts)
-    return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
-
-
-_PARAGRAPHS = (
+_PARAGRAPHS: Rules = (
     (TARGET, write_target, "label", "an anchor"),
-    (_MEANING, _write_meanings, "definition", "behind its term, which is bold"),
+    (MEANING, write_meanings, "definition", "behind its term, which is bold"),
     (TABLE_CAPTION, move_caption, "caption of a table", "stands above it"),
 )
 """What is changed once formulas and tags are on lines of their own."""
