@@ -73,7 +73,7 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     options = read_options(cell.text)[0]
     title = caption_of_code(options, context, ("lst-cap", "tbl-cap"))
     label = re.sub("^lst-", "", options.get("lst-label", ""))
-    word += how_shown(cell) + (f" {{#lst:{to_anchor(label)}}}" if label else "")
+    word += how_shown(options, cell.head) + (f" {{#lst:{to_anchor(label)}}}" if label else "")
     head, end = f"python file={context.script_path}{word}", f"\n{_END} {len(context.parts)}"
     blocks = [*title, marks.fence(head, code + end)]
     blocks += write_recorded(recorded_output(cell, code), context.script_path, context)
@@ -147,10 +147,7 @@ _SAVED = re.compile(
 def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tuple[str, str]:
     """Return code that saves its figures beside the lesson, and the paragraphs that show them."""
     names: dict[str, str] = {}
-    for match in _SAVED.finditer(code):
-        path = match["path"]
-        if path in names:
-            continue
+    for path in dict.fromkeys(match["path"] for match in _SAVED.finditer(code)):
         stem, _, extension = posixpath.basename(path).rpartition(".")
         name = f"{to_anchor(stem)}.{extension}"
         if name in context.figures:
@@ -353,20 +350,14 @@ def caption_of_code(
     return [f"**{rewrite_prose(words, context)}**"] if words else []
 
 
-def how_shown(cell: Segment) -> str:
+def how_shown(options: Mapping[str, str], tags: str = "") -> str:
     """Return the word for a cell whose code its tool folds or hides, after a blank."""
-    options = read_options(cell.text)[0]
-    tags = cell.head + options.get("tags", "")
-    if re.search("remove-(?:input|cell)", tags) or "false" in (
-        options.get("echo"),
-        options.get("include"),
-    ):
+    tags += options.get("tags", "")
+    is_hidden = "false" in (options.get("echo"), options.get("include"))
+    if is_hidden or re.search("remove-(?:input|cell)", tags):
         return " hidden"
-    return (
-        " folded"
-        if re.search("hide-(?:input|cell)", tags) or options.get("code-fold") == "true"
-        else ""
-    )
+    is_folded = re.search("hide-(?:input|cell)", tags) or options.get("code-fold") == "true"
+    return " folded" if is_folded else ""
 
 
 def code_for_readers(text: str) -> str:

@@ -102,7 +102,7 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     if options.get("eval", "").lower() == "false":
         context.leave(kind, f"a {kind}, which its tool does not run, is shown")
         return "\n\n".join((*head, marks.fence(language, code), *write_outputs(cell, context)))
-    word = how_shown(replace(cell, text="\n".join(f"#| {n}: {v}" for n, v in options.items())))
+    word = how_shown(options, cell.head)
     if not (language in _SHELLS or language in context.single_languages):
         context.change(kind, "lines of one script, which ends the text")
         cells = context.joined.setdefault(language, JoinedCells(_new_path(language, context)))
