@@ -262,7 +262,9 @@ class SourceFiles:
         """Return the settings in a file; none where it is not there, or cannot be read."""
         path = self.find_settings(name)
         read = read_toml if path.endswith(".toml") else read_yaml  # JSON is YAML
-        value = read(self.read_text(path)) if path else None
+        value = read(self.read_text(path)) if path else {}
+        if value is None:
+            self.leave(path, "settings that cannot be read: nothing here is as they say", "setting")
         return value if isinstance(value, dict) else {}
 
     @cached_property
