@@ -12,7 +12,6 @@ from textwrap import shorten
 from coursebuild.api import Edit, Options, Recording, ScriptRun, Span, marks, model
 from coursebuild.core.run.part_marks import FAILURE
 from coursebuild.core.run.script_environment import distributions
-from coursebuild.core.scripts.module_code import bound_names, global_names
 from coursebuild.features.importer.cells import imported_names
 from coursebuild.features.importer.commands.findings import Rank
 from coursebuild.features.importer.context import script_path_of
@@ -102,12 +101,12 @@ class Chain:
             elif errors:
                 reasons[number] = f"`{shorten(errors[0], 200, placeholder='…')}`"
             else:
-                names -= _bound_names(code)
+                names -= _bound_names(ast.parse(code))
                 continue
             if reasons[number].startswith("`"):
                 message = f": `{shorten(errors[0], 200, placeholder='…')}`, so the cell is not run"
                 self.findings.append((Rank.FAILED, message, self.parts[number].span))
-            names |= _bound_names(code)
+            names |= _bound_names(ast.parse(code))
         rest = (imports.get(n, c) for n, c in enumerate(self.codes) if n not in reasons)
         if self.modules and not any(rest):
             return  # nothing would be left of it: a key says what it requires
@@ -128,7 +127,7 @@ class Chain:
             for statement in ast.parse(code).body:
                 modules = imported_names(statement)
                 if any(f"{name}.".startswith(f"{m}.") for name in modules for m in self.modules):
-                    names.update(bound_names(statement))
+                    names |= _bound_names(statement)
                     first, last = statement.lineno - 1, statement.end_lineno or statement.lineno
                     lines[first:last] = [""] * (last - first)
             if (new := "\n".join(lines)) != code:
@@ -196,14 +195,34 @@ def _loaded_names(code: str) -> set[str]:
     """The names that a cell takes from those above it: no statement before has given them."""
     used_names, own_names = set[str](), set[str]()
     for statement in ast.parse(code).body:
-        if hasattr(statement, "body"):  # as in a loop, it may use what it has given
-            own_names.update(bound_names(statement))
-        is_both = isinstance(statement, ast.AugAssign)
-        names = (n.id for n in global_names(statement) if is_both or isinstance(n.ctx, ast.Load))
-        used_names |= {*names} - own_names
-        own_names.update(bound_names(statement))
+        names = set[str]()
+        for node in ast.walk(statement):
+            match node:
+                case ast.Name(id=name, ctx=ast.Load()) | ast.AugAssign(target=ast.Name(id=name)):
+                    names.add(name)
+                case (
+                    ast.For(target=inner)
+                    | ast.comprehension(target=inner)
+                    | (ast.Import() as inner)
+                    | (ast.ImportFrom() as inner)
+                ):
+                    own_names |= _bound_names(inner)
+                case _:
+                    continue
+        used_names |= names - own_names
+        own_names |= _bound_names(statement)
     return used_names
 
 
-def _bound_names(code: str) -> set[str]:
-    return {name for statement in ast.parse(code).body for name in bound_names(statement)}
+def _bound_names(tree: ast.AST) -> set[str]:
+    """The names that code gives."""
+    names = set[str]()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name, ctx=ast.Store()):
+                names.add(name)
+            case ast.FunctionDef() | ast.ClassDef() | ast.AsyncFunctionDef():
+                names.add(node.name)
+            case _:
+                names |= {name.partition(".")[0] for name in imported_names(node).values()}
+    return names
