@@ -47,12 +47,15 @@ _PLACES = (
     ("fig:", r"^(?:#\|[ \t]*label:[ \t]*|!\[[^\n]*\{#)fig-(?P<name>[\w-]+)"),
 )
 """What sets an anchor, by what stands before its name here."""
-_ANCHORS = [(prefix, re.compile(pattern, re.MULTILINE)) for prefix, pattern in _PLACES]
 
 
 def find_anchors(text: str) -> set[str]:
     """Return the anchors that a text of any dialect sets, `eq:name` of formulas among them."""
-    anchors = {f"{kind}{to_anchor(m['name'])}" for kind, p in _ANCHORS for m in p.finditer(text)}
+    anchors = {
+        f"{prefix}{to_anchor(place['name'])}"
+        for prefix, pattern in _PLACES
+        for place in re.finditer(pattern, text, re.MULTILINE)
+    }
     proofs = re.findall(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", text)
     anchors |= {f"{kind}:{to_anchor(name)}" for kind, name in proofs}
     anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", normalize_formulas(text)))

@@ -31,7 +31,7 @@ from coursebuild.features.importer.roles import (
     convert_substitution,
     convert_tag,
     convert_wiki_link,
-    tell_emoji,
+    draw_emoji,
     words_of_link,
     write_link,
 )
@@ -172,7 +172,7 @@ _KINDS = {
     "latex": ("command of LaTeX", "dropped: it changes no word"),
     "mention": ("mention of a lesson", "its new number"),
     "icon": ("icon", "dropped: it is a picture of its tool"),
-    "emoji": ("emoji", ""),
+    "emoji": ("emoji", "its sign"),
     "block": ("block of Obsidian", "an anchor"),
     "keys": ("keys", "their names"),
     "definition": ("link by reference", "its new address"),
@@ -400,7 +400,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
         case "emoji":
-            return tell_emoji(whole, context)
+            return draw_emoji(whole, context)
         case "block" if (context.files.folder / ".obsidian").is_dir():
             return f'<a id="{to_anchor(match["id"])}"></a>'
         case "keys":

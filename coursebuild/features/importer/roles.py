@@ -6,7 +6,9 @@ replaces, or code that its tool runs.
 
 from __future__ import annotations
 
+import contextlib
 import re
+import unicodedata
 from urllib.parse import urlsplit
 
 from coursebuild.features.importer.context import (
@@ -200,10 +202,15 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     return "" if is_statement else ", ".join(f"`{text}`" for text in texts)
 
 
-def tell_emoji(name: str, context: LessonContext) -> str:
-    """Return the name of a sign between colons as it is, and note it where its tool draws signs."""
-    if context.files.mkdocs or context.files.docusaurus:
-        context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
+def draw_emoji(name: str, context: LessonContext) -> str:
+    """Return the sign that a name between colons has in Unicode, if its tool draws signs."""
+    if not (context.files.mkdocs or context.files.docusaurus):
+        return name
+    with contextlib.suppress(KeyError):
+        sign = unicodedata.lookup(name.strip(":").replace("_", " "))
+        if sign >= "\u2600":  # where the pictures begin
+            return sign
+    context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
     return name
 
 
