@@ -193,7 +193,7 @@ def _place_models(parts: Mapping[str, Sequence[str]], models: dict[str, str]) ->
     They are below `models`; what needs a file of a folder of that name lies to it as it did.
     """
     rest, root = set[str](), "/"
-    for path, names in parts.items():
+    for path, names in (*parts.items(), *parts.items()):  # the second time for what shares parts
         whole = {path, *names}
         if home := min(whole & models.keys(), default=""):
             source, target = posixpath.dirname(f"/{home}"), posixpath.dirname(models[home])
