@@ -16,6 +16,8 @@ from msgspec import Struct
 from coursebuild.report.values import plural
 
 Replacement = Callable[[re.Match[str]], str]
+Rules = tuple[tuple[re.Pattern[str], str | Replacement, str, str], ...]
+"""What is replaced by what, the kind of thing that it is, and how it is changed."""
 
 
 class Leftover(Struct, frozen=True, order=True):
@@ -77,7 +79,7 @@ class Account:
         self._words[kind, change].append(" ".join(words.split()))
 
     def replace(
-        self, old: re.Pattern[str], new: str | Replacement, text: str, kind: str, change: str
+        self, text: str, old: re.Pattern[str], new: str | Replacement, kind: str, change: str
     ) -> str:
         """Return a text with what a pattern matches replaced, and note each as changed."""
         text, count = old.subn(new, text)

@@ -47,12 +47,15 @@ _PLACES = (
     ("fig:", r"^(?:#\|[ \t]*label:[ \t]*|!\[[^\n]*\{#)fig-(?P<name>[\w-]+)"),
 )
 """What sets an anchor, by what stands before its name here."""
-_ANCHORS = [(prefix, re.compile(pattern, re.MULTILINE)) for prefix, pattern in _PLACES]
 
 
 def find_anchors(text: str) -> set[str]:
     """Return the anchors that a text of any dialect sets, `eq:name` of formulas among them."""
-    anchors = {f"{kind}{to_anchor(m['name'])}" for kind, p in _ANCHORS for m in p.finditer(text)}
+    anchors = {
+        f"{prefix}{to_anchor(place['name'])}"
+        for prefix, pattern in _PLACES
+        for place in re.finditer(pattern, text, re.MULTILINE)
+    }
     proofs = re.findall(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", text)
     anchors |= {f"{kind}:{to_anchor(name)}" for kind, name in proofs}
     anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", normalize_formulas(text)))
@@ -76,17 +79,23 @@ def figure_of(source: str, caption: str, label: str, alt: str) -> str:
     return f"Figure: ![{alt}]({source}) {caption}{mark}"
 
 
-TABLE_CAPTION = re.compile(
-    r"^(?P<table>(?:\|.*\n)+)\n?:[ ]+(?P<caption>.*?)[ ]*(?:\{#tbl-(?P<label>[\w-]+)[^{}]*\})?$",
-    re.MULTILINE,
+CAPTION = re.compile(
+    r"(?:Table)?:[ ]+(?P<caption>.*?)[ ]*(?:\{(?:#tbl-(?P<label>[\w-]+))?[^{}\n]*\})?"
 )
-"""A caption of Quarto, below its table."""
+"""The caption of a table of Pandoc, with attributes."""
+TABLE_CAPTION = re.compile(rf"^(?P<table>(?:\|.*\n)+)\n?{CAPTION.pattern}$", re.MULTILINE)
+"""A table of Quarto above its caption."""
 
 
 def move_caption(match: re.Match[str]) -> str:
     """Return a table below its caption."""
+    return f"{write_caption(match)}\n\n{match['table']}".lstrip("\n")
+
+
+def write_caption(match: re.Match[str]) -> str:
+    """Return the caption of a table; nothing where it holds attributes alone."""
     label = f" {{#tab:{to_anchor(match['label'])}}}" if match["label"] else ""
-    return f"Table: {match['caption']}{label}\n\n{match['table']}"
+    return f"Table: {match['caption']}{label}" if match["caption"] or label else ""
 
 
 def write_target(match: re.Match[str]) -> str:

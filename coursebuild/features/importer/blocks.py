@@ -9,41 +9,31 @@ import textwrap
 
 from msgspec.structs import replace
 
-from coursebuild.api import marks, model
+from coursebuild.api import marks
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.absent_labs import write_absent_lab
 from coursebuild.features.importer.cells import (
     code_for_readers,
-    options_of,
+    read_options,
     write_cell,
     write_outputs,
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.directives import (
+    CALLOUTS,
     Directive,
     convert_directive,
     highlighted_languages,
-    split_options,
 )
 from coursebuild.features.importer.jsx import without_jsx
 from coursebuild.features.importer.other_cells import language_of, write_other_cell
 from coursebuild.features.importer.prose import rewrite_prose
+from coursebuild.features.importer.roles import fill_shortcodes
 from coursebuild.features.importer.segments import change_prose, lower_titles, read_markdown
 from coursebuild.features.importer.source_files import Segment
 from coursebuild.features.lab.model import BUILT_IN_KINDS
 
-_CALLOUTS = {
-    **{name: name for name in model.CALLOUTS},
-    "hint": "tip",
-    **dict.fromkeys(("attention", "failure", "bug"), "caution"),
-    **dict.fromkeys(("danger", "error"), "warning"),
-    **dict.fromkeys(("seealso", "info", "abstract", "summary", "quote", "topic"), "note"),
-    **dict.fromkeys(("admonition", "margin", "sidebar", "dropdown", "example"), "note"),
-    **dict.fromkeys(("aside", "details", "toggle", "todo"), "note"),
-    **dict.fromkeys(("exercise", "question"), "try"),
-    **dict.fromkeys(("answer", "success"), "solution"),
-}
 _MAX_DEPTH = 20
 """Blocks that may be around another."""
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
@@ -68,6 +58,9 @@ def convert_segment(segment: Segment, context: LessonContext) -> str:
 
 def _convert(segment: Segment, context: LessonContext) -> str:
     context, head, text = context.at(segment.place), segment.head, segment.text
+    if segment.kind != "prose" and segment.mark[0] in "`~":
+        text = fill_shortcodes(text, context)
+        segment = replace(segment, text=text)
 
     def name_callouts(text: str) -> str:
         return _QUOTED_KIND.sub(lambda m: m[1] + _callout_kind(m[2], context) + m[3], text)
@@ -111,14 +104,14 @@ def _convert(segment: Segment, context: LessonContext) -> str:
 
 def _write_tabs(text: str, context: LessonContext) -> str:
     """Return a set of tabs of Quarto with their titles, which are headings, in bold."""
-    context.files.account.changed[_TAB] += 1
+    context.change(*_TAB)
     first = re.search(r"^#{1,6}(?=[ \t])", text, re.MULTILINE)
     pattern = rf"^{first[0] if first else '#'}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
     return _convert_nested(text, context, re.compile(pattern, re.MULTILINE))
 
 
 def _write_tab(title: str, text: str, context: LessonContext) -> str:
-    context.files.account.changed[_TAB] += 1
+    context.change(*_TAB)
     return f"**{rewrite_prose(title, context).strip()}**\n\n{_convert_nested(text, context)}"
 
 
@@ -133,7 +126,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     kind = kind or next((name for name in classes if name in _PROOF_CLASSES), "")
     if callout is not None:
         kind = callout[1]
-    elif plain is not None and plain[1].lower() in _CALLOUTS:
+    elif plain is not None and plain[1].lower() in CALLOUTS:
         kind, title = plain[1].lower(), plain[2] or plain[3] or ""
     if kind:
         if not (title or plain):
@@ -152,7 +145,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
     if "panel-tabset" in classes:
         return _write_tabs(text, context)
-    context.files.account.changed["division", "what it holds, without a frame"] += 1
+    context.change("division", "what it holds, without a frame")
     if figure := re.search(r"#fig-([\w-]+)", head):
         return f'<a id="fig-{to_anchor(figure[1])}"></a>\n\n{_convert_nested(text, context)}'
     return _convert_nested(text, context)
@@ -182,7 +175,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         if raw[1] == "markdown":
             return _convert_nested(text, context)
         if raw[1] == "html":
-            return text
+            return rewrite_prose(text, context)
         context.leave("block that is raw", f"a block of raw {raw[1]}, shown as text")
         return marks.fence("text", text)
     if kind == "admonish":
@@ -191,7 +184,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         is_folded = "collapsible=true" in head
         return _write_callout(name, title[1] if title else "", text, context, is_folded)
     if listing := re.search(r"\bfile=((?!examples/)\S+)", head) if kind == "python" else None:
-        context.files.account.changed["listing of a file", "its name, and its code, not run"] += 1
+        context.change("listing of a file", "its name, and its code, not run")
         return f"**`{listing[1]}`**\n\n{marks.fence('python', text)}"
     if kind in ("lab", "quiz") and context.camera_is_position:
         text = _CAMERA.sub(_reverse_camera, text)
@@ -219,13 +212,12 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
             message = f"a block `{language}`, which is shown as JSON"
             context.leave(f"block of `{language}`", message)
             language = "json"
-    cell = Segment(kind="block", place="", text=text)
-    if head.startswith("{") and (options := options_of(cell)):
-        text = code_for_readers(cell)
+    if re.match(r"\{\w", head) and (options := read_options(text)[0]):
+        text = code_for_readers(text)
         caption = options.get("fig-cap") or options.get("lst-cap") or ""
         head += f' title="{caption}"' if caption else ""
     change = "dropped: its tool colours the lines beside it"
-    text = context.files.account.replace(_HIGHLIGHT, "", text, "comment in code", change)
+    text = context.files.account.replace(text, _HIGHLIGHT, "", "comment in code", change)
     words = re.sub(r"(\$[^$]+\$)|(?<!\\)([][_*`{}<])", _escape, _title_of(head))
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
@@ -258,10 +250,10 @@ def _convert_nested(text: str, context: LessonContext, title: re.Pattern[str] | 
 
 
 def _callout_kind(kind: str, context: LessonContext) -> str:
-    callout_kind = _CALLOUTS.get(kind.lower())
+    callout_kind = CALLOUTS.get(kind.lower())
     if callout_kind is None:
         callout_kind = slug_of(kind).lstrip("0123456789-") or "note"
-        if callout_kind not in _CALLOUTS:
+        if callout_kind not in CALLOUTS:
             label = kind if kind.isprintable() else callout_kind
             context.callouts[callout_kind] = label.replace("-", " ").capitalize()
     return callout_kind
@@ -273,12 +265,12 @@ def _write_callout(
     title, brace, label = title.partition("{#")
     title = " ".join(f"{rewrite_prose(title, context)} {brace}{label}".split())
     head = f"[!{_callout_kind(kind, context)}]{'-' * is_folded} {title}".rstrip()
-    context.files.account.changed["callout", "a quotation that begins with its kind"] += 1
+    context.change("callout", "a quotation that begins with its kind")
     return marks.block_quote(f"{head}\n{_convert_nested(text, context)}".rstrip("\n"))
 
 
 def _convert_directive(name: str, argument: str, text: str, context: LessonContext) -> str:
-    options, body = split_options(text)
+    options, body = read_options(text) if text.lstrip()[:1] in (":", "-") else ({}, text)
     directive = Directive(
         name.lower(),
         argument,
@@ -293,7 +285,7 @@ def _convert_directive(name: str, argument: str, text: str, context: LessonConte
         f"directive `{{{name}}}`",
         "Markdown",
         f"{{{name}}} {argument}\n{text}",
-        lambda: convert_directive(directive, context, tuple(_CALLOUTS)),
+        lambda: convert_directive(directive, context),
     )
 
 

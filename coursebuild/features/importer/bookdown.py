@@ -87,7 +87,7 @@ def read_book(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
     if name not in files:
         return
     settings = files.settings(name)
-    files.account.changed["map", "content/course.toml"] += 1
+    files.change("map", "content/course.toml")
     choice = value_at(settings, "rmd_files")
     if isinstance(choice, Mapping):  # by the form of the book
         choice = choice.get("html") or choice.get("latex")

@@ -18,7 +18,7 @@ from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment, read_yaml
 
 _OPTION = re.compile(
-    r"^(?:(?:#|//|%%)(?:[ ](?=\|[ ]+[\w-]+:[ ]))?\|(.*)|:([\w-]+):[ \t]*(.*))\n?", re.MULTILINE
+    r"\s*(?:(?:#|//|%%)(?:[ ](?=\|[ ]+[\w-]+:[ ]))?\|(.*)|:([\w-]+):[ \t]*(.*))(?:\n|\Z)"
 )
 """A line of options of a cell: YAML of Quarto, or one option of MyST."""
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
@@ -38,7 +38,6 @@ _MAGIC = re.compile(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 def write_cell(cell: Segment, context: LessonContext) -> str:
     """Return a cell as a part of the lesson's script, with what it prints and draws; or as code."""
     context = context.at(cell.place)
-    account = context.files.account
     if re.search(r"\bHTML\([\"']+\s*<style|^\s*%%(?:javascript|js|css)\b|<style", cell.text):
         context.leave("cell", "a cell that changes the look of its page, which the site has itself")
         return ""
@@ -47,7 +46,7 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     code = runnable_code(cell, context)
     if not code:
         magic = re.match(r"\s*%%(\w+).*\n", cell.text)
-        shown_code, language = code_for_readers(cell), "python"
+        shown_code, language = code_for_readers(cell.text), "python"
         if magic is not None:
             shown_code = cell.text[magic.end() :].strip("\n")
             if magic[1] == "writefile":
@@ -70,11 +69,11 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
             figure = "\n\n".join(write_outputs(replace(cell, printed="", value=""), context))
     word = " part" if context.parts else ""
     context.parts.append(code)
-    account.changed["cell", "a part of the lesson's script"] += 1
-    options = options_of(cell)
+    context.change("cell", "a part of the lesson's script")
+    options = read_options(cell.text)[0]
     title = caption_of_code(options, context, ("lst-cap", "tbl-cap"))
     label = re.sub("^lst-", "", options.get("lst-label", ""))
-    word += how_shown(cell) + (f" {{#lst:{to_anchor(label)}}}" if label else "")
+    word += how_shown(options, cell.head) + (f" {{#lst:{to_anchor(label)}}}" if label else "")
     head, end = f"python file={context.script_path}{word}", f"\n{_END} {len(context.parts)}"
     blocks = [*title, marks.fence(head, code + end)]
     blocks += write_recorded(recorded_output(cell, code), context.script_path, context)
@@ -148,10 +147,7 @@ _SAVED = re.compile(
 def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tuple[str, str]:
     """Return code that saves its figures beside the lesson, and the paragraphs that show them."""
     names: dict[str, str] = {}
-    for match in _SAVED.finditer(code):
-        path = match["path"]
-        if path in names:
-            continue
+    for path in dict.fromkeys(match["path"] for match in _SAVED.finditer(code)):
         stem, _, extension = posixpath.basename(path).rpartition(".")
         name = f"{to_anchor(stem)}.{extension}"
         if name in context.figures:
@@ -164,7 +160,7 @@ def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tup
         if cell.picture is not None and cell.picture[0] == f".{extension}":
             data = data or cell.picture[1]
         _copy_figure(name, data, context)
-        context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
+        context.change("figure of a cell", "saved by the script, and recorded")
     code = _SAVED.sub(lambda match: f'{match["call"]}"{names[match["path"]]}"', code)
     caption = _caption_of(cell, code, context)
     label = len(names) == 1
@@ -178,7 +174,7 @@ def _without_window(code: str) -> str:
 
 
 def _caption_of(cell: Segment, code: str, context: LessonContext) -> str:
-    options, title = options_of(cell), _DRAWN_TITLE.search(code)
+    options, title = read_options(cell.text)[0], _DRAWN_TITLE.search(code)
     words = "" if title is None else title[3]
     words = words if title is None or title[1] == "r" else re.sub(r"\\([\\'\"])", r"\1", words)
     caption = options.get("fig-cap") or options.get("caption") or words
@@ -187,7 +183,7 @@ def _caption_of(cell: Segment, code: str, context: LessonContext) -> str:
 
 
 def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = True) -> str:
-    options = options_of(cell)
+    options = read_options(cell.text)[0]
     alt = " ".join(options.get("fig-alt", options.get("alt", "")).strip("\"' ").split()) or caption
     alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)
     label = options.get("label", "") if has_label else ""
@@ -203,7 +199,7 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
     """Return code that saves what it draws, and the paragraph that shows it."""
     name = _keep_picture(cell, context) or f"{_picture_stem(context)}.svg"
     context.figures.append(name)
-    context.files.account.changed["figure of a cell", "saved by the script, and recorded"] += 1
+    context.change("figure of a cell", "saved by the script, and recorded")
     code = f'{_without_window(code)}\n{pyplot}.savefig("{name}")\n{pyplot}.close("all")'.lstrip()
     return code, _write_figure(cell, name, _caption_of(cell, code, context))
 
@@ -211,7 +207,7 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
 def write_outputs(cell: Segment, context: LessonContext) -> Iterator[str]:
     """Yield what is recorded below code that is only shown: its text, its picture."""
     if text := plain_output(f"{cell.printed}{cell.value}"):
-        context.files.account.changed["output of code that is shown", "a block of text"] += 1
+        context.change("output of code that is shown", "a block of text")
         yield marks.fence("text", text)
     if name := _keep_picture(cell, context):
         yield f"![{context.title}]({name})"
@@ -246,23 +242,31 @@ def _copy_figure(name: str, data: bytes, context: LessonContext) -> bool:
     return isinstance(picture, bytes)
 
 
-def options_of(cell: Segment) -> Mapping[str, str]:
-    """Return the options of a cell by their names, as Quarto and MyST write them."""
-    lines = _OPTION.findall(cell.text)
-    options = {name: value.strip() for _, name, value in lines if name}
-    head = _YAML_HEAD.match(cell.text)
-    for text in ("\n".join(line for line, name, _ in lines if not name), head[1] if head else ""):
-        value = read_yaml(text)
+def read_options(text: str) -> tuple[Mapping[str, str], str]:
+    """Return the options that begin a cell or directive, by their names, and its other lines.
+
+    They are YAML, between lines of hyphens or behind the marks of Quarto, or lines of MyST.
+    """
+    head = _YAML_HEAD.match(text)
+    at, yaml_lines, options = head.end() if head else 0, list[str](), dict[str, str]()
+    while option := _OPTION.match(text, at):
+        at = option.end()
+        if option[2]:
+            options[option[2]] = option[3].strip()
+        else:
+            yaml_lines.append(option[1])
+    for yaml_text in ("\n".join(yaml_lines), head[1] if head else ""):
+        value = read_yaml(yaml_text)
         pending = [value] if isinstance(value, dict) else []
         while pending:
             for name, inner in pending.pop().items():
                 if isinstance(inner, dict):
                     pending.append(inner)
                 else:
-                    text = " ".join(map(str, inner)) if isinstance(inner, list) else str(inner)
-                    text = text.lower() if isinstance(inner, bool) else text
-                    options[str(name).replace(".", "-")] = text  # as knitr and Quarto call it
-    return options
+                    words = " ".join(map(str, inner)) if isinstance(inner, list) else str(inner)
+                    words = words.lower() if isinstance(inner, bool) else words
+                    options[str(name).replace(".", "-")] = words  # as knitr and Quarto call it
+    return options, text[at:]
 
 
 def _with_new_paths(code: str, context: LessonContext) -> str:
@@ -278,7 +282,7 @@ def _with_new_paths(code: str, context: LessonContext) -> str:
         is_plain = line[start:end] in (f'"{value}"'.encode(), f"'{value}'".encode())
         if path and path != value and is_plain:
             lines[at] = line[:start] + f'"{path}"'.encode() + line[end:]
-            context.files.account.changed["path in a cell", "the new place of the file"] += 1
+            context.change("path in a cell", "the new place of the file")
     return b"\n".join(lines).decode()
 
 
@@ -302,7 +306,7 @@ def _without_host(text: str, context: LessonContext) -> str:
                 first, end = statement.lineno, statement.end_lineno or statement.lineno
                 lines[first:end] = [""] * (end - first)
                 change = "printed by its cell: bind the number where the text has it"
-                context.files.account.changed["value that is glued", change] += 1
+                context.change("value that is glued", change)
                 continue
             case ast.Expr() if names & {
                 n.id for n in ast.walk(statement) if isinstance(n, ast.Name)
@@ -346,22 +350,19 @@ def caption_of_code(
     return [f"**{rewrite_prose(words, context)}**"] if words else []
 
 
-def how_shown(cell: Segment) -> str:
+def how_shown(options: Mapping[str, str], tags: str = "") -> str:
     """Return the word for a cell whose code its tool folds or hides, after a blank."""
-    options = options_of(cell)
-    tags = cell.head + options.get("tags", "")
-    if "remove-input" in tags or "false" in (options.get("echo"), options.get("include")):
+    tags += options.get("tags", "")
+    is_hidden = "false" in (options.get("echo"), options.get("include"))
+    if is_hidden or re.search("remove-(?:input|cell)", tags):
         return " hidden"
-    return " folded" if "hide-input" in tags or options.get("code-fold") == "true" else ""
+    is_folded = re.search("hide-(?:input|cell)", tags) or options.get("code-fold") == "true"
+    return " folded" if is_folded else ""
 
 
-def code_for_readers(cell: Segment) -> str:
-    """Return a cell's code without the lines that only its tool understands."""
-    return _drop_magics(_without_options(cell.text)).strip("\n")
-
-
-def _without_options(text: str) -> str:
-    return _OPTION.sub("", _YAML_HEAD.sub("", text, count=1))
+def code_for_readers(text: str) -> str:
+    """Return the code of a cell without the lines that only its tool understands."""
+    return _drop_magics(read_options(text)[1]).strip("\n")
 
 
 def _drop_magics(text: str) -> str:
@@ -382,8 +383,7 @@ def _find_fault(text: str) -> str:
 
 def runnable_code(cell: Segment, context: LessonContext) -> str:
     """Return what the script runs of a cell; empty where that is nothing."""
-    options = options_of(cell)
-    text = _without_options(cell.text)
+    options, text = read_options(cell.text)
     tags = cell.head + options.get("tags", "")
     if "raises-exception" in tags or options.get("error") == "true":
         context.leave("cell", "a cell that is meant to fail is shown, not run")

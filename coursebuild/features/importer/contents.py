@@ -60,7 +60,9 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         UsageError: there is nothing to import.
     """
     names = ("myst.yml", "_quarto.yml", "_config.yml", "mkdocs.yml")
-    myst, quarto, _, mkdocs = settings = [_read_settings(name, files) for name in names]
+    settings = [_read_settings(name, files) for name in names]
+    settings[-1] = settings[-1] or files.settings("zensical.toml").get("project", {})
+    myst, quarto, _, mkdocs = settings
 
     def find_setting(*keys: str) -> str:
         places = (
@@ -149,7 +151,7 @@ def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
     if not path:
         return {}
     value = read_yaml(files.read_text(path))
-    files.account.changed["map", "content/course.toml"] += 1
+    files.change("map", "content/course.toml")
     if value is None:
         raise UsageError(f"{path} is not YAML, or too large")
     return value if isinstance(value, dict) else {"chapters": value}

@@ -111,6 +111,10 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         """Note that something has no counterpart, why, and what to do."""
         self.files.leave(self.path, message, kind, self.place)
 
+    def change(self, kind: str, change: str, count: int = 1) -> None:
+        """Note that things of a kind were changed in a way."""
+        self.files.change(kind, change, count)
+
     def print_value(self, language: str, code: str) -> str:
         """Let the cells above print a value that the text shows, and return its name; or nothing.
 

@@ -164,13 +164,12 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
     }
     lacks = {path: name for path in texts if (name := _find_lack(path, parts[path], texts))}
     pieces = {part for path in lacks for part in parts.pop(path)}
-    for root, names in _group_by_folder(parts).items():
-        _place_models(root, names, models)
+    _place_models(parts, models)
     included = {part for names in parts.values() for part in names if part in texts}
     for path in texts:
         lack = lacks.get(path)
         if path in included:
-            files.account.changed["fragment of a model", "beside the models that include it"] += 1
+            files.change("fragment of a model", "beside the models that include it")
         elif lack or path in pieces or _FRAGMENT.search(texts[path]):
             message = "a fragment of a model, which no whole one includes: it is compiled with none"
             if lack:
@@ -188,40 +187,24 @@ def _find_lack(path: str, parts: Sequence[str], texts: Mapping[str, str]) -> str
     return next((name for name in names if posixpath.basename(name) not in part_names), "")
 
 
-def _group_by_folder(parts: Mapping[str, Sequence[str]]) -> Mapping[str, set[str]]:
-    """Return models with their parts, by the innermost folder that holds all of them.
+def _place_models(parts: Mapping[str, Sequence[str]], models: dict[str, str]) -> None:
+    """Give models and their parts new paths, which lie to each other as they did.
 
-    What lies in a folder of another group is of that group, so that no path between them breaks.
+    They are below `models`; what needs a file of a folder of that name lies to it as it did.
     """
-    groups: dict[str, set[str]] = {}
-    folders = {
-        path: posixpath.commonpath([f"/{posixpath.dirname(name)}" for name in (path, *names)])
-        for path, names in parts.items()
-    }
-    for path, folder in sorted(folders.items(), key=lambda item: item[1]):
-        roots = (root for root in groups if posixpath.commonpath((root, folder)) == root)
-        root = next(roots, folder)
-        groups.setdefault(root, set()).update((path, *parts[path]))
-    return groups
-
-
-def _place_models(root: str, names: set[str], models: dict[str, str]) -> None:
-    """Give files of a group new paths, which lie to each other as they did.
-
-    They are below `models`, unless some are in a folder of that name already, which counts.
-    """
-    fixed = min(names & models.keys(), default=None)
-    if fixed is None:
-        folder, source = "models", root
-        places = {*models.values()}
-        if any(f"models/{posixpath.relpath(f'/{name}', root)}" in places for name in names):
-            folder = f"models/{to_anchor(root)}"
-    else:
-        folder, source = posixpath.dirname(models[fixed]), f"/{posixpath.dirname(fixed)}"
-    for name in names - models.keys():
-        new = posixpath.normpath(posixpath.join(folder, posixpath.relpath(f"/{name}", source)))
-        if not new.startswith("../"):
-            models[name] = new
+    rest, root = set[str](), "/"
+    for path, names in (*parts.items(), *parts.items()):  # the second time for what shares parts
+        whole = {path, *names}
+        if home := min(whole & models.keys(), default=""):
+            source, target = posixpath.dirname(f"/{home}"), posixpath.dirname(models[home])
+            paths = {n: posixpath.join(target, posixpath.relpath(f"/{n}", source)) for n in whole}
+            news = {name: posixpath.normpath(new) for name, new in paths.items()}
+            models |= {n: new for n, new in news.items() if not new.startswith("../")}
+        else:
+            rest |= whole
+    if rest and not models:  # else the names of folders keep them apart
+        root = posixpath.commonpath([posixpath.dirname(f"/{name}") for name in rest])
+    models |= {n: f"models/{posixpath.relpath(f'/{n}', root)}" for n in rest - models.keys()}
 
 
 _WORK = re.compile(
@@ -264,7 +247,7 @@ def _cited_works(files: SourceFiles, cited: Set[str]) -> str:
         if key in cited or not key:
             selection.setdefault(key or text, text)
     uncited = {key for key, _ in works if key} - cited
-    files.account.changed["source", "left out: no text cites it"] += len(uncited)
+    files.change("source", "left out: no text cites it", len(uncited))
     files.account.taken["source"] += len(cited)
     return "".join(f"{text}\n\n" for text in selection.values())
 
@@ -354,7 +337,7 @@ def _convert_texts(
             head = f'<a id="{to_anchor(text.label)}"></a>\n\n' if text.label else ""
             if macros:
                 head += f"$${macros}$$\n\n"
-                files.account.changed["macros", "defined in the formulas that use them"] += 1
+                files.change("macros", "defined in the formulas that use them")
             new[text.link] = text.title, head + _convert_text(text, context)
         except RecursionError:
             raise UsageError(f"{text.file} is nested too deeply") from None

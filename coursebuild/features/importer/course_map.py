@@ -66,7 +66,7 @@ def read_course_json(path: str, files: SourceFiles) -> ImportedCourse:
         UsageError: it is no JSON, or holds no levels.
     """
     text = files.read_text(path)
-    files.account.changed["map", "content/course.toml"] += 1
+    files.change("map", "content/course.toml")
     try:
         # A number such as 4.10 is the name of a lesson.
         data = json.loads(text, parse_float=str, parse_int=str)
@@ -265,7 +265,7 @@ def _read_file(
             source = _TAG_BESIDE_BLOCK.sub(r"\g<0>\n", source)
         visible_text = without_hidden_lines(source, files.hidden_marks)
         if visible_text != source:
-            files.account.changed["hidden lines of code", "dropped: readers did not see them"] += 1
+            files.change("hidden lines of code", "dropped: readers did not see them")
             source = visible_text
         read = read_segments(source, text.file, title)
     except RecursionError:
@@ -276,7 +276,7 @@ def _read_file(
         kind = "lesson" if id else "page"
         message = f"`{name}` of its metadata ({words}), which a {kind} does not have"
         files.leave(text.file, message, "metadata of a text")
-    files.account.changed["text", "a lesson" if id else "a page"] += 1
+    files.change("text", "a lesson" if id else "a page")
     if course.has_own_titles and title and read.title and title.casefold() != read.title.casefold():
         words = f"“{title}” is “{read.title}”"
         files.account.change("title in the map", "the title of the text itself", words)

@@ -6,19 +6,32 @@ import csv
 import functools
 import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import marks
+from coursebuild.api import marks, model
 from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.context import NUMBERED, LessonContext, label_anchor, to_anchor
 from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.roles import convert_role, words_of_link, write_link
-from coursebuild.features.importer.source_files import TOO_MUCH, read_yaml
+from coursebuild.features.importer.source_files import TOO_MUCH
+
+CALLOUTS = {
+    **{name: name for name in model.CALLOUTS},
+    "hint": "tip",
+    **dict.fromkeys(("attention", "failure", "bug"), "caution"),
+    **dict.fromkeys(("danger", "error"), "warning"),
+    **dict.fromkeys(("seealso", "info", "abstract", "summary", "quote", "topic"), "note"),
+    **dict.fromkeys(("admonition", "margin", "sidebar", "dropdown", "example"), "note"),
+    **dict.fromkeys(("aside", "details", "toggle", "todo"), "note"),
+    **dict.fromkeys(("exercise", "question"), "try"),
+    **dict.fromkeys(("answer", "success"), "solution"),
+}
+"""Kinds of callouts here, by those that other tools have."""
 
 
 class Directive(Struct, frozen=True):
@@ -46,23 +59,6 @@ class Directive(Struct, frozen=True):
         return f" {{#{kind}:{to_anchor(self.label)}}}" if self.label else ""
 
 
-_MYST_OPTION = re.compile(r":([\w-]+):[ \t]*(.*)")
-
-
-def split_options(text: str) -> tuple[Mapping[str, str], str]:
-    """Return the options that begin a directive (`:name: value`, or YAML), and its other lines."""
-    if text.startswith("---\n") and "\n---" in text[4:]:
-        head, _, rest = text[4:].partition("\n---")
-        value = read_yaml(head)
-        options = value if isinstance(value, dict) else {}
-        return {str(name): str(option) for name, option in options.items()}, rest.lstrip("-\n")
-    options, lines = {}, text.split("\n")
-    while lines and (option := _MYST_OPTION.fullmatch(lines[0].strip())) is not None:
-        options[option[1]] = option[2]
-        del lines[0]
-    return options, "\n".join(lines)
-
-
 _TITLED = frozenset(
     "admonition dropdown sidebar topic exercise example margin aside details card".split()
 )
@@ -87,16 +83,16 @@ _CHANGES = {
 }
 
 
-def convert_directive(directive: Directive, context: LessonContext, callouts: Sequence[str]) -> str:
-    """Return a directive in Markdown; `callouts` are those that are callouts here."""
+def convert_directive(directive: Directive, context: LessonContext) -> str:
+    """Return a directive in Markdown."""
     anchor = ""
     kind = directive.name.removeprefix("prf:")
     if directive.label and not (kind in _WITH_LABELS or kind in NUMBERED):
         anchor = f'<a id="{to_anchor(directive.label)}"></a>\n\n'
-    return anchor + _write(directive, context, callouts)
+    return anchor + _write(directive, context)
 
 
-def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]) -> str:
+def _write(directive: Directive, context: LessonContext) -> str:
     name, argument, options, text = (
         directive.name,
         directive.argument,
@@ -118,6 +114,12 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             new = {**options, "alt": alt, "name": argument}
             figure = replace(directive, name="figure", argument=source, options=new, text=caption)
             return _write_figure(figure, context)
+        case "glue:figure":
+            context.leave(kind, f"the figure `{argument}`: save it in its cell, as `figure=` says")
+            return directive.nested(text)
+        case "todo" if "conf.py" in context.files:
+            context.leave(kind, "a note of the authors, which readers did not see: a comment now")
+            return f"<!-- {argument} {text.replace('-->', '--›')} -->"
         case "doctest" | "plot":
             return marks.fence("pycon" if name == "doctest" else "python", text.strip("\n"))
         case "line-block":
@@ -169,12 +171,12 @@ def _write(directive: Directive, context: LessonContext, callouts: Sequence[str]
             version, _, rest = argument.partition(" ")
             body = f"{rest}\n{text}".strip()
             return directive.callout("version", f"{_CHANGES[name]} {version}", body, False)
-        case _ if (proof := name.removeprefix("prf:")) in _PROOFS and name not in callouts:
+        case _ if (proof := name.removeprefix("prf:")) in _PROOFS and name not in CALLOUTS:
             return directive.callout(proof, argument + directive.number, text, False)
         case "solution":  # its argument is the label of an exercise
             return directive.callout(name, directive.number, text, True)
-        case _ if name in callouts:
-            if name == "admonition" and (kind := options.get("class", "")) in callouts:
+        case _ if name in CALLOUTS:
+            if name == "admonition" and (kind := options.get("class", "")) in CALLOUTS:
                 name = kind
             is_folded = name in ("details", "toggle") or "dropdown" in options.get("class", name)
             has_title = directive.name in _TITLED or (text.strip() and "myst.yml" in context.files)

@@ -14,22 +14,22 @@ from coursebuild.features.importer.source_files import value_at
 
 WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
 """Words in a formula that hold a formula themselves."""
+_CODE = r"(?P<ticks>`+)(?!`)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
 _DISPLAY = re.compile(
-    r"(?P<ticks>`+)(?!`)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
-    rf"|\$\$(?P<tex>(?:{WORDS}|[^$\\]|\\.)+?)\$\$"
+    rf"{_CODE}|\$\$(?P<tex>(?:{WORDS}|[^$\\]|\\.)+?)\$\$"
     r"(?:[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\}))?"
     r"(?:[ \t]*<br[ ]*/?>)*(?P<behind>[ \t]*(?=[^\s.,;:]|[.,;:][ \t]*\S))?",
     re.DOTALL,
 )
 """A formula between two dollar signs each, or code, in which there is none."""
 _ENVIRONMENT = re.compile(
-    rf"\$\$(?>(?:{WORDS}|[^$])+)\$\$|^[ \t]*"
+    rf"{_CODE}|\$\$(?>(?:{WORDS}|[^$])+)\$\$|(?:^[ \t]*|(?P<words>[\w,.:;)][ ]))"
     r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
     r"(?>(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*)"
-    r"\\end\{(?P=env)(?P=star)\})[ \t]*$",
+    r"\\end\{(?P=env)(?P=star)\})(?(words)(?=\s)|[ \t]*$)",
     re.DOTALL | re.MULTILINE,
 )
-"""A formula between dollar signs, or one that its environment alone makes one."""
+"""A formula between dollar signs, or one that its environment alone makes one; or code."""
 _BRACKETS = re.compile(
     r"^(?P<lead>[ \t]*)(?:\\{1,2}\[(?P<tex>(?>(?:(?!\\{1,2}[\[\]]).)+))\\{1,2}\]"
     r"|\$(?P<lines>[ \t]*\n(?:(?!\n[ \t]*\n)[^$])+)\$)[ \t]*$",
@@ -65,8 +65,14 @@ def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
     text = define_operators(_DISPLAY.sub(_drop_empty, text))
-    text = _ENVIRONMENT.sub(lambda m: f"$${m['tex']}$$" if m["tex"] else m[0], text)
-    return _DISPLAY.sub(_label_formula, text)
+    return _DISPLAY.sub(_label_formula, _ENVIRONMENT.sub(_write_environment, text))
+
+
+def _write_environment(match: re.Match[str]) -> str:
+    tex, words = match["tex"], match["words"] or ""
+    if words:  # a line of it could begin as that of a list
+        tex = " ".join(tex.split("\n"))
+    return f"{words}$${tex}$$" if tex else match[0]
 
 
 def define_operators(text: str) -> str:

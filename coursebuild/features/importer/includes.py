@@ -97,12 +97,14 @@ def expand_includes(
             part_text, problem = None, TOO_MUCH
         if part_text is None:
             files.leave(path, f"`{name}`: {problem}", "file that is included", line)
+            if mark["mkdocs"] and not re.search(r"check_paths\W+true", files.mkdocs):
+                return ""  # as there
             before = text[: mark.start()]
             is_in_code = (
                 len(_FENCE.findall(before)) % 2 or before.rpartition("\n")[2].count("`") % 2
             )
             return mark[0] if is_in_code else f"`{name}`"
-        files.account.changed["file that is included", "its lines stand in the text"] += 1
+        files.change("file that is included", "its lines stand in the text")
         expanded = expand_includes(part_text, target, files, depth + 1, lesson=lesson or path)
         included = expanded.strip("\n")
         if mark["listing"] or mark["command"] == "playground":

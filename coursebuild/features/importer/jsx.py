@@ -53,6 +53,19 @@ def without_jsx(text: str, context: LessonContext) -> str:
     return _PART.sub(lambda part: _convert_part(part, context), text)
 
 
+def write_component(name: str, attributes: str, context: LessonContext) -> str:
+    """Return what the beginning of a component has readers see: a picture, or its label."""
+    context.leave("component", f"the component `<{name}>`; what it holds is shown")
+    labels = (pattern.search(attributes) for pattern in _LABELS)
+    label = next(filter(None, labels), None)
+    words = (label[1] or label[2] or "") if label else ""
+    if picture := _ADDRESS.search(attributes):
+        return f"![{words}]({picture[1]})"
+    if number := re.search(r"\snumber=\"([^\"]+)", attributes):
+        words = f"{name} {number[1]}: {words}"
+    return words and f"**{words}**"
+
+
 def _convert_part(part: re.Match[str], context: LessonContext) -> str:
     name, attributes = part["name"], part["attributes"]
     if part["code"]:
@@ -68,16 +81,11 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
             return f"<!-- {comment.strip().replace('-->', '--›')} -->"
         return f"`{expression}`" if expression else ""
     if name[0].isupper():
-        if not part["end"]:
-            context.leave("component", f"the component `<{name}>`; what it holds is shown")
-        label = next(filter(None, (pattern.search(attributes) for pattern in _LABELS)), None)
-        words = (label[1] or label[2] or "") if label else ""
-        if picture := _ADDRESS.search(attributes):
-            return f"![{words}]({picture[1]})"
+        words = "" if part["end"] else write_component(name, attributes, context)
         before, after = part.string[: part.start()], part.string[part.end() :]
         is_first = not before.rpartition("\n")[2].strip()
         gap = "\n\n" if words and is_first and after[:1] not in ("\n", "") else ""
-        return f"**{words}**{gap}" if words else ""
+        return words + gap
 
     def write_attribute(computed: re.Match[str]) -> str:
         address = _ADDRESS.search(computed[0])

@@ -18,7 +18,7 @@ from coursebuild.features.importer.cells import (
     caption_of_code,
     code_for_readers,
     how_shown,
-    options_of,
+    read_options,
     write_outputs,
     write_recorded,
 )
@@ -65,7 +65,7 @@ def languages_of_single_cells(segments: Iterable[Segment]) -> frozenset[str]:
         language_of(segment)
         for segment in segments
         if _options_of(segment).get("eval", "").lower() != "false"
-        and not _PICTURE.fullmatch(code_for_readers(segment))
+        and not _PICTURE.fullmatch(code_for_readers(segment.text))
     ]
     return frozenset(language for language in languages if languages.count(language) == 1)
 
@@ -77,13 +77,13 @@ def _options_of(segment: Segment) -> dict[str, str]:
         name.replace(".", "-"): value.strip("\"'").replace("\\\\", "\\") for name, value in words
     }
     booleans = {"T": "true", "TRUE": "true", "F": "false", "FALSE": "false"}
-    return {**{n: booleans.get(v, v) for n, v in options.items()}, **options_of(segment)}
+    return {**{n: booleans.get(v, v) for n, v in options.items()}, **read_options(segment.text)[0]}
 
 
 def write_other_cell(cell: Segment, language: str, context: LessonContext) -> str:
     """Return a cell of this language as a script, or as code that is shown, with its output."""
     options, kind = _options_of(cell), f"cell of `{language}`"
-    code = code_for_readers(replace(cell, text=_MAGIC.sub("", cell.text, count=1)))
+    code = code_for_readers(_MAGIC.sub("", cell.text, count=1))
     label = options.get("label", "")
     if own_label := _own_label(cell.head):  # of which only figures and tables are referred to
         label = f"fig-{own_label}" if "fig-cap" in options else ""
@@ -102,9 +102,9 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     if options.get("eval", "").lower() == "false":
         context.leave(kind, f"a {kind}, which its tool does not run, is shown")
         return "\n\n".join((*head, marks.fence(language, code), *write_outputs(cell, context)))
-    word = how_shown(replace(cell, text="\n".join(f"#| {n}: {v}" for n, v in options.items())))
+    word = how_shown(options, cell.head)
     if not (language in _SHELLS or language in context.single_languages):
-        context.files.account.changed[kind, "lines of one script, which ends the text"] += 1
+        context.change(kind, "lines of one script, which ends the text")
         cells = context.joined.setdefault(language, JoinedCells(_new_path(language, context)))
         lines = cells.add(code, cell.printed + (cell.value if language in _PRINTING else ""))
         block = marks.fence(f"{language} show={cells.path}#{lines}", code)

@@ -53,7 +53,7 @@ def read_outline(files: SourceFiles) -> Outline | None:
     places = (posixpath.join(folder, name), "SUMMARY.md", "docs/SUMMARY.md")
     path = next((path for path in map(posixpath.normpath, places) if path in files), "")
     if path:
-        files.account.changed["map", "content/course.toml"] += 1
+        files.change("map", "content/course.toml")
         outline = _read_summary(path, str(value_at(settings, "title") or ""), files)
         if not is_mdbook:
             return outline
@@ -83,7 +83,7 @@ def read_outline(files: SourceFiles) -> Outline | None:
     name = next((path for path in files if re.fullmatch(pattern, path)), "")
     parts: list[ImportedText | ImportedLevel] = []
     if name:
-        files.account.changed["map", "content/course.toml"] += 1
+        files.change("map", "content/course.toml")
         sidebars = _read_literal(files.read_text(name))
         if sidebars is None:
             message = "a program: the order of lessons is that of `sidebar_position` and of names"

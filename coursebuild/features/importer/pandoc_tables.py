@@ -1,4 +1,4 @@
-"""Tables and verses that Pandoc reads, as the Markdown that all tools read.
+"""Tables, verses and definitions that Pandoc reads, as the Markdown that all tools read.
 
 A grid has its cells between bars and crosses; another table has them below runs of hyphens, and
 empty lines between its rows where these go over several lines. A cell is what stands between the
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import re
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, groupby, pairwise
 from unicodedata import east_asian_width
@@ -16,7 +17,7 @@ from unicodedata import east_asian_width
 from msgspec import Struct
 
 from coursebuild.api import marks
-from coursebuild.features.importer.context import to_anchor
+from coursebuild.features.importer.anchors import CAPTION, write_caption
 
 _QUOTE = re.compile(r"(?:[ ]{0,3}>[ ]?)*")
 _INDENT = re.compile(rf"{_QUOTE.pattern}[ ]{{0,3}}")
@@ -25,11 +26,13 @@ _RULE = re.compile(r"[ ]{0,3}-{2,}(?:[ ]+-{2,})+[ ]*")
 """What stands above the cells of a table without bars, a run of hyphens for each column."""
 _LINE = re.compile(r"[ ]{0,3}-{5,}[ ]*")
 _FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
-_CAPTION = re.compile(r"(?:Table)?:[ ]+(?P<words>.*?)[ ]*(?:\{#tbl-(?P<label>[\w-]+)[^{}]*\})?")
 _DELIMITERS = re.compile(r"\|?[ \t]*:?-+:?[ \t]*(?:\|[ \t]*:?-+:?[ \t]*)*\|?[ \t]*")
 _WIDE = "\0"
 """What stands behind a character that takes two columns."""
 _ITEM = re.compile(r"[-+*][ ]+|(?=\d+[.)][ ])")
+
+_MOST_LINES = 2_000
+"""Lines that a table may take: else a long text of what begins as one could be read without end."""
 
 Cells = Sequence[Sequence[str]]
 """The cells of a row, each with its lines."""
@@ -50,13 +53,12 @@ def rewrite_tables(text: str, leave: Callable[[int], None]) -> tuple[str, int]:
     `leave` is told the line, from 0, of a grid whose bars do not stand in columns: it is a text.
     """
     lines, out, count, at, fence = text.split("\n"), list[str](), 0, 0, ""
-    regions: dict[str, tuple[int, Sequence[str]]] = {}
     while at < len(lines):
         if mark := _FENCE.match(lines[at]):
             fence = "" if fence and mark[1].startswith(fence) else fence or mark[1]
         is_first = at == 0 or not lines[at - 1].strip("> ")
         may_begin = is_first and not fence and _may_begin(lines, at)
-        size, new = _read_block(lines, at, regions) if may_begin else (0, ())
+        size, new = _read_block(lines[at : at + _MOST_LINES]) if may_begin else (0, ())
         if size and not new:
             leave(at)
             lead = (_INDENT.match(lines[at]) or [""])[0]
@@ -74,44 +76,27 @@ def _may_begin(lines: Sequence[str], at: int) -> bool:
     return first.startswith(("+", "|", "--")) or second.startswith("--")
 
 
-def _read_block(
-    lines: Sequence[str], at: int, regions: dict[str, tuple[int, Sequence[str]]]
-) -> tuple[int, Sequence[str]]:
+def _read_block(lines: Sequence[str]) -> tuple[int, Sequence[str]]:
     """Return how many lines a table or verse takes, and as many new ones; none for a bad grid."""
     for pattern, read in _READERS:
-        lead = (pattern.match(lines[at]) or [""])[0]
-        below = _below(lines, at, lead, regions)
+        lead = (pattern.match(lines[0]) or [""])[0]
+        below = [*_stripped(lines, lead)]
         if table := read(below):
             caption, caption_size = _read_caption(below[table.size :])
             rows = (map(_join, cells) for cells in table.rows)
             new = marks.table(map(_join, table.head), rows, table.sides).split("\n")
             new, size = [*caption, *new], table.size + caption_size
             return size, [(lead + line).rstrip() for line in (*new, *[""] * (size - len(new)))]
-    lead = (_INDENT.match(lines[at]) or [""])[0]
-    below = _below(lines, at, lead, regions)
+    lead = (_INDENT.match(lines[0]) or [""])[0]
+    below = [*_stripped(lines, lead)]
     if verse := _read_verse(below):
         return len(verse), [lead + line for line in verse]
     return len(_find_grid(below)), ()
 
 
-def _below(
-    lines: Sequence[str], at: int, lead: str, regions: dict[str, tuple[int, Sequence[str]]]
-) -> Sequence[str]:
-    """Return the line at an index, and those below it that begin as it does, without that.
-
-    `regions` keeps for each beginning the lines found last, and the index behind them, so that a
-    long text is read once.
-    """
-    end, region = regions.get(lead, (0, ()))
-    if not end - len(region) <= at < end:
-        region = [*_stripped(lines, at, lead)]
-        end = at + len(region)
-        regions[lead] = end, region
-    return region[at - end :]
-
-
-def _stripped(lines: Sequence[str], at: int, lead: str) -> Iterator[str]:
-    for line in lines[at:]:
+def _stripped(lines: Sequence[str], lead: str) -> Iterator[str]:
+    """Yield the first line, and those below it that begin as it does, without that."""
+    for line in lines:
         is_empty = not line.strip("> ")
         if not (is_empty or line.startswith(lead)):
             return
@@ -121,14 +106,11 @@ def _stripped(lines: Sequence[str], at: int, lead: str) -> Iterator[str]:
 def _read_caption(lines: Sequence[str]) -> tuple[list[str], int]:
     """Return the caption of the table that ends above, and the lines that it takes."""
     start = next((n for n, line in enumerate(lines[:2]) if line.strip()), None)
-    if start is None or not _CAPTION.match(lines[start].lstrip()):
+    if start is None or not CAPTION.match(lines[start].lstrip()):
         return [], 0
     end = next((n for n in range(start, len(lines)) if not lines[n].strip()), len(lines))
-    caption = _CAPTION.fullmatch(" ".join(line.strip() for line in lines[start:end]))
-    if caption is None:
-        return [], 0
-    label = f" {{#tab:{to_anchor(caption['label'])}}}" if caption["label"] else ""
-    return [f"Table: {caption['words']}{label}", ""], end
+    caption = CAPTION.fullmatch(" ".join(line.strip() for line in lines[start:end]))
+    return ([write_caption(caption), ""], end) if caption else ([], 0)
 
 
 def _join(lines: Sequence[str]) -> str:
@@ -278,6 +260,22 @@ def _read_verse(lines: Sequence[str]) -> list[str]:
 
 _READERS = ((_INDENT, _read_grid), (_QUOTE, _read_ruled))
 """What reads tables, and what stands before each of their lines."""
+
+
+MEANING = re.compile(
+    r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
+    r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
+    re.MULTILINE,
+)
+"""A term in a paragraph of its own, and what it means, once or more, each behind a colon."""
+
+
+def write_meanings(match: re.Match[str]) -> str:
+    """Return what a term means, as paragraphs of which the first begins with the term."""
+    meanings = re.split(r"^:[ \t]+", match["meanings"].lstrip("\n"), flags=re.MULTILINE)[1:]
+    parts = (textwrap.dedent(f"    {part.lstrip()}").strip() for part in meanings)
+    lines = (re.sub(r"^[ ]{2,4}", "", part, flags=re.MULTILINE) for part in parts)
+    return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
 
 
 _EXAMPLE = re.compile(r"^([ ]{0,3})\(@([\w-]*)\)(?=[ \t]+\S)", re.MULTILINE)

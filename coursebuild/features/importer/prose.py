@@ -7,8 +7,8 @@ not recognized here.
 from __future__ import annotations
 
 import re
-import textwrap
 
+from coursebuild.features.importer.account import Rules
 from coursebuild.features.importer.anchors import (
     FIGURE,
     MARKDOWN_FIGURE,
@@ -21,7 +21,7 @@ from coursebuild.features.importer.anchors import (
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.displays import WORDS, normalize_formulas
-from coursebuild.features.importer.pandoc_tables import rewrite_tables
+from coursebuild.features.importer.pandoc_tables import MEANING, rewrite_tables, write_meanings
 from coursebuild.features.importer.roles import (
     address_of_label,
     convert_attributes,
@@ -31,7 +31,7 @@ from coursebuild.features.importer.roles import (
     convert_substitution,
     convert_tag,
     convert_wiki_link,
-    tell_emoji,
+    draw_emoji,
     words_of_link,
     write_link,
 )
@@ -72,7 +72,8 @@ _LINE = re.compile(
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
-    r"|(?P<latex>\\(?:newpage|pagebreak|clearpage)(?![A-Za-z])|\\index\w*\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
+    r"|(?P<latex>\\(?:newline|newpage|pagebreak|clearpage|noindent|(?:small|med|big)skip|[hv]fill)"
+    r"(?![A-Za-z])[ ]?|\\[hv]space\*?\{[^{}\n]*\}|\\index\w*\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
     rf"|(?P<told>(?<![\w@.\\/])@(?P<work>{_KEY})(?:[ ]?\[[, ]*(?P<cited>[^\[\]\n@]+)\](?!\())?)"
@@ -82,7 +83,6 @@ _LINE = re.compile(
     r"(?:\[(?P<name_of>[^\[\]\n]*)\])?)"
     r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
-    r"|(?P<route>(?<=[\"'(<])#/lessons?/[\w.-]+(?:#[\w-]+)?)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:(?:\{[^{}\n]*\})?(?:[ ]|&nbsp;)*)"
     r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
@@ -94,12 +94,6 @@ _LINE = re.compile(
 )
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
-_MEANING = re.compile(
-    r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
-    r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
-    re.MULTILINE,
-)
-"""A term in a paragraph of its own, and what it means, once or more, each behind a colon."""
 _FIELDS = re.compile(
     r"(?<![^\n]\n)(?:^:[A-Za-z][\w -]*:(?:[ \t]+\S[^\n]*)?(?:\n[ \t]+\S[^\n]*)*\n?)+^(?!.)",
     re.MULTILINE,
@@ -108,6 +102,8 @@ _FIELDS = re.compile(
 _ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
 _EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
+_PICTURE_LINE = re.compile(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)
+"""A picture of HTML above words, which would be HTML as well."""
 _EMPTY_HEADING = re.compile(r"[ ]{0,3}#{1,6}[ \t]*$")
 _ENDS = {"<!--": "-->", "$$": "$$"}
 _COMMENT = re.compile(
@@ -146,6 +142,8 @@ _OVER_LINES = re.compile(
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
+    r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
+    r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
     r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
 )
 """A role, a note, a citation, the address of a link or a formula that goes on in the next line."""
@@ -156,7 +154,6 @@ _KINDS = {
     "role": ("", "Markdown"),
     "code": ("code in a line", "code without the tool's mark"),
     "image": ("picture", "its file is in content/files"),
-    "link": ("link", "its new address"),
     "digits": ("formula", "the digits behind it are in it"),
     "math": ("formula", "without blanks at its ends"),
     "paren": ("formula", "between dollar signs"),
@@ -172,14 +169,10 @@ _KINDS = {
     "substitution": ("substitution", "the words that it stands for"),
     "marked": ("marked words", "a tag of HTML"),
     "change": ("suggested change", "as if it had been accepted"),
-    "wiki": ("link", "its new address"),
-    "auto": ("link", "its new address"),
     "latex": ("command of LaTeX", "dropped: it changes no word"),
     "mention": ("mention of a lesson", "its new number"),
-    "route": ("link", "its new address"),
-    "tail": ("link", "its new address"),
     "icon": ("icon", "dropped: it is a picture of its tool"),
-    "emoji": ("emoji", ""),
+    "emoji": ("emoji", "its sign"),
     "block": ("block of Obsidian", "an anchor"),
     "keys": ("keys", "their names"),
     "definition": ("link by reference", "its new address"),
@@ -201,36 +194,26 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
 
     text, count = rewrite_tables(text, leave_grid)
     change = "its rows between bars, a cell in one line; or a verse in lines that end"
-    account.changed["table or verse of Pandoc", change] += count
-    change = "a picture with its caption"
-    text = account.replace(MARKDOWN_FIGURE, write_captioned, text, "figure", change)
-    change = "dropped: the site has its own"
-    text = account.replace(_CONTENTS, "", text, "table of contents", change)
+    context.change("table or verse of Pandoc", change, count)
     if context.path.endswith((".qmd", ".Rmd")):
         text = _SETTINGS.sub("", text)
-    change = "the words of a heading or term that has no others: its tool replaces it"
-    text = account.replace(_COMMENT_AS_HEADING, r"\1`\2`", text, "comment", change)
     for pattern, kind in _KEPT.items():
         account.taken[kind] += len(pattern.findall(text))
-    change = "a comment of HTML"
-    text = account.replace(_COMMENT, _write_comment, text, "comment of MyST", change)
+    for rule in _BLOCKS:
+        text = account.replace(text, *rule)
     if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
         text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
     text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
-    text = account.replace(TARGET, write_target, text, "label", "an anchor")
     for abbreviation in _ABBREVIATION.finditer(text):
         message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
         context.leave("abbreviation", message)
     text = _ABBREVIATION.sub("", text)
     if "conf.py" in context.files:
         change = "a list; dropped where no field says a word"
-        text = account.replace(_FIELDS, _write_fields, text, "list of fields", change)
-    change = "behind its term, which is bold"
-    text = account.replace(_MEANING, _write_meanings, text, "definition", change)
-    text = account.replace(
-        TABLE_CAPTION, move_caption, text, "caption of a table", "stands above it"
-    )
+        text = account.replace(text, _FIELDS, _write_fields, "list of fields", change)
+    for rule in _PARAGRAPHS:
+        text = account.replace(text, *rule)
     out, mark = [], ""
     for number, line in enumerate(text.split("\n")):
         edge = _EDGE.match(line)
@@ -241,13 +224,22 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         elif edge is not None and edge[1].startswith(mark):
             mark = "" if mark else edge[1]
         out.append(line)
-    return FIGURE.sub(write_figure, "\n".join(out))
+    return FIGURE.sub(write_figure, _PICTURE_LINE.sub(r"\g<0>\n", "\n".join(out)))
 
 
 def _write_comment(match: re.Match[str]) -> str:
     """Return a comment as one of HTML; nothing for a mark that says nothing."""
     words = (match["inner"] or match["lines"] or match["line"] or match["data"] or "").strip()
     return f"<!-- {words.replace('-->', '--›')} -->" if words else ""
+
+
+_BLOCKS: Rules = (
+    (MARKDOWN_FIGURE, write_captioned, "figure", "a picture with its caption"),
+    (_CONTENTS, "", "table of contents", "dropped: the site has its own"),
+    (_COMMENT_AS_HEADING, r"\1`\2`", "comment", "words of a heading or term that has no others"),
+    (_COMMENT, _write_comment, "comment of MyST", "a comment of HTML"),
+)
+"""What is changed before the lines of a text are read, and how the account calls it."""
 
 
 def _join_lines(match: re.Match[str]) -> str:
@@ -262,18 +254,18 @@ def _write_fields(match: re.Match[str]) -> str:
     return "".join(f"- **{name}**: {' '.join(words.split())}\n" for name, words in fields)
 
 
-def _write_meanings(match: re.Match[str]) -> str:
-    """Return what a term means, as paragraphs of which the first begins with the term."""
-    meanings = re.split(r"^:[ \t]+", match["meanings"].lstrip("\n"), flags=re.MULTILINE)[1:]
-    parts = (textwrap.dedent(f"    {part.lstrip()}").strip() for part in meanings)
-    lines = (re.sub(r"^[ ]{2,4}", "", part, flags=re.MULTILINE) for part in parts)
-    return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
+_PARAGRAPHS: Rules = (
+    (TARGET, write_target, "label", "an anchor"),
+    (MEANING, write_meanings, "definition", "behind its term, which is bold"),
+    (TABLE_CAPTION, move_caption, "caption of a table", "stands above it"),
+)
+"""What is changed once formulas and tags are on lines of their own."""
 
 
 def _rewrite_line(line: str, context: LessonContext) -> str:
     def rewrite(match: re.Match[str]) -> str:
         group = match.lastgroup or ""
-        kind, change = _KINDS[group]
+        kind, change = _KINDS.get(group, ("link", "its new address"))
         if group == "role":
             kind = f"role `{{{match['name']}}}`"
         return context.files.account.convert(
@@ -408,14 +400,12 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
         case "emoji":
-            return tell_emoji(whole, context)
+            return draw_emoji(whole, context)
         case "block" if (context.files.folder / ".obsidian").is_dir():
             return f'<a id="{to_anchor(match["id"])}"></a>'
         case "keys":
             keys = re.findall(r"[^+\"]+", match["stroke"])
             return "+".join(key.capitalize() if key.islower() else key for key in keys)
-        case "route":
-            return context.resolve_link(whole) or whole
         case "tail":
             return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":
@@ -442,7 +432,7 @@ _STATEMENTS = re.compile(r"\s*(?:\{%[^%\n]*%\}\s*)+")
 """A line of nothing but statements of Jinja or Liquid."""
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
-_CITED_KEY = re.compile(rf"(?<![\w@])@({_KEY})")
+_CITED_KEY = re.compile(rf"(?<![\w@`])@({_KEY})")
 _TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
 """A formula with blanks at its ends, which some tools allow."""
 _WORD = re.compile(r"(?<![\\A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")

@@ -6,7 +6,9 @@ replaces, or code that its tool runs.
 
 from __future__ import annotations
 
+import contextlib
 import re
+import unicodedata
 from urllib.parse import urlsplit
 
 from coursebuild.features.importer.context import (
@@ -15,6 +17,7 @@ from coursebuild.features.importer.context import (
     label_anchor,
     to_anchor,
 )
+from coursebuild.features.importer.jsx import write_component
 from coursebuild.features.importer.source_files import title_of_file
 
 
@@ -59,7 +62,8 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             if ":" in address.rpartition("#")[2]:  # what has a number is called by it
                 rest = words.partition("%s")[2] if "%s" in words else ""
                 return write_link("" if "%s" in words else words, address) + rest
-            words = words.replace("%s", "").strip()
+            lesson = re.match(r"lesson:([\w.]+)", address)
+            words = words.replace("%s", lesson[1] if lesson else "").strip()
             return write_link(words if address else words or title_of_file(target), address)
         case _ if name.partition(":")[0] in ("cite", "citep", "citet"):
             keys = [key.strip() for key in body.split(",")]
@@ -106,6 +110,19 @@ _LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)[\w-]+[ ]+")
 """The language of code in a line, as MkDocs marks it."""
 
 
+_SHORTCODE = re.compile(r"(\{?)\{\{<\s*(?:(?:var|meta)\s+([\w.-]+)|[^{}]*?)\s*>\}\}(\}?)")
+
+
+def fill_shortcodes(code: str, context: LessonContext) -> str:
+    """Return code of Quarto with the values that it names, without the braces that keep a name."""
+
+    def fill(name: re.Match[str]) -> str:
+        is_kept = name[1] and name[3]
+        return name[0][1:-1] if is_kept else context.substitutions.get(name[2] or "", name[0])
+
+    return _SHORTCODE.sub(fill, code) if context.path.endswith(".qmd") else code
+
+
 def convert_code(whole: str, context: LessonContext) -> str:
     """Return code in a line, without the mark of a tool that replaces it by its value."""
     if raw := re.fullmatch(r"(`+)(.+?)\1\{=(\w+)\}", whole):
@@ -115,7 +132,7 @@ def convert_code(whole: str, context: LessonContext) -> str:
         return ""
     run = _INLINE_RUN.fullmatch(whole)
     if run is None:
-        return _LANGUAGE.sub(r"\1", whole)
+        return _LANGUAGE.sub(r"\1", fill_shortcodes(whole, context))
     if run[1] is None and re.match(r"[\w.]+[ ]*(?:<-|=(?!=))", run[2]):
         context.leave("code in a line", f"{whole}, which shows nothing: set the name in a cell")
         return ""
@@ -173,7 +190,7 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     if name.removeprefix("end") in _FRAMES and name != "embed":
         return ""
     if name == "kbd" and arguments:
-        return arguments[-1]
+        return arguments[-1].rpartition("=")[2]
     key = address if name in ("var", "meta") else name
     if (value := context.substitutions.get(key)) is not None:
         return value
@@ -181,13 +198,19 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     texts = ["".join(text) for text in _QUOTED.findall(call["arguments"])] if call else []
     message = f"`{whole}`, which its tool replaces: write what it stands for"
     context.leave("substitution", message)
-    return "" if is_statement else ", ".join(f"`{text}`" for text in texts or [whole])
+    texts = texts or [whole[3:-3].strip() if whole.startswith("{{<") else whole]
+    return "" if is_statement else ", ".join(f"`{text}`" for text in texts)
 
 
-def tell_emoji(name: str, context: LessonContext) -> str:
-    """Return the name of a sign between colons as it is, and note it where its tool draws signs."""
-    if context.files.mkdocs or context.files.docusaurus:
-        context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
+def draw_emoji(name: str, context: LessonContext) -> str:
+    """Return the sign that a name between colons has in Unicode, if its tool draws signs."""
+    if not (context.files.mkdocs or context.files.docusaurus):
+        return name
+    with contextlib.suppress(KeyError):
+        sign = unicodedata.lookup(name.strip(":").replace("_", " "))
+        if sign >= "\u2600":  # where the pictures begin
+            return sign
+    context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
     return name
 
 
@@ -220,6 +243,9 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     A class names a look that its tool gives; here it could be that of another thing.
     """
     tag = _LOOK.sub("", tag)
+    name = tag[1:].split()[0]
+    if name[0].isupper() and not name.isupper():  # no element of HTML
+        return write_component(name, tag, context)
     kind = _WITH_FILE.match(tag)
     attribute = _ATTRIBUTE.search(tag) if kind else None
     if attribute and kind and kind["frame"]:

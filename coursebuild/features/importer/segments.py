@@ -114,7 +114,8 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
         if heading["lower"]:  # what stands below a second title stays below it
             return heading["lower"] + "#" * (len(titles) > 1)
         titles.append(_text_of(heading))
-        if len(titles) == 1 and own_title in ("", titles[0]):
+        words = re.sub(r"\[([^\[\]]*)\]\([^()]*\)|[*_`]", r"\1", titles[0])
+        if len(titles) == 1 and own_title in ("", titles[0], words):
             return f"({heading['label']})=\n" if heading["label"] else ""
         return f"## {_text_of(heading)}" if heading["text"] is None else f"#{heading[0].strip()}"
 
@@ -141,11 +142,15 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
 def _raise_title(segments: list[Segment], title: str) -> list[Segment]:
     """Bring headings up where the title of the map begins the text as one of a lower level."""
     start = segments[0].text if segments and segments[0].kind == "prose" else ""
-    first = re.match(r"\s*\#(\#+)[ \t]+(.*?)[ \t#]*(?:\n|\Z)", start)
+    first = re.match(rf"{_MARKS}#(#+)[ \t]+(.*?)[ \t#]*(?:\n|\Z)", start)
     if first is None or first[2].casefold() != title.casefold():
         return segments
     surplus = re.compile(rf"^{first[1]}(?=\#)", re.MULTILINE)
     return [*change_prose(segments, lambda prose: surplus.sub("", prose))]
+
+
+_MARKS = r"\s*(?:(?:<!--(?:(?!-->)[\s\S])*-->|<a id=[^<>]*></a>)\s*)*"
+"""Comments and anchors, which no reader sees."""
 
 
 def change_prose(segments: Iterable[Segment], change: Callable[[str], str]) -> Iterator[Segment]:

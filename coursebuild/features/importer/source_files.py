@@ -262,13 +262,15 @@ class SourceFiles:
         """Return the settings in a file; none where it is not there, or cannot be read."""
         path = self.find_settings(name)
         read = read_toml if path.endswith(".toml") else read_yaml  # JSON is YAML
-        value = read(self.read_text(path)) if path else None
+        value = read(self.read_text(path)) if path else {}
+        if value is None:
+            self.leave(path, "settings that cannot be read: nothing here is as they say", "setting")
         return value if isinstance(value, dict) else {}
 
     @cached_property
     def mkdocs(self) -> str:
         """The settings of MkDocs; empty where it is no project of it."""
-        path = self.find_settings("mkdocs.yml")
+        path = self.find_settings("mkdocs.yml") or "zensical.toml" * ("zensical.toml" in self)
         return path and (self.read_text(path) or "\n")
 
     @cached_property
@@ -424,6 +426,10 @@ class SourceFiles:
             self.leave(path, _LINK_OUT)
         is_public = not any(map(_is_skipped, (*path.split("/"), *real.split("/"))))
         return is_public and Path(self.folder, real).is_file()
+
+    def change(self, kind: str, change: str, count: int = 1) -> None:
+        """Note that things of a kind were changed in a way."""
+        self.account.changed[kind, change] += count
 
     def leave(self, path: str, message: str, kind: str = "file", place: str = "") -> None:
         """Note that something is not imported, and why."""
