@@ -2,7 +2,8 @@
 
 A slip may leave a text that is right, but says less: without its caption an output is a block of
 text, without its brace a bound number is code. Nobody can see that in the text. But what was proved
-at the last check without errors, still stands in the text, and is proved no longer, is a fact.
+at the last check without errors, still stands in the text, and is proved no longer, is a fact. So is
+that a bound number gave way to another one, which is printed elsewhere.
 
 Entry points: `proved_texts`, `find_losses`; `remarks_on_proofs`, which `check` ends with.
 """
@@ -31,10 +32,13 @@ from coursebuild.core.model import (
     find_inlines,
 )
 from coursebuild.core.model.addresses import recorded_figures
+from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.registry import feature_trials, features
-from coursebuild.core.scripts.bound_places import document_bindings
+from coursebuild.core.scripts.bound_places import document_bindings, moved_values
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.source import Source, Span
 from coursebuild.core.values import fingerprint
+from coursebuild.pipeline.verify import Verification
 from coursebuild.report.values import plural
 
 Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "block", "link", "result"]
@@ -87,16 +91,19 @@ class Proof(Struct, frozen=True):
 def remarks_on_proofs(
     course: Course,
     store: Store,
-    scripts: Collection[str],
+    verification: Verification,
     documents: Collection[str] | None,
     *,
     is_green: bool,
 ) -> tuple[str, ...]:
-    """Say what is proved no longer; without errors, keep what is proved now.
+    """Say what is proved no longer, and which values have moved; without errors, keep what is proved.
 
     `documents` are the paths of those that were checked; `None`: all.
     """
-    remarks = []
+    remarks: list[str] = []
+    results, addresses = verification.results, known_addresses(course.records)
+    outputs = PrintedOutputs(results.verdicts, results.runs)
+    scripts = {run.path for run in results.runs if run.did_run}
     owned_documents = [
         (owner, document)
         for owner, document in course.owned_documents
@@ -106,6 +113,8 @@ def remarks_on_proofs(
     for owner, document in owned_documents:
         path, texts = document.source.path, all_texts[document.source.path]
         proofs = tuple(proof for proof, _, script in texts if script is None or script in scripts)
+        moves = moved_values(document, outputs, addresses, verification.addresses)
+        remarks += (f"{owner.id}: {move}" for move in moves)
         key = fingerprint(path)
         before = store.peek(KIND, key, value_reader(tuple[Proof, ...])) or ()
         losses = [

@@ -93,6 +93,41 @@ def test_what_was_proved_is_kept_while_there_are_errors(make: Make) -> None:
         assert "`0.357 s` in line 15 was proved before" in folder.main("check").out
 
 
+def test_a_value_that_gave_way_to_another_printed_one_is_told_once(make: Make) -> None:
+    lesson = LESSON.replace("`3.5 m/s`{out}", "much")
+    folder = make(lesson)
+    assert folder.main("check").status == 0
+    remark = (
+        "1.1: `3.5` in line 15 is number 1 of `speed # m/s`; `0.357 s` stood there before, number 1 "
+        'of `time # s`: `{out="speed"}` chooses `speed 3.5 m/s`'
+    )
+    changed = lesson.replace("`0.357 s`", "`3.5`")
+    for text, is_told in ((changed, True), (changed + "\nIt fell.\n", False)):
+        folder.write(folder.lesson(1), text)
+        result = folder.main("check")
+        assert (result.status, remark in result.out) == (0, is_told), result.out
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("`0.357 s`{out}", '`3.5`{out="speed"}'),  # the author says that it is meant
+        ("`0.357 s`{out}", "`0.36 s`{out}"),  # the same number
+        ("It takes `0.357 s`{out}", "It ends with `3.5`{out}"),  # another sentence
+        ("0.357", "0.358"),  # the printed number has changed
+    ],
+)
+def test_a_value_that_did_not_give_way_to_another_is_not_told(
+    make: Make, old: str, new: str
+) -> None:
+    folder = make(LESSON)
+    folder.main("check")
+    folder.write(folder.lesson(1), LESSON.replace(old, new))
+    result = folder.main("check")
+    assert result.status == 0, result.out
+    assert "stood there before" not in result.out
+
+
 def test_another_lesson_with_the_same_text_is_not_meant(make: Make) -> None:
     folder = make(LESSON, "## Two\n\nIt takes `0.357 s`.\n")
     folder.main("check")

@@ -40,7 +40,7 @@ from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_k
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, describe_line
 from coursebuild.core.scripts.table_cells import row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose, did_you_mean
-from coursebuild.core.text.numbers import Number, difference, join_thousands
+from coursebuild.core.text.numbers import Number, difference
 from coursebuild.core.text.quantities import with_unit
 
 _SILENT_OUTCOMES = (
@@ -95,7 +95,7 @@ def _with_likely_script(
     is_open = finding.rule == "binding-mismatch" and not finding.help
     if not is_open or binding.script is not None or binding.words:
         return finding
-    text = BoundText.of(binding.text, binding.comma)
+    text = BoundNumber(binding, outputs).text
     paths = {
         verdict.recording.script or ""
         for verdict in outputs.of_document(document)
@@ -216,7 +216,7 @@ def dependent_bindings(
         if any(
             recording_key(candidate.recording) == key for candidate in outputs.of_binding(binding)
         ):
-            bound_text = BoundText.of(binding.text, binding.comma)
+            bound_text = BoundNumber(binding, outputs).text
             places = text_places(bound_text.before, output.lines)
             if bound_text.numbers:
                 shown_places = bound_text.shown_places([output])
@@ -292,7 +292,6 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     outputs = bound.groups[-1]
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
     with_point = BoundText.of(pointed)
-    thousands = join_thousands(binding.text)
     bare, stray, label = bound_text.bare, bound_text.stray, ""
     message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"
     if not bound_text.numbers:
@@ -308,9 +307,6 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     elif pointed != binding.text and with_point.numbers and with_point.is_in(outputs):
         message = f"`{binding.text}` has a comma where outputs have a decimal point"
         help = Fix(f"write `{pointed}`", pointed)
-    elif thousands != binding.text and BoundText.of(thousands, binding.comma).is_in(outputs):
-        message = f"`{binding.text}` has a space that may part two numbers"
-        help = Fix("write a no-break space between its digits", thousands)
     else:
         label, help = _nearest(bound_text, outputs), ""
     return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)
@@ -332,7 +328,7 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         return mismatch
     if places_now:
         place, better = places_now[0], text.rewrite(places_now[0])
-        if better and not BoundText.of(better, text.comma).is_in([place.output]):
+        if better and not BoundText.of(better, text.comma, joined=True).is_in([place.output]):
             better = ""  # other numbers have its words or unit
         are = "are" if len(text.numbers) > 1 else "is"
         label = f"{place.text} {are} printed there now, in `{plain_text(place.line.text)}`"

@@ -15,6 +15,7 @@ from coursebuild.core.text.numbers import (
     Number,
     as_printed,
     group_space,
+    join_thousands,
     round_like,
     scan_prose,
     within_half_unit,
@@ -60,9 +61,12 @@ class BoundText(Struct, frozen=True):
     """What parted thousands, if a space did; here it is a comma."""
 
     @classmethod
-    def of(cls, text: str, comma: bool = False) -> BoundText:
-        """The numbers and the plain text of a binding, in a language that may have the comma."""
-        pointed = as_printed(text, comma)
+    def of(cls, text: str, comma: bool = False, *, joined: bool = False) -> BoundText:
+        """The numbers and the plain text of a binding, in a language that may have the comma.
+
+        `joined`: ordinary spaces may part thousands.
+        """
+        pointed = as_printed(join_thousands(text) if joined else text, comma)
         if pointed != text:
             return replace(cls.of(pointed), comma=comma, space=group_space(text))
         numbers = numbers_of_quantities(text, scan_prose(text))

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 
 from msgspec import Struct
@@ -29,7 +29,7 @@ from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body
-from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, masked
+from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, describe_place, masked
 from coursebuild.core.scripts.table_cells import ColumnTitle, row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.core.text.quantities import is_same_unit, unit_behind, unit_of_label
@@ -87,6 +87,33 @@ def carried_addresses(
     """The addresses of the values of a lesson that was written anew, value by value."""
     pairs = zip(before, now, strict=True) if len(before) == len(now) else ()
     return {new: addresses[old] for old, new in pairs if old in addresses}
+
+
+def moved_values(
+    document: model.Document, outputs: PrintedOutputs, before: Addresses, now: Addresses
+) -> Iterator[str]:
+    """What is to be told of bound numbers that now show another printed number than before.
+
+    What they showed is still printed, and stands in the document no more; the words before them are
+    as they were. No one is told whose author has chosen the number by its words.
+    """
+    pairs = bound_values(document, outputs)
+    texts = {value for _, value in pairs}
+    lost = [v for v in before if v.path == document.source.path and v not in texts]
+    new = [(b, v) for b, v in pairs if v in now and v not in before and not b.words]
+    for binding, value in new:
+        place = value.script, value.before
+        replaced = [v for v in lost if (v.script, v.before) == place]
+        if len(replaced) != 1 or [(v.script, v.before) for _, v in new].count(place) > 1:
+            continue
+        old, (address, *_), (old_address, *_) = replaced[0], now[value], before[replaced[0]]
+        was = BoundNumber(replace(binding, text=old.text), outputs, before[old]).places()
+        if was and not {*before[old]} & {*now[value]}:
+            choice = place_note(binding, BoundNumber(binding, outputs, now[value]).places()[0], was)
+            yield (
+                f"`{binding.text}` in line {binding.span.line} is {describe_place(address)}; "
+                f"`{old.text}` stood there before, {describe_place(old_address)}: {choice.message}"
+            )
 
 
 def reworded_addresses(
@@ -219,13 +246,18 @@ class BoundNumber(Struct, frozen=True, dict=True):
 
     @cached_property
     def text(self) -> BoundText:
-        """Its text; a comma in it may stand before decimals, or part numbers."""
+        """Its text; a comma or a space between its digits may belong to one number, or part two.
+
+        One that may be either is two numbers only where these are recorded, and not the one.
+        """
         binding, texts = self.binding, [text for group in self.groups for text in group]
-        with_comma = BoundText.of(binding.text, binding.comma)
-        as_printed = BoundText.of(binding.text)
-        may_be_list = len(as_printed.numbers) > len(with_comma.numbers)  # not `4,096`
-        is_list = may_be_list and as_printed.is_in(texts) and not with_comma.is_in(texts)
-        return as_printed if is_list else with_comma
+        one = BoundText.of(binding.text, binding.comma, joined=True)
+        for comma in {binding.comma, False}:
+            several = BoundText.of(binding.text, comma)
+            may_be_list = len(several.numbers) > len(one.numbers)  # not `4,096`
+            if may_be_list and several.is_in(self.recorded) and not one.is_in(texts):
+                return several
+        return one
 
     @property
     def following(self) -> str:
