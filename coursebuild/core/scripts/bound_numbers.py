@@ -15,6 +15,7 @@ from coursebuild.core.text.numbers import (
     Number,
     as_printed,
     group_space,
+    join_decimals,
     join_thousands,
     round_like,
     scan_prose,
@@ -64,8 +65,10 @@ class BoundText(Struct, frozen=True):
     def of(cls, text: str, comma: bool = False, *, joined: bool = False) -> BoundText:
         """The numbers and the plain text of a binding, in a language that may have the comma.
 
-        `joined`: ordinary spaces may part thousands.
+        `joined`: spaces, also ordinary ones, may part thousands, and groups of decimals.
         """
+        if joined:
+            text = join_decimals(text, comma)
         pointed = as_printed(join_thousands(text) if joined else text, comma)
         if pointed != text:
             return replace(cls.of(pointed), comma=comma, space=group_space(text))
