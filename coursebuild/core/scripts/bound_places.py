@@ -29,7 +29,7 @@ from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import BoundText
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body
-from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, describe_place, masked
+from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, masked
 from coursebuild.core.scripts.table_cells import ColumnTitle, row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.core.text.quantities import is_same_unit, unit_behind, unit_of_label
@@ -92,28 +92,29 @@ def carried_addresses(
 def moved_values(
     document: model.Document, outputs: PrintedOutputs, before: Addresses, now: Addresses
 ) -> Iterator[str]:
-    """What is to be told of bound numbers that now show another printed number than before.
+    """What is to be told of bound numbers that show another printed number than before.
 
-    What they showed is still printed, and stands in the document no more; the words before them are
-    as they were. No one is told whose author has chosen the number by its words.
+    What they showed stands in the document no more; the words before them are as they were. Where
+    an author has chosen the number by its words, it is not printed elsewhere by mistake.
     """
     pairs = bound_values(document, outputs)
-    texts = {value for _, value in pairs}
-    lost = [v for v in before if v.path == document.source.path and v not in texts]
-    new = [(b, v) for b, v in pairs if v in now and v not in before and not b.words]
+    lost = before.keys() - {value for _, value in pairs}
+    new = [pair for pair in pairs if pair[1] in now.keys() - before.keys()]
+    of_place: dict[ShownValue, list[ShownValue]] = {}
+    for value in (*lost, *(value for _, value in new)):
+        of_place.setdefault(replace(value, text=""), []).append(value)
     for binding, value in new:
-        place = value.script, value.before
-        replaced = [v for v in lost if (v.script, v.before) == place]
-        if len(replaced) != 1 or [(v.script, v.before) for _, v in new].count(place) > 1:
+        old, *rest = of_place[replace(value, text="")]
+        if rest != [value]:
             continue
-        old, (address, *_), (old_address, *_) = replaced[0], now[value], before[replaced[0]]
+        bound = BoundNumber(binding, outputs, now[value])
         was = BoundNumber(replace(binding, text=old.text), outputs, before[old]).places()
-        if was and not {*before[old]} & {*now[value]}:
-            choice = place_note(binding, BoundNumber(binding, outputs, now[value]).places()[0], was)
-            yield (
-                f"`{binding.text}` in line {binding.span.line} is {describe_place(address)}; "
-                f"`{old.text}` stood there before, {describe_place(old_address)}: {choice.message}"
-            )
+        place = bound.places()[0]
+        lead = f"`{old.text}` gave way to `{binding.text}` in line {binding.span.line}, which"
+        if any(n.place < p.place for n, p in zip(bound.text.numbers, place.numbers, strict=True)):
+            yield f"{lead} has more digits than are printed: {place.text}"
+        elif was and not binding.words and not {*before[old]} & {*now[value]}:
+            yield f"{lead} is printed elsewhere: {place_note(binding, place, was).message}"
 
 
 def reworded_addresses(
@@ -280,6 +281,11 @@ class BoundNumber(Struct, frozen=True, dict=True):
                 choices.append(places)
         of_unit = (p for p in choices if self.text.wrong_unit(p, self.following) is None)
         return next(of_unit, choices[0] if choices else [])
+
+    @property
+    def found(self) -> list[PrintedPlace]:
+        """The numbers at its addresses in recorded text, or else in the run."""
+        return next(filter(None, map(self.look_up, self.groups)), [])
 
     def look_up(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers at its addresses; those that it may mean where none is known.

@@ -390,11 +390,6 @@ def masked(text: str, is_grouped: bool = False) -> str:
     return plain_text(skeleton.replace(MARK, " # "))
 
 
-def describe_place(address: Address) -> str:
-    """Where in which printed line a value stands, in words."""
-    return f"number {address.place + 1} of {describe_line(address)}"
-
-
 def describe_line(address: Address) -> str:
     """The printed line of an address in words, with the numbers that name it."""
     numbers = iter(address.name.split())

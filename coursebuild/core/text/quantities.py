@@ -181,9 +181,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
         follows = words[count] if bare == product and count < len(words) else ""
         is_open = bare.count("(") > bare.count(")") or word in _SIGNS
         longer = read_unit(bare)
-        is_certain = re.match("[=:]", follows) is None
-        if has_names or count > 1:
-            is_certain &= re.match(r"[\d.+−-]", follows) is None
+        may_not_follow = r"[=:\d.+−-]" if has_names or count > 1 else "[=:]"
+        is_certain = re.match(may_not_follow, follows) is None
         if longer and not unit:
             is_word = is_name(bare) and follows.strip("|") != ""
             is_word |= bare in ("d", "min") and _has_maximum(text)

@@ -126,7 +126,7 @@ degR 5/9 K rankine Rankine
 mas? π/648000000 rad
 gon π/200 rad gradian gradians
 rev 1,2π cycle revolution revolutions Umdrehung Umdrehungen
-U!? 1,2π,1/6e7:mol/s cycle
+U!? 1,1/6e7:mol/s,2π cycle
 tr!? 1,2π cycle
 turn? 1,2π cycle turns
 rpm 1/60,π/30 cycle/s RPM

@@ -23,7 +23,9 @@ from msgspec.structs import replace
 
 from coursebuild.api import Diagnostic, Note, Span, diagnose, model
 from coursebuild.core.registry import kind_of_block
+from coursebuild.core.text.numbers import only_number
 from coursebuild.core.text.quantities import unit_behind
+from coursebuild.core.text.units import ONE as _NO_UNIT
 from coursebuild.core.text.units import Unit, find_unit
 from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (
@@ -200,15 +202,13 @@ def _read_quantity(
         unit_text = declarations[name].unit_text
     unit = find_unit(unit_text) if unit_text else None
     if number is not None:
-        size = measure(unit) if unit is not None else ONE
-        zero = Real.of(unit.zero if unit is not None else 0)
-        mantissa, _, exponent = number.text.replace("−", "-").lower().partition("e")
-        decimals = len(mantissa.partition(".")[2])
-        last_place = Fraction(10) ** (int(exponent or 0) - decimals)
-        step = Real.of(last_place) * size if decimals else None
-        value = (Real.of(Fraction(f"{mantissa}e{exponent or 0}")) + zero) * size
+        unit, read_number = unit or _NO_UNIT, only_number(number.text)
+        assert read_number is not None
+        size, last_place = measure(unit), Fraction(10) ** read_number.place
+        step = Real.of(last_place) * size if "." in number.text else None
+        value = (Real.of(Fraction(read_number.value)) + Real.of(unit.zero)) * size
         text = f"{number.text} {unit_text}".rstrip()
-        return SymbolQuantity(name, unit_text, unit or Unit(Fraction(1)), value, step, text)
+        return SymbolQuantity(name, unit_text, unit, value, step, text)
     if len(sides) == 1:
         return SymbolQuantity(name, unit_text, unit)
     if formula.meaning is None and name not in values:
@@ -225,12 +225,10 @@ def _read_quantity(
         raise WrongDimensions(f"it is {dimensions}", sides[1].start, sides[1].end)
     unit = (find_unit(unit_text or unit_name) if unit_text or unit_name else None) or scale
     factor = ONE if units else measure(scale)
-    own_unit = find_unit(unit_name) if unit_name else None
-    size = measure(own_unit) if own_unit is not None else ONE
-    beginning = Real.of(own_unit.zero if own_unit is not None else 0)
+    own_unit = find_unit(unit_name) or _NO_UNIT
     value = quantity.value * factor
     step = numeral.step * factor if numeral is not None and not numeral.is_whole else None
-    text = f"{value / size - beginning:.10g} {unit_name}".rstrip()
+    text = f"{value / measure(own_unit) - Real.of(own_unit.zero):.10g} {unit_name}".rstrip()
     return SymbolQuantity(name, unit_text or unit_name, unit, value, step, text)
 
 
