@@ -315,7 +315,7 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
 def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     """The diagnostic of a binding at whose address stands another number now, or none."""
     binding, text, label, help = bound.binding, bound.text, "", ""
-    noted_places = rivals = places_now = bound.found
+    noted_places = rivals = places_now = bound.current_places
     places_now.sort(key=lambda place: _distance(text.numbers, place.numbers))
     if len({text.rewrite(place) for place in places_now}) > 1:
         message = f"the places that showed `{binding.text}` have different numbers now"
@@ -326,7 +326,7 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         return mismatch
     elif places_now:
         place, better = places_now[0], text.rewrite(places_now[0])
-        if better and not BoundText.of(better, text.comma, joined=True).is_in([place.output]):
+        if better and not BoundText.of(better, text.comma, may_join=True).is_in([place.output]):
             better = ""  # other numbers have its words or unit
         are = "are" if len(text.numbers) > 1 else "is"
         label = f"{place.text} {are} printed there now, in `{plain_text(place.line.text)}`"
@@ -335,14 +335,14 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     elif binding.words:
         message = f"`{bound.path}` printed no number right after `{binding.words}`"
         of_script = replace(binding, script=bound.path)
-        noted_places = rivals = BoundNumber(of_script, bound.outputs).found
+        noted_places = rivals = BoundNumber(of_script, bound.outputs).current_places
         if rivals:
             message = f"the output above has no number right after `{binding.words}`"
             message += f", another of `{bound.path}` has"
             binding = of_script
         else:
             wordless = replace(bound, binding=replace(binding, words=""))
-            noted_places = rivals = wordless.found
+            noted_places = rivals = wordless.current_places
     else:
         line_text = describe_line(bound.lost_address())
         message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"

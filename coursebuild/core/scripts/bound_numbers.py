@@ -62,14 +62,14 @@ class BoundText(Struct, frozen=True):
     """What parted thousands, if a space did; here it is a comma."""
 
     @classmethod
-    def of(cls, text: str, comma: bool = False, *, joined: bool = False) -> BoundText:
+    def of(cls, text: str, comma: bool = False, *, may_join: bool = False) -> BoundText:
         """The numbers and the plain text of a binding, in a language that may have the comma.
 
-        `joined`: spaces, also ordinary ones, may part thousands, and groups of decimals.
+        `may_join`: spaces, also ordinary ones, may part thousands, and groups of decimals.
         """
-        if joined:
+        if may_join:
             text = join_decimals(text, comma)
-        pointed = as_printed(join_thousands(text) if joined else text, comma)
+        pointed = as_printed(join_thousands(text) if may_join else text, comma)
         if pointed != text:
             return replace(cls.of(pointed), comma=comma, space=group_space(text))
         numbers = numbers_of_quantities(text, scan_prose(text))

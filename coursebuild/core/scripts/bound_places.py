@@ -252,13 +252,13 @@ class BoundNumber(Struct, frozen=True, dict=True):
         One that may be either is two numbers only where these are recorded, and not the one.
         """
         binding, texts = self.binding, [text for group in self.groups for text in group]
-        one = BoundText.of(binding.text, binding.comma, joined=True)
+        number_text = BoundText.of(binding.text, binding.comma, may_join=True)
         for comma in {binding.comma, False}:
             several = BoundText.of(binding.text, comma)
-            may_be_list = len(several.numbers) > len(one.numbers)  # not `4,096`
-            if may_be_list and several.is_in(self.recorded) and not one.is_in(texts):
+            may_be_list = len(several.numbers) > len(number_text.numbers)  # not `4,096`
+            if may_be_list and several.is_in(self.recorded) and not number_text.is_in(texts):
                 return several
-        return one
+        return number_text
 
     @property
     def following(self) -> str:
@@ -283,7 +283,7 @@ class BoundNumber(Struct, frozen=True, dict=True):
         return next(of_unit, choices[0] if choices else [])
 
     @property
-    def found(self) -> list[PrintedPlace]:
+    def current_places(self) -> list[PrintedPlace]:
         """The numbers at its addresses in recorded text, or else in the run."""
         return next(filter(None, map(self.look_up, self.groups)), [])
 

@@ -314,7 +314,7 @@ def _update_table(
             if cell_matches(old, new, comparison):
                 continue
             span, text = cell.span(old), number_text(old, new, comparison)
-            number = BoundText.of(span.text, table.comma, joined=True)
+            number = BoundText.of(span.text, table.comma, may_join=True)
             if number.text.replace(MINUS, "-") != old.text:
                 reason = "a number written with an entity or an escape cannot be replaced"
                 return refusal(span, reason)

@@ -385,7 +385,7 @@ def _describe_dependence(dependent: bindings.DependentBinding) -> str:
     recorded, printed = _single_number(change.recorded), _single_number(change.printed)
     if recorded is None or printed is None or change.kind is DriftKind.MISSING:
         return lead + "a line that changed"
-    text = BoundText.of(binding.text, binding.comma, joined=True)
+    text = BoundText.of(binding.text, binding.comma, may_join=True)
     numbers = [n for n in text.numbers if shows(n, recorded)]
     holds = ", and still holds" if any(shows(n, printed) for n in numbers) else ""
     return f"{lead}{recorded.text}, which this run printed as {printed.text}{holds}"

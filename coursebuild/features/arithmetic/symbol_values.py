@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Collection, Iterator, Mapping
+from decimal import Decimal
 from fractions import Fraction
 
 from msgspec import Struct
@@ -23,9 +24,7 @@ from msgspec.structs import replace
 
 from coursebuild.api import Diagnostic, Note, Span, diagnose, model
 from coursebuild.core.registry import kind_of_block
-from coursebuild.core.text.numbers import only_number
 from coursebuild.core.text.quantities import unit_behind
-from coursebuild.core.text.units import ONE as _NO_UNIT
 from coursebuild.core.text.units import Unit, find_unit
 from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (
@@ -41,6 +40,7 @@ from coursebuild.features.arithmetic.real import ONE, Real
 from coursebuild.features.arithmetic.statements import read_statements
 from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
 
+_NUMBER = Unit(Fraction(1))
 _Formula = model.Math | model.MathBlock
 _Level = tuple[int, ...]
 """The number of a section, then the offsets of the callouts and questions inside it."""
@@ -202,11 +202,10 @@ def _read_quantity(
         unit_text = declarations[name].unit_text
     unit = find_unit(unit_text) if unit_text else None
     if number is not None:
-        unit, read_number = unit or _NO_UNIT, only_number(number.text)
-        assert read_number is not None
-        size, last_place = measure(unit), Fraction(10) ** read_number.place
+        unit, decimal = unit or _NUMBER, Decimal(number.text.replace("−", "-"))
+        size, last_place = measure(unit), Fraction(10) ** int(decimal.as_tuple().exponent)
         step = Real.of(last_place) * size if "." in number.text else None
-        value = (Real.of(Fraction(read_number.value)) + Real.of(unit.zero)) * size
+        value = (Real.of(Fraction(decimal)) + Real.of(unit.zero)) * size
         text = f"{number.text} {unit_text}".rstrip()
         return SymbolQuantity(name, unit_text, unit, value, step, text)
     if len(sides) == 1:
@@ -225,7 +224,7 @@ def _read_quantity(
         raise WrongDimensions(f"it is {dimensions}", sides[1].start, sides[1].end)
     unit = (find_unit(unit_text or unit_name) if unit_text or unit_name else None) or scale
     factor = ONE if units else measure(scale)
-    own_unit = find_unit(unit_name) or _NO_UNIT
+    own_unit = find_unit(unit_name) or _NUMBER
     value = quantity.value * factor
     step = numeral.step * factor if numeral is not None and not numeral.is_whole else None
     text = f"{value / measure(own_unit) - Real.of(own_unit.zero):.10g} {unit_name}".rstrip()
