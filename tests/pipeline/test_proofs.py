@@ -57,6 +57,7 @@ def assert_told(make: Make, lesson: str, old: str, new: str, remark: str) -> Non
         ),
         ("`0.357 s`{out}", '`3.5`{out="speed"}', ""),
         ("`0.357 s`{out}", "`0.36 s`{out}", ""),
+        ("It", "`0.357`{out}, `3.5`{out}, `0.36`{out}, `0.4`{out}, `3.5`{out}, It", ""),
         ("It takes `0.357 s`{out}", "It ends with `3.5`{out}", ""),
         ("0.357", "0.358", ""),
     ],

@@ -105,7 +105,7 @@ def moved_values(
         of_place.setdefault(replace(value, text=""), []).append(value)
     for binding, value in new:
         old, *rest = of_place[replace(value, text="")]
-        if rest != [value]:
+        if rest != [value] or old not in before:
             continue
         bound = BoundNumber(binding, outputs, now[value])
         was = BoundNumber(replace(binding, text=old.text), outputs, before[old]).places()

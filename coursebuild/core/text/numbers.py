@@ -154,7 +154,7 @@ def join_thousands(text: str) -> str:
 
 def join_decimals(text: str, comma: bool) -> str:
     """A text without spaces between decimals in groups of three: `0.006 694 38` is `0.00669438`."""
-    group = rf"(?<![0-9])[0-9]+[.{',' * comma}](?:[0-9]{{3}}[ {_SPACES}])+[0-9]{{1,3}}(?![0-9/])"
+    group = rf"(?<![0-9])[0-9]+[.{',' * comma}](?:[0-9]{{3}}[ {_SPACES}])+[0-9]{{1,3}}(?![0-9/.,])"
     return re.sub(group, lambda match: re.sub(r"\s", "", match[0]), text)
 
 
