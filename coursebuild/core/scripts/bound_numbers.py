@@ -14,8 +14,8 @@ from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, Pri
 from coursebuild.core.text.numbers import (
     Number,
     as_printed,
+    decimal_gaps,
     group_space,
-    join_decimals,
     join_thousands,
     round_like,
     scan_prose,
@@ -68,7 +68,7 @@ class BoundText(Struct, frozen=True):
         `may_join`: spaces, also ordinary ones, may part thousands, and groups of decimals.
         """
         if may_join:
-            text = join_decimals(text, comma)
+            text = replace_ranges(text, ((*gap, "") for gap in decimal_gaps(text, comma)))
         pointed = as_printed(join_thousands(text) if may_join else text, comma)
         if pointed != text:
             return replace(cls.of(pointed), comma=comma, space=group_space(text))
