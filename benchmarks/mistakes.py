@@ -52,15 +52,18 @@ from benchmarks.slips.changes import KINDS, Change, make_change  # noqa: E402
 from benchmarks.slips.pages import compare_pages  # noqa: E402
 from coursebuild.core.files.trust import FOLDER  # noqa: E402
 from coursebuild.core.model import Course  # noqa: E402
+from coursebuild.core.model.lesson_record import known_addresses  # noqa: E402
 from coursebuild.core.model.results import ScriptJob, ScriptRun  # noqa: E402
 from coursebuild.core.pages import urls  # noqa: E402
 from coursebuild.core.pages.page_list import page_list  # noqa: E402
 from coursebuild.core.run.script_server import ScriptServer  # noqa: E402
+from coursebuild.core.scripts.bound_places import moved_values  # noqa: E402
 from coursebuild.core.text.diagnostics import Diagnostic  # noqa: E402
 from coursebuild.pipeline.check import judge  # noqa: E402
 from coursebuild.pipeline.options import Options, open_store  # noqa: E402
 from coursebuild.pipeline.proofs import find_losses, proved_texts  # noqa: E402
 from coursebuild.pipeline.verify import Verification, verify  # noqa: E402
+from coursebuild.preview.messages import printed_outputs  # noqa: E402
 from coursebuild.preview.run_history import script_keys  # noqa: E402
 from coursebuild.preview.session import Session  # noqa: E402
 
@@ -165,7 +168,11 @@ class Checker:
             if (path := document.source.path) == change.path:
                 texts = proved_texts(course, [document])[path]
                 for proof, _ in find_losses(document.source, texts, self.proofs.get(path, ())):
-                    return Outcome(change, "unproved", proof.describe())
+                    return Outcome(change, "unproved", proof.name)
+                library, addresses = self.session.library, self.session.runs.addresses
+                before = known_addresses(course.records)
+                for move in moved_values(document, printed_outputs(library), before, addresses):
+                    return Outcome(change, "unproved", move)
         for hint in judge(course, self.session.diagnostics()).hints:
             if _identity(hint) not in self.hints:
                 return Outcome(change, "hinted", _describe(hint))

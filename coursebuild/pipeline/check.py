@@ -92,7 +92,7 @@ def check(
             remarks = remarks_on_proofs(
                 course,
                 options.store,
-                {run.path for run in verification.results.runs if run.did_run},
+                verification,
                 checked_course.documents,
                 is_green=report.summary.ok,
             )

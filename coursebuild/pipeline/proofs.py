@@ -2,7 +2,8 @@
 
 A slip may leave a text that is right, but says less: without its caption an output is a block of
 text, without its brace a bound number is code. Nobody can see that in the text. But what was proved
-at the last check without errors, still stands in the text, and is proved no longer, is a fact.
+at the last check without errors, still stands in the text, and is proved no longer, is a fact. So
+is that a bound number gave way to another one, which is printed elsewhere or with fewer digits.
 
 Entry points: `proved_texts`, `find_losses`; `remarks_on_proofs`, which `check` ends with.
 """
@@ -15,7 +16,6 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Literal, TypeAlias
 
 from msgspec import Struct
-from msgspec.structs import replace
 
 from coursebuild.core.engine.store import Store, value_reader
 from coursebuild.core.model import (
@@ -31,10 +31,13 @@ from coursebuild.core.model import (
     find_inlines,
 )
 from coursebuild.core.model.addresses import recorded_figures
+from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.registry import feature_trials, features
-from coursebuild.core.scripts.bound_places import document_bindings
+from coursebuild.core.scripts.bound_places import document_bindings, moved_values
+from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.source import Source, Span
 from coursebuild.core.values import fingerprint
+from coursebuild.pipeline.verify import Verification
 from coursebuild.report.values import plural
 
 Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "block", "link", "result"]
@@ -52,6 +55,8 @@ class Proof(Struct, frozen=True):
     """Something that was proved of a document."""
 
     kind: Kind
+    name: str
+    """What it is called in a report."""
     text: str
     """What of it stands in the document, on one line."""
     script: str = ""
@@ -64,39 +69,25 @@ class Proof(Struct, frozen=True):
     """What readers see of a link, in its brackets: it stays where its address is misspelt."""
     labels: int = 0
     """How often the label stood in the document."""
-    fence: str = ""
-    """The word that says what a block is: `quiz`."""
-
-    def describe(self) -> str:
-        """What it is called in a report."""
-        match self.kind:
-            case "value":
-                return f"`{self.text}`"
-            case "figure" | "result":
-                return f"the {self.kind} `{self.text}`"
-            case "lab":
-                return "the lab"
-            case "block":
-                return f"the block `{self.fence}`"
-            case "link":
-                return f"the link to `{self.text}`"
-            case "output" | "table":
-                return f"the {self.kind} of `{self.script}`"
 
 
 def remarks_on_proofs(
     course: Course,
     store: Store,
-    scripts: Collection[str],
+    verification: Verification,
     documents: Collection[str] | None,
     *,
     is_green: bool,
 ) -> tuple[str, ...]:
-    """Say what is proved no longer; without errors, keep what is proved now.
+    """Say what is proved no longer or elsewhere; without errors, keep what is proved now.
 
     `documents` are the paths of those that were checked; `None`: all.
     """
     remarks = []
+    results = verification.results
+    addresses = known_addresses(course.records)
+    outputs = PrintedOutputs(results.verdicts, results.runs)
+    scripts = {run.path for run in results.runs if run.did_run}
     owned_documents = [
         (owner, document)
         for owner, document in course.owned_documents
@@ -106,10 +97,12 @@ def remarks_on_proofs(
     for owner, document in owned_documents:
         path, texts = document.source.path, all_texts[document.source.path]
         proofs = tuple(proof for proof, _, script in texts if script is None or script in scripts)
+        for move in moved_values(document, outputs, addresses, verification.addresses):
+            remarks.append(f"{owner.id}: {move}")
         key = fingerprint(path)
         before = store.peek(KIND, key, value_reader(tuple[Proof, ...])) or ()
         losses = [
-            f"{proof.describe()} in line {line}"
+            f"{proof.name} in line {line}"
             for proof, line in find_losses(document.source, texts, before)
         ]
         if losses:
@@ -134,7 +127,7 @@ def proved_texts(course: Course, documents: Iterable[Document]) -> dict[str, lis
     for _, trial in feature_trials(course).values():
         span = trial.block.span
         if span.path in texts:  # not in a model's file
-            texts[span.path].append((_proof("lab", _fenced_line(span), span), span, None))
+            texts[span.path].append(_proved("lab", "the lab", _fenced_line(span), span))
     return texts
 
 
@@ -165,34 +158,37 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
         kind: Kind = "table" if isinstance(recording.body, Table) else "output"
         text, script = _longest_line(recording.body_span.text), recording.script or ""
         if text:
-            yield _proof(kind, text, recording.span, script), recording.span, script
+            yield _proved(kind, f"the {kind} of `{script}`", text, recording.span, script)
     for binding in document_bindings(document):
         above = [r.script for r in recordings if r.body_span.end <= binding.span.start]
         if binding_script := binding.script or (above[-1] if above else None):
-            yield _proof("value", binding.text, binding.span), binding.span, binding_script
+            name = f"`{binding.text}`"
+            yield _proved("value", name, binding.text, binding.span, binding_script)
     for figure in recorded_figures(document):
-        yield _proof("figure", figure.name, figure.span, figure.script), figure.span, figure.script
+        name = f"the figure `{figure.name}`"
+        yield _proved("figure", name, figure.name, figure.span, figure.script)
     for block in (*find_blocks(document, FeatureBlock), *find_blocks(document, Mjcf)):
         fence = _FENCE.match(block.span.text)
         if fence is not None and fence["word"] not in _TRIED:
-            proof = _proof("block", _fenced_line(block.span), block.span)
-            yield replace(proof, fence=fence["word"]), block.span, None
+            name = f"the block `{fence['word']}`"
+            yield _proved("block", name, _fenced_line(block.span), block.span)
     for span in (s for f in features() if f.proofs is not None for s in f.proofs(document)):
         if numbers := _NUMBER.findall(span.text):
-            yield _proof("result", numbers[-1], span), span, None
+            yield _proved("result", f"the result `{numbers[-1]}`", numbers[-1], span)
     for link in find_inlines(document, Link):
         text = link.target_span.text
         is_opaque = isinstance(link.target, UrlTarget) and _OPAQUE.match(text)
         if not link.mention and text and not is_opaque:
-            yield _proof("link", text, link.span), link.span, None
+            yield _proved("link", f"the link to `{text}`", text, link.span)
 
 
-def _proof(kind: Kind, text: str, span: Span, script: str = "") -> Proof:
+def _proved(kind: Kind, name: str, text: str, span: Span, script: str | None = None) -> ProvedText:
     label = span.text.partition("](")[0] + "]" if kind == "link" and span.text[:1] == "[" else ""
     places = [*_places(span.source, text)]
     place = next(filter(span.contains, places), span)
     labels = [*_places(span.source, label)] if label else []
-    return Proof(kind, text, script, len(places), place.line, label, len(labels))
+    proof = Proof(kind, name, text, script or "", len(places), place.line, label, len(labels))
+    return proof, span, script
 
 
 def _fenced_line(span: Span) -> str:

@@ -40,7 +40,7 @@ from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_k
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, describe_line
 from coursebuild.core.scripts.table_cells import row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose, did_you_mean
-from coursebuild.core.text.numbers import Number, difference, join_thousands
+from coursebuild.core.text.numbers import Number, difference
 from coursebuild.core.text.quantities import with_unit
 
 _SILENT_OUTCOMES = (
@@ -95,7 +95,7 @@ def _with_likely_script(
     is_open = finding.rule == "binding-mismatch" and not finding.help
     if not is_open or binding.script is not None or binding.words:
         return finding
-    text = BoundText.of(binding.text, binding.comma)
+    text = BoundNumber(binding, outputs).text
     paths = {
         verdict.recording.script or ""
         for verdict in outputs.of_document(document)
@@ -216,7 +216,7 @@ def dependent_bindings(
         if any(
             recording_key(candidate.recording) == key for candidate in outputs.of_binding(binding)
         ):
-            bound_text = BoundText.of(binding.text, binding.comma)
+            bound_text = BoundNumber(binding, outputs).text
             places = text_places(bound_text.before, output.lines)
             if bound_text.numbers:
                 shown_places = bound_text.shown_places([output])
@@ -292,7 +292,6 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     outputs = bound.groups[-1]
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
     with_point = BoundText.of(pointed)
-    thousands = join_thousands(binding.text)
     bare, stray, label = bound_text.bare, bound_text.stray, ""
     message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"
     if not bound_text.numbers:
@@ -308,9 +307,6 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     elif pointed != binding.text and with_point.numbers and with_point.is_in(outputs):
         message = f"`{binding.text}` has a comma where outputs have a decimal point"
         help = Fix(f"write `{pointed}`", pointed)
-    elif thousands != binding.text and BoundText.of(thousands, binding.comma).is_in(outputs):
-        message = f"`{binding.text}` has a space that may part two numbers"
-        help = Fix("write a no-break space between its digits", thousands)
     else:
         label, help = _nearest(bound_text, outputs), ""
     return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)
@@ -318,50 +314,44 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
 
 def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
     """The diagnostic of a binding at whose address stands another number now, or none."""
-    binding, text = bound.binding, bound.text
-    places_now = next(filter(None, map(bound.look_up, bound.groups)), [])
+    binding, text, label, help = bound.binding, bound.text, "", ""
+    noted_places = rivals = places_now = bound.current_places
     places_now.sort(key=lambda place: _distance(text.numbers, place.numbers))
     if len({text.rewrite(place) for place in places_now}) > 1:
         message = f"the places that showed `{binding.text}` have different numbers now"
         if binding.words:
             message = f"`{bound.path}` printed `{binding.words}` before {len(places_now)} numbers"
-        notes = [place_note(binding, p, places_now) for p in places_now[:_MAX_NOTES]]
         help = _CHOOSE
-        return diagnose("binding-mismatch", binding.text_span, message, help=help, notes=notes)
-    if places_now and (mismatch := _wrong_unit(bound, text, places_now[:1])):
+    elif places_now and (mismatch := _wrong_unit(bound, text, places_now[:1])):
         return mismatch
-    if places_now:
+    elif places_now:
         place, better = places_now[0], text.rewrite(places_now[0])
-        if better and not BoundText.of(better, text.comma).is_in([place.output]):
+        if better and not BoundText.of(better, text.comma, may_join=True).is_in([place.output]):
             better = ""  # other numbers have its words or unit
         are = "are" if len(text.numbers) > 1 else "is"
         label = f"{place.text} {are} printed there now, in `{plain_text(place.line.text)}`"
         help = Fix(f"write `{better}`", better, safe=True) if better else ""
-        rivals = [] if bound.addresses else text.bare.shown_places([place.output])
-        notes = [place_note(binding, rival, places_now) for rival in rivals[:_MAX_NOTES]]
-        return diagnose(
-            "binding-mismatch", binding.text_span, message, label=label, help=help, notes=notes
-        )
-    if binding.words:
+        noted_places = [] if bound.addresses else text.bare.shown_places([place.output])
+    elif binding.words:
         message = f"`{bound.path}` printed no number right after `{binding.words}`"
         of_script = replace(binding, script=bound.path)
-        elsewhere = BoundNumber(of_script, bound.outputs)
-        proposals = next(filter(None, map(elsewhere.look_up, elsewhere.groups)), [])
-        if proposals:
+        noted_places = rivals = BoundNumber(of_script, bound.outputs).current_places
+        if rivals:
             message = f"the output above has no number right after `{binding.words}`"
             message += f", another of `{bound.path}` has"
             binding = of_script
         else:
             wordless = replace(bound, binding=replace(binding, words=""))
-            proposals = next(filter(None, map(wordless.look_up, wordless.groups)), [])
-        notes = [place_note(binding, place, proposals) for place in proposals[:_MAX_NOTES]]
-        return diagnose("binding-mismatch", binding.text_span, message, notes=notes)
-    line_text = describe_line(bound.lost_address())
-    message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
-    proposals = replace(bound, addresses=()).places()
-    notes = [place_note(binding, place, proposals) for place in proposals[:_MAX_NOTES]]
-    help = 'bind it anew: choose the words before it, as in `{out="tau"}`'
-    return diagnose("binding-mismatch", binding.text_span, message, help=help, notes=notes)
+            noted_places = rivals = wordless.current_places
+    else:
+        line_text = describe_line(bound.lost_address())
+        message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
+        noted_places = rivals = replace(bound, addresses=()).places()
+        help = 'bind it anew: choose the words before it, as in `{out="tau"}`'
+    notes = [place_note(binding, place, rivals) for place in noted_places[:_MAX_NOTES]]
+    return diagnose(
+        "binding-mismatch", binding.text_span, message, label=label, help=help, notes=notes
+    )
 
 
 def _nearest(bound_text: BoundText, outputs: Sequence[PrintedText]) -> str:

@@ -14,7 +14,9 @@ from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, Pri
 from coursebuild.core.text.numbers import (
     Number,
     as_printed,
+    decimal_gaps,
     group_space,
+    join_thousands,
     round_like,
     scan_prose,
     within_half_unit,
@@ -60,9 +62,14 @@ class BoundText(Struct, frozen=True):
     """What parted thousands, if a space did; here it is a comma."""
 
     @classmethod
-    def of(cls, text: str, comma: bool = False) -> BoundText:
-        """The numbers and the plain text of a binding, in a language that may have the comma."""
-        pointed = as_printed(text, comma)
+    def of(cls, text: str, comma: bool = False, *, may_join: bool = False) -> BoundText:
+        """The numbers and the plain text of a binding, in a language that may have the comma.
+
+        `may_join`: spaces, also ordinary ones, may part thousands, and groups of decimals.
+        """
+        if may_join:
+            text = replace_ranges(text, ((*gap, "") for gap in decimal_gaps(text, comma)))
+        pointed = as_printed(join_thousands(text) if may_join else text, comma)
         if pointed != text:
             return replace(cls.of(pointed), comma=comma, space=group_space(text))
         numbers = numbers_of_quantities(text, scan_prose(text))

@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cached_property
 
 from msgspec import Struct
@@ -87,6 +87,34 @@ def carried_addresses(
     """The addresses of the values of a lesson that was written anew, value by value."""
     pairs = zip(before, now, strict=True) if len(before) == len(now) else ()
     return {new: addresses[old] for old, new in pairs if old in addresses}
+
+
+def moved_values(
+    document: model.Document, outputs: PrintedOutputs, before: Addresses, now: Addresses
+) -> Iterator[str]:
+    """What is to be told of bound numbers that show another printed number than before.
+
+    What they showed stands in the document no more; the words before them are as they were. Where
+    an author has chosen the number by its words, it is not printed elsewhere by mistake.
+    """
+    pairs = bound_values(document, outputs)
+    lost = before.keys() - {value for _, value in pairs}
+    new = [pair for pair in pairs if pair[1] in now.keys() - before.keys()]
+    of_place: dict[ShownValue, list[ShownValue]] = {}
+    for value in (*lost, *(value for _, value in new)):
+        of_place.setdefault(replace(value, text=""), []).append(value)
+    for binding, value in new:
+        old, *rest = of_place[replace(value, text="")]
+        if rest != [value] or old not in before:
+            continue
+        bound = BoundNumber(binding, outputs, now[value])
+        was = BoundNumber(replace(binding, text=old.text), outputs, before[old]).places()
+        place = bound.places()[0]
+        lead = f"`{old.text}` gave way to `{binding.text}` in line {binding.span.line}, which"
+        if any(n.place < p.place for n, p in zip(bound.text.numbers, place.numbers, strict=True)):
+            yield f"{lead} has more digits than are printed: {place.text}"
+        elif was and not binding.words and not {*before[old]} & {*now[value]}:
+            yield f"{lead} is printed elsewhere: {place_note(binding, place, was).message}"
 
 
 def reworded_addresses(
@@ -219,13 +247,18 @@ class BoundNumber(Struct, frozen=True, dict=True):
 
     @cached_property
     def text(self) -> BoundText:
-        """Its text; a comma in it may stand before decimals, or part numbers."""
+        """Its text; a comma or a space between its digits may belong to one number, or part two.
+
+        One that may be either is two numbers only where these are recorded, and not the one.
+        """
         binding, texts = self.binding, [text for group in self.groups for text in group]
-        with_comma = BoundText.of(binding.text, binding.comma)
-        as_printed = BoundText.of(binding.text)
-        may_be_list = len(as_printed.numbers) > len(with_comma.numbers)  # not `4,096`
-        is_list = may_be_list and as_printed.is_in(texts) and not with_comma.is_in(texts)
-        return as_printed if is_list else with_comma
+        number_text = BoundText.of(binding.text, binding.comma, may_join=True)
+        for comma in {binding.comma, False}:
+            several = BoundText.of(binding.text, comma)
+            may_be_list = len(several.numbers) > len(number_text.numbers)  # not `4,096`
+            if may_be_list and several.is_in(self.recorded) and not number_text.is_in(texts):
+                return several
+        return number_text
 
     @property
     def following(self) -> str:
@@ -248,6 +281,11 @@ class BoundNumber(Struct, frozen=True, dict=True):
                 choices.append(places)
         of_unit = (p for p in choices if self.text.wrong_unit(p, self.following) is None)
         return next(of_unit, choices[0] if choices else [])
+
+    @property
+    def current_places(self) -> list[PrintedPlace]:
+        """The numbers at its addresses in recorded text, or else in the run."""
+        return next(filter(None, map(self.look_up, self.groups)), [])
 
     def look_up(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
         """The numbers at its addresses; those that it may mean where none is known.

@@ -17,7 +17,7 @@ from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Addresses
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
-from coursebuild.core.scripts.diff import find_differences, number_change, quote, text_diff
+from coursebuild.core.scripts.diff import find_differences, number_change, text_diff
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
 from coursebuild.core.scripts.table_cells import cell_matches, elides_rows, row_text, row_values
@@ -143,9 +143,6 @@ class _ChangeFinder(Struct, frozen=True):
         return self.body.span(start, end)
 
 
-_MAX_NOTES, _WIDTH = 10, 80
-
-
 def repeat_findings(
     course: model.Course,
     extractions: Iterable[Extraction],
@@ -187,34 +184,15 @@ def _describe_end(run: ScriptRun) -> str:
     return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
 
 
-def instability_diagnostic(
-    recording: model.Recording, first: Side, second: Side, comparison: model.Comparison
-) -> Diagnostic:
+def instability_diagnostic(recording: model.Recording, first: Side, second: Side) -> Diagnostic:
     """Say which lines differ between two runs, of which the first is recorded."""
-    steps = align(first, second, LineMatcher(comparison))
-    different_steps = [step for step in steps if step.kind in _DIFFERENT]
-    notes = []
-    for step in different_steps[:_MAX_NOTES]:
-        if step.kind is StepKind.MISSING:
-            line = quote(first.lines[step.recorded], _WIDTH)
-            notes.append(Note(f"{line} was printed in the first run only"))
-        elif step.kind is StepKind.EXTRA:
-            line = quote(second.lines[step.printed], _WIDTH)
-            notes.append(Note(f"{line} was printed in the second run only"))
-        else:
-            number = second.raw_line(step.printed)
-            lines = (first.lines[step.recorded], second.lines[step.printed])
-            a, b = (quote(line, _WIDTH) for line in lines)
-            notes.append(Note(f"line {number}: {a} in one run, {b} in the next"))
-    if (rest := len(different_steps) - _MAX_NOTES) > 0:
-        notes.append(Note(f"and {rest} more {'line' if rest == 1 else 'lines'}"))
-    help = _TABLE_HELP if isinstance(recording.body, model.Table) else _HELP
+    diff = text_diff("\n".join(first.lines), "\n".join(second.lines))
     return diagnose(
         "output-unstable",
         recording.caption_span,
         "two runs of the script printed different lines",
-        help=help,
-        notes=notes,
+        help=_TABLE_HELP if isinstance(recording.body, model.Table) else _HELP,
+        notes=[Note(f"printed by the first run (-) and by the second (+):\n{diff}")],
     )
 
 
@@ -223,9 +201,6 @@ _HELP = (
     f'{_REPEAT_HELP}, or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
 )
 _TABLE_HELP = f"{_REPEAT_HELP}, or record the output in a `text` fence with `volatile`"
-
-
-_DIFFERENT = (StepKind.DIFFERS, StepKind.MISSING, StepKind.EXTRA)
 
 
 def _compare_table(

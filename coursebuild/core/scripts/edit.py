@@ -45,7 +45,6 @@ from coursebuild.core.scripts.table_cells import (
 )
 from coursebuild.core.scripts.tables import RowAddresses, TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
-from coursebuild.core.text.numbers import join_thousands
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _T = TypeVar("_T")
@@ -315,7 +314,7 @@ def _update_table(
             if cell_matches(old, new, comparison):
                 continue
             span, text = cell.span(old), number_text(old, new, comparison)
-            number = BoundText.of(join_thousands(span.text), table.comma)
+            number = BoundText.of(span.text, table.comma, may_join=True)
             if number.text.replace(MINUS, "-") != old.text:
                 reason = "a number written with an entity or an escape cannot be replaced"
                 return refusal(span, reason)

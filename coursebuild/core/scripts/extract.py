@@ -51,12 +51,10 @@ class Extraction(Struct, frozen=True):
 
     def line_span(self, line: int) -> Span | None:
         """Where a line of the file (from 1) stands in the lesson; `None` if it has no such line."""
-        code = self.script.code
-        lines = code.text.split("\n")
-        if not 1 <= line <= len(lines) or (line == len(lines) and not lines[-1]):
+        lines = self.script.code.lines()
+        if not 1 <= line <= len(lines) or (line == len(lines) and not lines[-1].text):
             return None
-        start = sum(len(text) + 1 for text in lines[: line - 1])
-        return code.span(start, start + len(lines[line - 1]))
+        return lines[line - 1].span()
 
 
 def is_run(course: Course, script: Script) -> bool:
@@ -103,10 +101,8 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
                     help = Fix(f"{help}, or say `part` if it goes on with the file", edits=edits)
             elif key in files:
                 message = f"`{path}` and `{first_path}` are one file where case does not count"
-            elif key in folders:
-                message = f"`{path}` is a file here and a folder of `{first_path}`"
             else:
-                message = f"`{first_path}` is a file and cannot be a folder of `{path}`"
+                message = f"one of `{path}` and `{first_path}` would be a folder of the other"
             notes = [Note(note, first.script.path_span)]
             diagnostics.append(
                 diagnose("script-repeated", script.path_span, message, help=help, notes=notes)

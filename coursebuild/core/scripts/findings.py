@@ -213,7 +213,7 @@ def find_instability(
         return None
     outputs = (r.output_of(recording.part) for r in (earlier_run, run))
     before, now = (Side.of(output, comparison.filters) for output in outputs)
-    return instability_diagnostic(recording, before, now, comparison)
+    return instability_diagnostic(recording, before, now)
 
 
 def count_unproven(
@@ -385,6 +385,7 @@ def _describe_dependence(dependent: bindings.DependentBinding) -> str:
     recorded, printed = _single_number(change.recorded), _single_number(change.printed)
     if recorded is None or printed is None or change.kind is DriftKind.MISSING:
         return lead + "a line that changed"
-    numbers = [n for n in BoundText.of(binding.text, binding.comma).numbers if shows(n, recorded)]
+    text = BoundText.of(binding.text, binding.comma, may_join=True)
+    numbers = [n for n in text.numbers if shows(n, recorded)]
     holds = ", and still holds" if any(shows(n, printed) for n in numbers) else ""
     return f"{lead}{recorded.text}, which this run printed as {printed.text}{holds}"

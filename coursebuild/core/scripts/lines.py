@@ -144,10 +144,6 @@ class Side(Struct, frozen=True):
         at = self.starts[line]
         return self.mapped.origin(at + start, at + end)
 
-    def raw_line(self, line: int) -> int:
-        """The number, from 1, of the raw line that a line begins on."""
-        return 1 + len(_LINE_END.findall(self.raw[: self.origin(line, 0, 0)[0]]))
-
     def raw_lines(self, line: int) -> tuple[str, ...]:
         """The lines of raw text that a line came from, without trailing white space.
 

@@ -48,8 +48,7 @@ class ModuleCode:
         """The name that each import binds, its module and its name there, empty for all of it."""
         for alias in statement.names:
             if isinstance(statement, ast.Import):
-                bound = alias.asname or alias.name.partition(".")[0]
-                yield bound, alias.name, ""
+                yield bound_name(alias), alias.name, ""
                 continue
             package = self.name.split(".")
             if not self.source.path.endswith("__init__.py"):
@@ -129,6 +128,11 @@ def _read(text: str) -> tuple[Sequence[ast.stmt], Mapping[str, Sequence[int]]]:
     return statements, numbers
 
 
+def bound_name(alias: ast.alias) -> str:
+    """The name that an import binds."""
+    return alias.asname or alias.name.partition(".")[0]
+
+
 def bound_names(statement: ast.stmt) -> tuple[str, ...]:
     """The names that a statement binds, without those inside of functions and classes."""
     match statement:
@@ -137,7 +141,7 @@ def bound_names(statement: ast.stmt) -> tuple[str, ...]:
         case ast.Import() | ast.ImportFrom():
             if is_future(statement):
                 return ()
-            return tuple(a.asname or a.name.partition(".")[0] for a in statement.names)
+            return tuple(map(bound_name, statement.names))
         case _:
             return tuple(sorted(_scope_names([statement])))
 
@@ -193,7 +197,7 @@ def _scope_names(nodes: Iterable[ast.AST]) -> frozenset[str]:
             case ast.GeneratorExp():
                 continue
             case ast.Import() | ast.ImportFrom():
-                names |= {a.asname or a.name.partition(".")[0] for a in node.names}
+                names |= {*map(bound_name, node.names)}
             case ast.ExceptHandler() if node.name:
                 names.add(node.name)
             case ast.Name(ctx=ast.Store()):

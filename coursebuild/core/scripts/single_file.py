@@ -23,6 +23,7 @@ from coursebuild.core.scripts.module_code import (
     CourseModule,
     ModuleCode,
     NotOneFileError,
+    bound_name,
     bound_names,
     futures,
     global_names,
@@ -298,7 +299,7 @@ class _File:
         """The import of a name from another package, as a line."""
         statement = module.statements[module.numbers[name][-1]]
         assert isinstance(statement, ast.Import | ast.ImportFrom)
-        aliases = [a for a in statement.names if (a.asname or a.name.partition(".")[0]) == name]
+        aliases = [alias for alias in statement.names if bound_name(alias) == name]
         if new_name not in ("", name):
             if any("." in alias.name and not alias.asname for alias in aliases):
                 raise NotOneFileError(f"{module.source.path} imports more than `{name}`")
@@ -384,9 +385,7 @@ def _dictionary(values: Mapping[str, str]) -> str:
 
 def _literal(text: str) -> str:
     """A text as Python writes it, on lines of its own."""
-    if '"""' in text or "\r" in text or text.endswith("\\") or "\0" in text:
-        return repr(text)
-    if "\\" in text or text.endswith('"'):
+    if text.endswith('"') or any(part in text for part in ('"""', "\r", "\0", "\\")):
         return repr(text)
     return f'"""\\\n{text}"""'
 

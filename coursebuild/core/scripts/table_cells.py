@@ -27,6 +27,7 @@ from coursebuild.core.scripts.lines import (
 from coursebuild.core.text.numbers import (
     Number,
     as_printed,
+    decimal_gaps,
     has_groups,
     join_thousands,
     only_number,
@@ -120,12 +121,17 @@ def table_rows(
     is_grouped = "," not in printed or has_groups(printed)
     has_pairs = _SPACED_PAIR.search(printed) is not None
 
-    def read(text: str) -> str:
-        return as_printed(text if has_pairs else join_thousands(text), table.comma)
+    def read(cell: model.Cell, column: int, mapped: MappedText) -> RowCell:
+        text = mapped.text
+        if not has_pairs:
+            gaps = decimal_gaps(text, table.comma)
+            mapped = mapped.replace_ranges(dict.fromkeys(gaps, ""))
+            text = join_thousands(mapped.text)
+        return RowCell.of(cell, column, mapped, as_printed(text, table.comma), is_grouped)
 
     rows = (
         tuple(
-            RowCell.of(cell, column, mapped, read(mapped.text), is_grouped)
+            read(cell, column, mapped)
             for column, cell in enumerate(row)
             if (mapped := cell_text(cell, rules)).text not in ("", *ELISIONS)
         )

@@ -116,9 +116,7 @@ class TableMatcher:
         if not layouts:
             return TableMatch(tuple(self._match_rows(None)))
         is_right = any(self._right_rows(layout) == len(self.rows) for layout in layouts)
-        rivals: tuple[str, ...] = ()
-        if len(layouts) > 1:
-            rivals = tuple(dict.fromkeys(map(self._describe, layouts)))
+        rivals = tuple(dict.fromkeys(map(self._describe, layouts))) if layouts[1:] else ()
         if rivals and not is_right:
             nearest = (self._nearest_fit(row, layouts) for row in range(len(self.rows)))
             rows = (self._row_match(row, fit, is_certain=False) for row, fit in enumerate(nearest))
@@ -209,10 +207,8 @@ class TableMatcher:
             for lead, title, n in zip(text.leads(at), names, numbers, strict=True)
         ]
 
-    def _count_lines(self, layout: LineLayout | None) -> int:
+    def _count_lines(self, layout: LineLayout) -> int:
         """How many printed lines have a layout, whatever text their cells hold."""
-        if layout is None:
-            return 0
         cells = [cell.canonical.skeleton for cell in self.rows[0]]
         patterns = [re.escape(cell) if MARK in cell else r"\S.*?" for cell in cells]
         parts = [re.escape(part) for part in layout.parts]
@@ -409,15 +405,12 @@ class TableMatcher:
 
 def updated_row(match: RowMatch, comparison: model.Comparison) -> tuple[RowCell, ...]:
     """A row with the numbers that are printed now."""
-    places: dict[int, list[tuple[int, int, str]]] = {cell.column: [] for cell in match.row}
+    texts: dict[int, dict[tuple[int, int], str]] = {cell.column: {} for cell in match.row}
     for cell, old, new in match.pairs:
         if not cell_matches(old, new, comparison):
-            text = number_text(old, new, comparison)
-            places[cell.column].append((old.start, old.end, text))
+            texts[cell.column][old.start, old.end] = number_text(old, new, comparison)
     return tuple(
-        replace(cell, mapped=cell.mapped.replace_ranges({(a, b): t for a, b, t in at}))
-        for cell in match.row
-        for at in (places[cell.column],)
+        replace(cell, mapped=cell.mapped.replace_ranges(texts[cell.column])) for cell in match.row
     )
 
 

@@ -152,6 +152,14 @@ def join_thousands(text: str) -> str:
     return _GROUP_SPACE.sub("\u202f", text)
 
 
+def decimal_gaps(text: str, comma: bool) -> list[tuple[int, int]]:
+    """The spaces between decimals in groups of three, as in `0.006 694 38`: start and end."""
+    group = rf"(?<![0-9])[0-9]+[.{',' * comma}](?:[0-9]{{3}}[ {_SPACES}])+[0-9]{{1,3}}(?![0-9/.,])"
+    space = re.compile(rf"[ {_SPACES}]")
+    numbers = re.finditer(group, text)
+    return [gap.span() for number in numbers for gap in space.finditer(text, *number.span())]
+
+
 def group_space(text: str) -> str:
     """The space that parts the thousands of a number; empty where none does."""
     return next(iter(_GROUP_SPACE.findall(text)), "")

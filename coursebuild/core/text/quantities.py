@@ -24,11 +24,10 @@ from coursebuild.core.text.units import PER, Unit, find_units, is_name, write_qu
 
 _SECOND_READINGS = {
     "m": ("min",),
-    "C": ("°C",),
-    "F": ("°F",),
     "°": ("°C", "°F"),
 }
 """What a symbol means in text besides."""
+_RAISED = re.compile("[\\^⁻]")
 _MAGNITUDES = frozenset("BGMP")
 """In text they count billions and millions more often than they are units."""
 _SIGNS = frozenset(("/", "·", "⋅", "*", *PER, "pour", "square", "cubic", "sq", "cu"))
@@ -182,9 +181,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
         follows = words[count] if bare == product and count < len(words) else ""
         is_open = bare.count("(") > bare.count(")") or word in _SIGNS
         longer = read_unit(bare)
-        is_certain = re.match("[=:]", follows) is None
-        if has_names or count > 1:
-            is_certain &= re.match(r"[\d.+−-]", follows) is None
+        may_not_follow = r"[=:\d.+−-]" if has_names or count > 1 else "[=:]"
+        is_certain = re.match(may_not_follow, follows) is None
         if longer and not unit:
             is_word = is_name(bare) and follows.strip("|") != ""
             is_word |= bare in ("d", "min") and _has_maximum(text)
@@ -195,7 +193,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
             one_word = UnitText("", find_units(bare.replace(" ", "")))  # `kWh` for `kW h`
             if not one_word or are_different(one_word, longer):
                 unit = UnitText(unit.text, unit.readings + longer.readings)  # `m in`
-                break
+                if not _RAISED.search(follows):  # as in `mg h L⁻¹`
+                    break
             unit = longer
         elif longer:
             unit = longer

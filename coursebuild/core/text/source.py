@@ -172,23 +172,17 @@ class Excerpt(Struct, frozen=True):
 
     def span(self, start: int = 0, end: int | None = None) -> Span:
         """The source span that `text[start:end]` came from, with what lies between its pieces."""
-        end, limit = len(self.text) if end is None else end, len(self.source.text)
-        if len(self.pieces) == 1:  # as of most
-            shift = self.pieces[0][1]
-            return Span(self.source, min(shift + start, limit), min(shift + max(start, end), limit))
-        first = self.offset(start)
+        end, first = len(self.text) if end is None else end, self.offset(start)
         last = self.offset(end - 1) + 1 if end > start else first
-        return Span(self.source, first, max(first, min(last, limit)))
+        return Span(self.source, first, max(first, min(last, len(self.source.text))))
 
     def slice(self, start: int, end: int | None = None) -> Excerpt:
         """The excerpt `text[start:end]`."""
         end = len(self.text) if end is None else end
-        pieces: tuple[tuple[int, int], ...] = ((0, self.offset(start)),)
-        if len(self.pieces) > 1:
-            first = bisect_right(self.pieces, start, key=itemgetter(0))
-            last = bisect_left(self.pieces, end, lo=first, key=itemgetter(0))
-            pieces += tuple((t - start, s) for t, s in self.pieces[first:last])
-        return Excerpt(self.source, self.text[start:end], pieces)
+        first = bisect_right(self.pieces, start, key=itemgetter(0))
+        last = bisect_left(self.pieces, end, lo=first, key=itemgetter(0))
+        pieces = ((t - start, s) for t, s in self.pieces[first:last])
+        return Excerpt(self.source, self.text[start:end], ((0, self.offset(start)), *pieces))
 
     def lines(self) -> tuple[Excerpt, ...]:
         """The excerpt's lines, without their line ends."""

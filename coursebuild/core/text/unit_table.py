@@ -4,7 +4,7 @@ The table grows by cases: with all units that there are, `link`, `hand` and `pol
 Sizes are exact, as defined by the SI Brochure (2019), NIST SP 811 (2008) and the IAU (2012, 2015);
 those of `u`, `bohr`, `hartree` and `Ry` are measured, and given as CODATA published them in 2022,
 2018 and 2014. A unit with several sizes is read as any of these: a calorie is thermochemical or of
-the steam tables, a revolution a cycle or an angle.
+the steam tables, a revolution a cycle or an angle, `Sv` a sievert or, in an ocean, a sverdrup.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from msgspec import Struct
 
 _TABLE = """
 m* 1 m meter metre meters metres Meter Metern metro metros
-g* 1e-3 kg gram grams gramme grammes Gramm gramo gramos
+g* 1e-3,9.80665:m/s^2 kg gram grams gramme grammes Gramm gramo gramos
 s* 1 s second seconds Sekunde Sekunden seconde secondes segundo segundos
 sec* 1 s secs
 A*! 1 A ampere amperes Ampere amp amps amperio amperios
@@ -27,12 +27,12 @@ N* 1 kg*m/s^2 newton newtons Newton
 Pa* 1 N/m^2 pascal pascals Pascal
 J* 1 N*m joule joules Joule julios
 W* 1 J/s watt watts Watt vatio vatios
-C*! 1 A*s coulomb coulombs Coulomb
+C*! 1,1@273.15:K A*s coulomb coulombs Coulomb
 V* 1 W/A volt volts Volt voltio voltios
-F*! 1 C/V farad farads Farad
+F*! 1,5/9@459.67:K C/V farad farads Farad
 Ω* 1 V/A ohms Ohm ohmio ohmios
 ohm* 1 V/A
-S*! 1 A/V siemens mho mhos
+S*! 1,1e-13:s A/V siemens mho mhos
 Wb* 1 V*s weber webers
 T*! 1 Wb/m^2 tesla teslas Tesla
 H*! 1 Wb/A henry henries Henry
@@ -41,7 +41,7 @@ lx* 1 lm/m^2 lux
 nit? 1 cd/m^2 nits
 Bq* 1 1/s becquerel becquerels
 Gy* 1 J/kg gray grays
-Sv* 1 J/kg sievert sieverts
+Sv* 1,1e6:m^3/s J/kg sievert sieverts
 rem*? 1e-2 Sv rems
 kat* 1 mol/s katal
 Nm* 1 N*m Newtonmeter Newtonmetern
@@ -58,11 +58,12 @@ d! 86400 s day days Tag Tage Tagen Tages jour jours dia dias
 week? 604800 s weeks Woche Wochen semaine semaines semana semanas
 fortnight? 1209600 s fortnights
 month? 2629800,2628000,2592000,2629746 s months Monat Monate Monaten mois meses
-a*? 31557600,31536000,31556952 s
+a*? 31557600,31536000,31556952,100:m^2 s
 yr* 31557600,31536000,31556952 s year years Jahr Jahre Jahren annee annees año años
 century? 3155760000,3153600000,3155695200 s centuries
 t*! 1e3 kg tonne tonnes Tonne Tonnen tonelada toneladas
-ton 1e3,907.18474,1016.0469088 kg tons
+kt 1e6,1852/3600:m/s kg
+ton 1e3,907.18474,1016.0469088,3516.8528420667:W kg tons
 L*! 1e-3 m^3 litre litres liter liters Liter Litern litro litros
 l*! 1e-3 m^3
 cc 1e-6 m^3 ccm
@@ -92,10 +93,11 @@ gpm 3.785411784e-3,4.54609e-3 m^3/min
 cfm 0.028316846592 m^3/min
 barn*? 1e-28 m^2 barns
 u? 1.66053906892e-27,1.66053906660e-27,1.660539040e-27 kg amu
-Da* 1.66053906892e-27,1.66053906660e-27,1.660539040e-27 kg dalton daltons
-lb 0.45359237 kg lbs pound pounds
+Da* 1.66053906892e-27,1.66053906660e-27,1.660539040e-27,9.869233e-13:m^2 kg dalton daltons
+lb 0.45359237,4.4482216152605:N kg lbs pound pounds
 slug? 4.4482216152605/0.3048 kg slugs
-oz 0.028349523125,0.0311034768 kg ounce ounces
+oz 0.028349523125,0.0311034768,29.5735295625e-6:m^3,28.4130625e-6:m^3 kg ounce ounces
+ct? 2e-4 kg carat carats
 dyn 1e-5 N
 kgf 9.80665 N kp
 lbf 4.4482216152605 N
@@ -124,12 +126,12 @@ degR 5/9 K rankine Rankine
 mas? π/648000000 rad
 gon π/200 rad gradian gradians
 rev 1,2π cycle revolution revolutions Umdrehung Umdrehungen
-U!? 1,2π cycle
+U!? 1,1/6e7:mol/s,2π cycle
 tr!? 1,2π cycle
 turn? 1,2π cycle turns
 rpm 1/60,π/30 cycle/s RPM
 rps 1,2π cycle/s RPS
-G*! 1e-4 T gauss Gauss
+G*! 1e-4,9.80665:m/s^2 T gauss Gauss
 Oe* 250/π A/m oersted oersteds
 Mx* 1e-8 Wb maxwell maxwells
 Gal* 1e-2 m/s^2
@@ -149,11 +151,11 @@ MB 8e6,8388608 bit
 GB 8e9,8589934592 bit
 TB 8e12,8796093022208 bit
 Bd* 1 1/s
-bps* 1 bit/s
+bps* 1,1e-4:1 bit/s
 FLOPS* 1 1/s
-fps 1 1/s
+fps 1,0.3048:m/s 1/s
 px 1 px pixel pixels
-pt! 0.0254/72 m
+pt! 0.0254/72,0.473176473e-3:m^3,0.56826125e-3:m^3 m
 dB ? 1 decibel
 Np ? 1
 """
@@ -161,7 +163,8 @@ Np ? 1
 
 Names are English, German, French and Spanish, without accents. A star: it takes prefixes. `!`: it
 is a name as often, as in `T = 2`; `?`: a word as often. After an `@` stands where a scale begins:
-0 °C are 273.15 of its degrees above absolute zero. The levels of a logarithmic scale have no size.
+0 °C are 273.15 of its degrees above absolute zero. A colon comes before the unit of a size that
+measures something else than the first. The levels of a logarithmic scale have no size.
 """
 
 

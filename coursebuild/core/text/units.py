@@ -339,8 +339,10 @@ def _base_unit(symbol: str) -> Unit:
 
 
 def _read_size(text: str, base: str) -> Unit:
-    """A unit of the table: `1609.344`, `5/9@459.67`, `π/180`, `2π`."""
+    """A unit of the table: `1609.344`, `5/9@459.67`, `π/180`, `2π`, `1e6:m^3/s`."""
+    text, _, own_base = text.partition(":")
     size, _, zero = text.partition("@")
+    base = own_base or base
     unit = _base_unit(base) if base in _BASES else _parse(base)[0]
     numerator, _, denominator = size.partition("/")
     pi = numerator.count("π") - denominator.count("π")

@@ -364,7 +364,7 @@ class _Evaluator:
         if not expression.ends_in_unit():
             return _ZERO
         unit = find_reading(expression.parts[1], self.readings)
-        return Real.of(unit.zero) * measure(unit) if unit.zero else _ZERO
+        return Real.of(unit.zero) * measure(unit)
 
     def _evaluate_sum(self, expression: Expression) -> PhysicalQuantity:
         before, last = expression.parts[0], expression.parts[-1]

@@ -275,28 +275,21 @@ def _apply_exactly(name: str, argument: Real) -> Real | None:
     is_angle = argument.form.radicand == 1 and argument.form.power == 1
     turn = argument.form.factor if is_angle or argument.form.factor == 0 else None
     match name:
-        case "sin":
-            return _sine(turn) if turn is not None else None
-        case "cos":
-            return _sine(turn + _HALF) if turn is not None else None
+        case "sin" if turn is not None:
+            return _sine(turn)
+        case "cos" if turn is not None:
+            return _sine(turn + _HALF)
         case "tan" if turn is not None:
             sine, cosine = _sine(turn), _sine(turn + _HALF)
             return sine / cosine if sine is not None and cosine is not None else None
-        case "arcsin" | "arccos":
-            turn = next((t for t in _SQUARED_SINES if _sine(t) == argument.abs()), None)
-            if turn is None:
-                return None
-            arcsine = PI * Real.of(turn * (argument.sign() or 0))
-            return arcsine if name == "arcsin" else PI * Real.of(_HALF) - arcsine
-        case "arctan":
-            return next(
-                (
-                    PI * Real.of(turn * (argument.sign() or 0))
-                    for turn in _SQUARED_SINES
-                    if turn != _HALF and _apply_exactly("tan", PI * Real.of(turn)) == argument.abs()
-                ),
-                None,
-            )
+        case "arcsin" | "arccos" | "arctan":
+            function = "tan" if name == "arctan" else "sin"
+            for turn in _SQUARED_SINES:
+                has_pole = function == "tan" and turn == _HALF
+                if not has_pole and _apply_exactly(function, PI * Real.of(turn)) == argument.abs():
+                    angle = PI * Real.of(turn * (argument.sign() or 0))
+                    return PI * Real.of(_HALF) - angle if name == "arccos" else angle
+            return None
         case "ln" if argument == ONE:
             return Real.of(0)
         case "exp" | "cosh":

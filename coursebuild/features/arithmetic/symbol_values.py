@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Collection, Iterator, Mapping
+from decimal import Decimal
 from fractions import Fraction
 
 from msgspec import Struct
@@ -39,6 +40,7 @@ from coursebuild.features.arithmetic.real import ONE, Real
 from coursebuild.features.arithmetic.statements import read_statements
 from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
 
+_NUMBER = Unit(Fraction(1))
 _Formula = model.Math | model.MathBlock
 _Level = tuple[int, ...]
 """The number of a section, then the offsets of the callouts and questions inside it."""
@@ -200,15 +202,12 @@ def _read_quantity(
         unit_text = declarations[name].unit_text
     unit = find_unit(unit_text) if unit_text else None
     if number is not None:
-        size = measure(unit) if unit is not None else ONE
-        zero = Real.of(unit.zero if unit is not None else 0)
-        mantissa, _, exponent = number.text.replace("−", "-").lower().partition("e")
-        decimals = len(mantissa.partition(".")[2])
-        last_place = Fraction(10) ** (int(exponent or 0) - decimals)
-        step = Real.of(last_place) * size if decimals else None
-        value = (Real.of(Fraction(f"{mantissa}e{exponent or 0}")) + zero) * size
+        unit, decimal = unit or _NUMBER, Decimal(number.text.replace("−", "-"))
+        size, last_place = measure(unit), Fraction(10) ** int(decimal.as_tuple().exponent)
+        step = Real.of(last_place) * size if "." in number.text else None
+        value = (Real.of(Fraction(decimal)) + Real.of(unit.zero)) * size
         text = f"{number.text} {unit_text}".rstrip()
-        return SymbolQuantity(name, unit_text, unit or Unit(Fraction(1)), value, step, text)
+        return SymbolQuantity(name, unit_text, unit, value, step, text)
     if len(sides) == 1:
         return SymbolQuantity(name, unit_text, unit)
     if formula.meaning is None and name not in values:
@@ -225,12 +224,10 @@ def _read_quantity(
         raise WrongDimensions(f"it is {dimensions}", sides[1].start, sides[1].end)
     unit = (find_unit(unit_text or unit_name) if unit_text or unit_name else None) or scale
     factor = ONE if units else measure(scale)
-    own_unit = find_unit(unit_name) if unit_name else None
-    size = measure(own_unit) if own_unit is not None else ONE
-    beginning = Real.of(own_unit.zero if own_unit is not None else 0)
+    own_unit = find_unit(unit_name) or _NUMBER
     value = quantity.value * factor
     step = numeral.step * factor if numeral is not None and not numeral.is_whole else None
-    text = f"{value / size - beginning:.10g} {unit_name}".rstrip()
+    text = f"{value / measure(own_unit) - Real.of(own_unit.zero):.10g} {unit_name}".rstrip()
     return SymbolQuantity(name, unit_text or unit_name, unit, value, step, text)
 
 

@@ -15,6 +15,7 @@ const PREFIXES = {
   Q: 30, R: 27, Y: 24, Z: 21, E: 18, P: 15, T: 12, G: 9, M: 6, k: 3, h: 2, da: 1,
   d: -1, c: -2, m: -3, μ: -6, u: -6, n: -9, p: -12, f: -15, a: -18, z: -21, y: -24, r: -27, q: -30,
 }
+const ONE = { scale: 1, offset: 0, powers: {} }
 const ANGLE = 'rad'
 const CYCLES = 'cycle'
 
@@ -25,7 +26,7 @@ const NAMES = {
   grad: '°', Grad: '°', grado: '°', grados: '°', degré: '°', degrés: '°',
   rev: 'turn', revs: 'turn', turns: 'turn', revolution: 'turn', revolutions: 'turn', RPM: 'rpm',
   meter: 'm', meters: 'm', metre: 'm', metres: 'm', kilogram: 'kg', kilograms: 'kg', gram: 'g', grams: 'g', kelvin: 'K',
-  sec: 's', secs: 's', second: 's', seconds: 's', minute: 'min', minutes: 'min', hour: 'h', hours: 'h', hr: 'h', day: 'd', days: 'd',
+  secs: 's', second: 's', seconds: 's', minute: 'min', minutes: 'min', hour: 'h', hours: 'h', hr: 'h', day: 'd', days: 'd',
   newton: 'N', newtons: 'N', joule: 'J', joules: 'J', watt: 'W', watts: 'W', pascal: 'Pa', pascals: 'Pa', hertz: 'Hz',
   volt: 'V', volts: 'V', ampere: 'A', amperes: 'A', coulomb: 'C', coulombs: 'C', tesla: 'T', ohms: 'Ω', litre: 'l', liter: 'l',
   inch: 'in', inches: 'in', foot: 'ft', feet: 'ft', mile: 'mi', miles: 'mi', pound: 'lb', pounds: 'lb',
@@ -44,7 +45,7 @@ const NAMES = {
  */
 export function readUnit(text) {
   const source = plain(text)
-  if (source === '') return [{ scale: 1, offset: 0, powers: {} }]
+  if (source === '') return [ONE]
   const readings = [{}, { split: true }].map((way) => parse(source, way))
   if (/\/.*[ *]/.test(source)) readings.push(parse(source, { wide: true }))
   return readings.filter((unit) => unit !== null)
@@ -114,7 +115,7 @@ function parse(source, { wide = false, split = false }) {
 
 /** Factors with signs between them. */
 function product(reader) {
-  let unit = { scale: 1, offset: 0, powers: {} }
+  let unit = ONE
   let sign = 1
   let isFirst = true
   for (;;) {
@@ -146,7 +147,7 @@ function group(reader) {
     const symbol = /^(?:°C|[°%‰'"]|\p{L}+|1(?![\d.]))/u.exec(reader.text.slice(reader.index))?.[0]
     if (symbol === undefined) return null
     reader.index += symbol.length
-    if (symbol === '1') return { scale: 1, offset: 0, powers: {} }
+    if (symbol === '1') return ONE
     const power = exponent(reader)
     if (power === null) return null
     const parts = (reader.split && power !== 1 && apart(symbol)) || unitsOf(symbol)
@@ -209,8 +210,7 @@ function single(symbol) {
 
 function base(symbol, prefix) {
   const [scale, powers, , offset = 0] = UNITS[symbol]
-  // So that a kilogram is exactly 1.
-  return { scale: prefix === 1e3 && scale === 1e-3 ? 1 : scale * prefix, offset, powers }
+  return { scale: scale * prefix, offset, powers }
 }
 
 function multiply(first, second, sign) {

@@ -36,9 +36,7 @@ def instability_text(first: str, second: str, comparison: Comparison = EXACT) ->
 
 
 def test_lines_that_one_run_alone_printed_are_told() -> None:
-    assert "`lost` was printed in the first run only" in instability_text("a\nlost", "a")
-    first, second = ("\n".join(f"{i}{x}" for i in range(12)) for x in ("", "x"))
-    assert "note: and 2 more lines" in instability_text(first, second)
+    assert "-lost" in instability_text("a\nlost", "a")
 
 
 def test_runs_that_differ_where_nothing_is_compared_are_stable() -> None:

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 
 from coursebuild.api import Diagnostic, Edit, Note, Source, Span
 from coursebuild.core.model import CodeSpan, NumberBinding, Text, document_inlines
-from coursebuild.core.scripts.bound_numbers import BoundText
+from coursebuild.core.scripts.bound_places import BoundNumber
 from coursebuild.core.scripts.findings import output_findings
 from coursebuild.core.text.numbers import scan_prose
 from coursebuild.core.text.rules import Severity, rule_address
@@ -223,7 +223,8 @@ def _bind_numbers(texts: OpenTexts, place: Span) -> Iterator[types.CodeAction]:
                 start, end = inline.span.start + number.start, inline.span.start + number.end
                 candidates.append((number.text, Span(place.source, start, end), f"`{number.text}`"))
         for text, span, code in candidates:
-            shown_text, binding = BoundText.of(text), NumberBinding(span, text, span, None)
+            binding = NumberBinding(span, text, span, None)
+            shown_text = BoundNumber(binding, printed).text
             sources = (
                 printed.of_binding(binding) if shown_text.numbers and _overlap(span, place) else []
             )

@@ -27,7 +27,7 @@ from coursebuild.core.pages.numbering import (
     number_items,
     number_prefix,
 )
-from coursebuild.core.scripts.bound_numbers import BoundText
+from coursebuild.core.scripts.bound_places import BoundNumber
 from coursebuild.core.syntax.decode import field_description
 from coursebuild.core.text.rules import RULES
 from coursebuild.features.glossary import definition_of
@@ -292,7 +292,8 @@ class _Lookup:
         return Referent(formula.span, "\n".join(lines), next(at_offset, declarations[0]).span)
 
     def look_up_binding(self, binding: model.NumberBinding) -> Referent | None:
-        number, printed = BoundText.of(binding.text, binding.comma), printed_outputs(self.library)
+        printed = printed_outputs(self.library)
+        number = BoundNumber(binding, printed).text
         for verdict in printed.of_binding(binding) if number.numbers else ():
             for place in number.shown_places([printed.text(verdict)]):
                 if place.span is not None:
