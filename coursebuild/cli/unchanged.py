@@ -179,19 +179,15 @@ def _state(root: str, input_paths: list[str], began: int | None = None) -> str:
 
     add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
     course = (os.path.join(root, name) for name in FOLDERS)
-    for path in (*course, *_tool(), *input_paths):
-        for row in _rows(path, began):
-            add(*row)
-    return digest.hexdigest()
-
-
-def _tool() -> list[str]:
     package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     source = os.path.dirname(package)
     tool = [*(folder for folder in sys.path if folder.endswith(_PACKAGES)), package]
     if os.path.isdir(os.path.join(source, "site", "dist")):
         tool += (os.path.join(source, n) for n in ("mjcourse", "templates", "site/dist"))
-    return tool
+    for path in (*course, *tool, *input_paths):
+        for row in _rows(path, began):
+            add(*row)
+    return digest.hexdigest()
 
 
 def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:
