@@ -54,8 +54,8 @@ def write_archive(target: BinaryIO, files: Iterable[SiteFile]) -> None:
     with zipfile.ZipFile(target, "w") as archive:
         for file in sorted(files, key=lambda file: (file.path != _MIMETYPE, file.path)):
             entry = zipfile.ZipInfo(file.path, _DATE)
-            is_stored = file.path.lower().endswith(_UNCOMPRESSED_SUFFIXES)
-            entry.compress_type = zipfile.ZIP_STORED if is_stored else zipfile.ZIP_DEFLATED
+            if not file.path.lower().endswith(_UNCOMPRESSED_SUFFIXES):
+                entry.compress_type = zipfile.ZIP_DEFLATED
             entry.create_system = 3
             entry.external_attr = 0o100644 << 16
             archive.writestr(entry, file.make(), compresslevel=_LEVEL)

@@ -37,8 +37,6 @@ class _Converter:
         blocks: list[str] = []
         line: list[HtmlContent] = []
         for child in (*content, None):
-            if isinstance(child, HtmlElement) and child.attributes.get("role") == "img":
-                continue  # a drawing
             if child is not None and (isinstance(child, str) or child.name not in _BLOCKS):
                 if isinstance(child, str) or child.name not in _SKIPPED_ELEMENTS:
                     line.append(child)
