@@ -176,7 +176,14 @@ class _State:
     def __init__(self, root: str, began: int | None = None) -> None:
         self._hash = hashlib.blake2b(digest_size=32)
         self._add(sys.version, sys.executable, *(os.environ.get(name, "") for name in _VARIABLES))
-        self.add_paths([*(os.path.join(root, name) for name in FOLDERS), *_tool()], began)
+        package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+        source = os.path.dirname(package)
+        paths = [os.path.join(root, name) for name in FOLDERS]
+        paths += (folder for folder in sys.path if folder.endswith(_PACKAGES))
+        paths.append(package)
+        if os.path.isdir(os.path.join(source, "site", "dist")):
+            paths += (os.path.join(source, n) for n in ("mjcourse", "templates", "site/dist"))
+        self.add_paths(paths, began)
 
     def add_paths(self, paths: list[str], began: int | None = None) -> None:
         for path in paths:
@@ -190,15 +197,6 @@ class _State:
     def digest(self) -> str:
         """The hash of what has been added until now."""
         return self._hash.hexdigest()
-
-
-def _tool() -> list[str]:
-    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    source = os.path.dirname(package)
-    tool = [*(folder for folder in sys.path if folder.endswith(_PACKAGES)), package]
-    if os.path.isdir(os.path.join(source, "site", "dist")):
-        tool += (os.path.join(source, n) for n in ("mjcourse", "templates", "site/dist"))
-    return tool
 
 
 def _rows(path: str, began: int | None) -> Iterator[tuple[object, ...]]:

@@ -241,18 +241,7 @@ def diagnostics_of(
     if documents is None:
         return tuple(diagnostics)
     own_paths = {*documents, course.map.path}
-    used_paths = _used_files(root, course, documents, runs)
-    return tuple(
-        d
-        for d in diagnostics
-        if d.span.path in own_paths or (d.is_error and d.span.path in used_paths)
-    )
-
-
-def _used_files(
-    root: Path, course: Course, documents: Collection[str], runs: Iterable[ScriptRun]
-) -> set[str]:
-    """The files that some lessons and pages use: models, what scripts read, the list of sources."""
+    # The files that some lessons and pages use: models, what scripts read, the list of sources
     paths = {file for run in runs if run.trace is not None for file in run.trace.files}
     for document in course.documents:
         if document.source.path in documents:
@@ -262,7 +251,12 @@ def _used_files(
     models = {model.source.path: model.source.text for model in course.models}
     for path in paths & {*models}:
         paths |= {*model_files(root, path, models[path])}
-    return paths | {f"{path.removesuffix('.xml')}.toml" for path in paths & {*models}}
+    used_paths = paths | {f"{path.removesuffix('.xml')}.toml" for path in paths & {*models}}
+    return tuple(
+        d
+        for d in diagnostics
+        if d.span.path in own_paths or (d.is_error and d.span.path in used_paths)
+    )
 
 
 def judge(

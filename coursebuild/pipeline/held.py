@@ -65,7 +65,18 @@ class HeldDocuments:
         """The documents that are to be compared; the addresses of the others are taken over."""
         changed_documents = []
         for id, document in documents:
-            key = self._keys[document.source.path] = self._key(id, document)
+            scripts = {script.path for script in document_scripts(document)}
+            scripts |= {recording.script or "" for recording in find_blocks(document, Recording)}
+            scripts |= {binding.script or "" for binding in find_inlines(document, NumberBinding)}
+            source = document.source
+            key = self._keys[document.source.path] = step_key(
+                "held outputs",
+                self._course_key,
+                id,
+                (source.path, source.digest),
+                self._known_addresses.get(source.path),
+                [(path, self._script_state(path)) for path in sorted(scripts)],
+            )
             entry = self._store.get_value(_KIND, key, _Held)
             if entry is None:
                 changed_documents.append((id, document))
@@ -87,20 +98,6 @@ class HeldDocuments:
         for item in self._addresses.items():
             by_document.setdefault(item[0].path, []).append(item)
         return by_document
-
-    def _key(self, id: str, document: Document) -> str:
-        scripts = {script.path for script in document_scripts(document)}
-        scripts |= {recording.script or "" for recording in find_blocks(document, Recording)}
-        scripts |= {binding.script or "" for binding in find_inlines(document, NumberBinding)}
-        source = document.source
-        return step_key(
-            "held outputs",
-            self._course_key,
-            id,
-            (source.path, source.digest),
-            self._known_addresses.get(source.path),
-            [(path, self._script_state(path)) for path in sorted(scripts)],
-        )
 
     def _find_script_state(self, path: str) -> str:
         """A hash of what a script printed, and of all outputs that are recorded of it."""

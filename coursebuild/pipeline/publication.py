@@ -13,7 +13,7 @@ import zipfile
 from collections.abc import Callable, Iterable, Mapping
 from itertools import chain
 from pathlib import Path
-from typing import BinaryIO, TypeVar
+from typing import TypeVar
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -35,6 +35,7 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_list import page_list
 from coursebuild.core.pages.renderer import TemplateFailure
+from coursebuild.core.pages.zips import write_archive
 from coursebuild.core.registry import find_exporter
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.diagnostics import Diagnostic
@@ -187,11 +188,6 @@ def _make_export(
     return _Export(tuple(files), tuple(diagnostics))
 
 
-_DATE = (1980, 1, 1, 0, 0, 0)
-_LEVEL = 6
-_MIMETYPE = "mimetype"
-"""The file that an e-book must begin with, uncompressed."""
-_UNCOMPRESSED_SUFFIXES = (".gz", ".jpeg", ".jpg", ".png", ".webp", ".woff2", ".zip", _MIMETYPE)
 _AUTHOR_FOLDERS = ("features", "models", "examples", ".coursebuild", ".git")
 
 
@@ -244,7 +240,7 @@ def write_export(out: Path, files: Iterable[SiteFile], *, archive: bool) -> int:
             place.parent.mkdir(parents=True, exist_ok=True)
             with temporary.open("wb") as target:
                 if archive:
-                    _pack(target, files)
+                    write_archive(target, files)
                 else:
                     (file,) = files
                     target.write(file.make())
@@ -256,14 +252,3 @@ def write_export(out: Path, files: Iterable[SiteFile], *, archive: bool) -> int:
     except OSError as error:
         raise EffectError(f"{out} cannot be written: {reason(error)}") from None
     return size
-
-
-def _pack(target: BinaryIO, files: Iterable[SiteFile]) -> None:
-    with zipfile.ZipFile(target, "w") as archive:
-        for file in sorted(files, key=lambda file: (file.path != _MIMETYPE, file.path)):
-            entry = zipfile.ZipInfo(file.path, _DATE)
-            is_stored = file.path.lower().endswith(_UNCOMPRESSED_SUFFIXES)
-            entry.compress_type = zipfile.ZIP_STORED if is_stored else zipfile.ZIP_DEFLATED
-            entry.create_system = 3
-            entry.external_attr = 0o100644 << 16
-            archive.writestr(entry, file.make(), compresslevel=_LEVEL)

@@ -263,20 +263,17 @@ class _Collector:
         report = self._read_record(kind, name)
         if report is None:
             return {}
-        if report.digest != self._digest(model):
-            reason = f"`{name}`, its files or its scenarios have changed since"
-            self._warn_stale(kind, name, reason)
-            return {}
-        fits = self._is_of_this_engine(kind, name, {report.machine.engine})
-        return {name: report} if fits else {}
-
-    def _digest(self, model: MjcfModel) -> str:
         if model.name not in self._digests:
             declarations = self._declarations.get(
                 model.name, Declarations(model.name, model.source)
             )
             self._digests[model.name] = scene_digest(self._root, model, declarations)
-        return self._digests[model.name]
+        if report.digest != self._digests[model.name]:
+            reason = f"`{name}`, its files or its scenarios have changed since"
+            self._warn_stale(kind, name, reason)
+            return {}
+        fits = self._is_of_this_engine(kind, name, {report.machine.engine})
+        return {name: report} if fits else {}
 
     def _read_record(self, kind: ReportKind[_T], model: str = "") -> _T | None:
         report = read_record(self._root, kind, model)

@@ -204,7 +204,14 @@ def _make_download(course_files: _Course, extraction: Extraction) -> ScriptDownl
     whole = None if extraction.script.archive else _one_file(course_files, extraction)
     if whole is not None and whole.text:
         packages, unknown = course_files.packages(whole.modules)
-        text = _metadata(packages, unknown, course_files.options) + whole.text
+        # The block by which installers know what a script needs (PEP 723)
+        interpreter = course_files.options.interpreter
+        version = platform.python_version() if interpreter is None else interpreter.version
+        oldest = ".".join(version.split(".")[:2])
+        rows = "".join(f'#     "{package}",\n' for package in packages)
+        rows += "".join(f"#     {_unknown_package(module)}\n" for module in unknown)
+        dependencies = f"# dependencies = [\n{rows}# ]\n" if rows else "# dependencies = []\n"
+        text = f'# /// script\n# requires-python = ">={oldest}"\n{dependencies}# ///\n' + whole.text
         return ScriptDownload(
             path, ((name, text.encode()),), name, packages, whole.modules, unknown
         )
@@ -248,7 +255,11 @@ def _one_file(course_files: _Course, extraction: Extraction) -> _OneFile:
             belongings = replace(belongings, style=style)
             code = single_file(_dotted(name), extraction.text, find_module, belongings)
         modules = tuple(sorted(find_imports(code) - sys.stdlib_module_names))
-        text = _rename(code, path, name)
+        # The text with the file's new place in its docstring
+        first = next(iter(cast(ast.Module, python_nodes(code)[0]).body), None)
+        end = (first.end_lineno or 0) if first is not None and is_text(first) else 0
+        lines = code.split("\n")
+        text = "\n".join([*(line.replace(path, name) for line in lines[:end]), *lines[end:]])
     whole = _OneFile(text, modules, answers)
     course_files.options.store.put_value(_KIND, key, whole)
     return whole
@@ -301,27 +312,8 @@ def _belongings(files: Mapping[str, bytes]) -> Belongings:
     return Belongings(models, data_texts)
 
 
-def _rename(text: str, path: str, name: str) -> str:
-    """The text with the file's new place in its docstring."""
-    first = next(iter(cast(ast.Module, python_nodes(text)[0]).body), None)
-    end = (first.end_lineno or 0) if first is not None and is_text(first) else 0
-    lines = text.split("\n")
-    return "\n".join([*(line.replace(path, name) for line in lines[:end]), *lines[end:]])
-
-
 def _unknown_package(module: str) -> str:
     return f"# the package of the module {module} was not known"
-
-
-def _metadata(packages: Iterable[str], unknown_modules: Iterable[str], options: Options) -> str:
-    """The block by which installers know what a script needs (PEP 723)."""
-    interpreter = options.interpreter
-    version = platform.python_version() if interpreter is None else interpreter.version
-    oldest = ".".join(version.split(".")[:2])
-    rows = "".join(f'#     "{package}",\n' for package in packages)
-    rows += "".join(f"#     {_unknown_package(module)}\n" for module in unknown_modules)
-    dependencies = f"# dependencies = [\n{rows}# ]\n" if rows else "# dependencies = []\n"
-    return f'# /// script\n# requires-python = ">={oldest}"\n{dependencies}# ///\n'
 
 
 # --- their trial
@@ -396,7 +388,12 @@ def _problems(
         if alone_run.failure:
             yield path, f"fails in an empty folder: {alone_run.failure}"
         elif not _prints_same(alone_run, runs[path]):
-            other_runs.append(_as_run(runs[path], alone_run.stdout))
+            # A script's run with another output, whose parts have as many lines as before
+            run = runs[path]
+            lines = alone_run.stdout.splitlines(keepends=True)
+            counts = (run.stdout[:start].count("\n") for start in run.part_starts)
+            starts = tuple(sum(map(len, lines[:count])) for count in counts)
+            other_runs.append(replace(run, stdout=alone_run.stdout, part_starts=starts))
     reported_paths = set[str]()
     for verdict in verify(course, other_runs) if other_runs else ():
         path = verdict.recording.script or ""
@@ -421,14 +418,6 @@ def _prints_same(alone_run: AloneRun, run: ScriptRun) -> bool:
             return False
         lines.remove(line)
     return bool(kept_back) and [*lines, *kept_back] == alone_run.stdout.splitlines()
-
-
-def _as_run(run: ScriptRun, stdout: str) -> ScriptRun:
-    """A script's run with another output, whose parts have as many lines as before."""
-    lines = stdout.splitlines(keepends=True)
-    counts = (run.stdout[:start].count("\n") for start in run.part_starts)
-    starts = tuple(sum(map(len, lines[:count])) for count in counts)
-    return replace(run, stdout=stdout, part_starts=starts)
 
 
 def _dotted(path: str) -> str:

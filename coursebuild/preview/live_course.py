@@ -115,7 +115,12 @@ class FolderWatcher:
                 unseen_folders = frozenset() if before is None else before | folders.keys()
                 for paths in self._watch(tuple(self._root / f for f in folders)):
                     self._ready.set()
-                    all_paths = paths | unseen_folders | self._find_changed_files()
+                    files = self._polled_files  # `watch_also` replaces the dictionary
+                    changed_files = {
+                        path for path, before in files.items() if self._file_state(path) != before
+                    }
+                    files.update((path, self._file_state(path)) for path in changed_files)
+                    all_paths = paths | unseen_folders | changed_files
                     if all_paths:
                         self._events.put(all_paths)
                     unseen_folders = frozenset()
@@ -136,12 +141,6 @@ class FolderWatcher:
                 if stat.S_ISDIR(status.st_mode):
                     folders[name] = (status.st_dev, status.st_ino)
         return folders
-
-    def _find_changed_files(self) -> set[str]:
-        files = self._polled_files  # `watch_also` replaces the dictionary
-        changed_files = {path for path, before in files.items() if self._file_state(path) != before}
-        files.update((path, self._file_state(path)) for path in changed_files)
-        return changed_files
 
     def _file_state(self, path: str) -> tuple[int, ...]:
         """What differs after a save of a file."""

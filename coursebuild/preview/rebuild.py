@@ -35,7 +35,7 @@ from coursebuild.pipeline.verify import verify, with_downloads
 from coursebuild.preview.messages import report_now
 from coursebuild.preview.run_history import script_keys
 from coursebuild.preview.session import Session
-from coursebuild.report import Report, Style
+from coursebuild.report import Style
 from coursebuild.report.text import diagnostic_paragraphs, location
 
 QUIET = 0.15
@@ -160,23 +160,21 @@ class BackgroundRebuild:
             session.trouble = trouble
             session.notify()
         if not trouble:
-            self._print_changes(report_now(session))
-
-    def _print_changes(self, report: Report) -> None:
-        now, before = report.diagnostics, self._printed
-        self._printed = now
-        new = subtract_diagnostics(now, before or ())
-        resolved = subtract_diagnostics(before or (), now)
-        for paragraph in diagnostic_paragraphs(new, self._style):
-            show(paragraph)
-        for diagnostic in resolved:
-            self._progress.say(f"gone: {location(diagnostic.span)}: {diagnostic.message}")
-        counts = [f"{len(new)} new"] if new else []
-        counts += [f"{len(resolved)} gone"] if resolved else []
-        verdict = report.summary.verdict()
-        if now and before is not None:
-            verdict = f"{verdict} ({', '.join(counts)})" if counts else f"still {verdict}"
-        self._progress.say(f"checked: {verdict}")
+            report = report_now(session)
+            now, before = report.diagnostics, self._printed
+            self._printed = now
+            new = subtract_diagnostics(now, before or ())
+            resolved = subtract_diagnostics(before or (), now)
+            for paragraph in diagnostic_paragraphs(new, self._style):
+                show(paragraph)
+            for diagnostic in resolved:
+                self._progress.say(f"gone: {location(diagnostic.span)}: {diagnostic.message}")
+            counts = [f"{len(new)} new"] if new else []
+            counts += [f"{len(resolved)} gone"] if resolved else []
+            verdict = report.summary.verdict()
+            if now and before is not None:
+                verdict = f"{verdict} ({', '.join(counts)})" if counts else f"still {verdict}"
+            self._progress.say(f"checked: {verdict}")
 
     # --- scripts
 

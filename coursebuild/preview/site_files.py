@@ -110,7 +110,16 @@ class Files:
     def find(self, path: str) -> bytes | None:
         """Return a file of the site, if there is one and it can be made."""
         if path in self._entries:
-            return self._find_page(path)
+            if path not in self._framed_pages:
+                assert self._library is not None and self._frame is not None
+                document = self.document(path)
+                mistakes = () if document is None else self._mistakes(document)
+                request = page_request(self._entries[path], self._library, mistakes)
+                page = self._reader.find_page(request.key) or self._reader.draw_page(request)
+                if len(self._framed_pages) == _MOST_PAGES:
+                    self._framed_pages.clear()
+                self._framed_pages[path] = frame_page(page, self._frame)
+            return self._framed_pages[path]
         if path in self._trial_files:
             return self._trial_files[path].data
         for site, files in reversed(self._sites):
@@ -122,18 +131,6 @@ class Files:
                 except EffectError:
                     return None  # gone since the course was read
         return None
-
-    def _find_page(self, path: str) -> bytes:
-        if path not in self._framed_pages:
-            assert self._library is not None and self._frame is not None
-            document = self.document(path)
-            mistakes = () if document is None else self._mistakes(document)
-            request = page_request(self._entries[path], self._library, mistakes)
-            page = self._reader.find_page(request.key) or self._reader.draw_page(request)
-            if len(self._framed_pages) == _MOST_PAGES:
-                self._framed_pages.clear()
-            self._framed_pages[path] = frame_page(page, self._frame)
-        return self._framed_pages[path]
 
 
 def _with_files(site: Site) -> tuple[Site, Mapping[str, SiteFile]]:

@@ -10,7 +10,6 @@ import math
 import textwrap
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import assert_never
 
 from msgspec import Struct
 
@@ -280,6 +279,4 @@ def _row_text(row: Doubt | Flip) -> str:
             text = f"`{second}` is printed {place}"
             if not second:
                 text = f"`{printed}` is not always printed"
-        case _:
-            assert_never(row)
     return f"{location(row.span)}  {text}" + ("  (allowed for)" if is_allowed else "")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple, TypeVar, assert_never
+from typing import NamedTuple, TypeVar
 
 from msgspec.structs import replace
 
@@ -311,8 +311,6 @@ def without_prose(document: Document) -> Document:
                 blocks += [] if block.source is None else [block]
             case BlockQuote() | ListBlock() | CodeBlock() | ThematicBreak() | MathBlock():
                 pass
-            case _:
-                assert_never(block)
     if is_blank(blocks) and not is_blank(document_blocks(document)):
         blocks.append(ThematicBreak(document.blocks[0].span))
     return Document(document.source, tuple(blocks), (), document.title_anchor, document.unclaimed)

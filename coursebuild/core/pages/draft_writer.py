@@ -76,11 +76,8 @@ class DraftWriter(PageWriter, frozen=True):
         except Exception:
             if not is_broken:
                 raise
-            shows_nothing = True
         else:
-            is_feature_block = isinstance(block, model.FeatureBlock)
-            shows_nothing = is_broken and is_feature_block and not html.striptags()
-        if shows_nothing:
-            self._mark_places.intersection_update(places_before)
-            html = self.code("", block.span.text)
-        return html
+            if not is_broken or not isinstance(block, model.FeatureBlock) or html.striptags():
+                return html
+        self._mark_places.intersection_update(places_before)
+        return self.code("", block.span.text)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
-from typing import Literal, TypeAlias, assert_never
+from typing import Literal, TypeAlias
 from urllib.parse import quote
 
 from markupsafe import Markup
@@ -235,8 +235,6 @@ class HtmlWriter:
                 return self.block(block)
             case model.Recording() | model.FeatureBlock():
                 return self.block(block)
-            case _:
-                assert_never(block)
 
     def _heading(self, heading: model.Heading) -> str:
         inner, name = self._inlines(heading.children), f"h{heading.level}"
@@ -336,8 +334,6 @@ class HtmlWriter:
                 return self._reference(inline)
             case model.Citation():
                 return self.citation(inline)
-            case _:
-                assert_never(inline)
 
     def _link(self, link: model.Link) -> str:
         title = f' title="{escape(link.title)}"' if link.title else ""

@@ -105,12 +105,9 @@ def _strings_for(
     feature_texts: tuple[tuple[str, str], ...],
     language: str,
 ) -> Strings:
-    files = [(path, text) for path, text in templates if path.startswith("strings/")]
-    texts = [(path[len("strings/") :].removesuffix(".toml"), text) for path, text in files]
     strings = Strings({}, language)
     for name in dict.fromkeys((DEFAULT_LANGUAGE, language.split("-")[0].lower(), language)):
-        for text in (
-            text for file_language, text in (*texts, *feature_texts) if file_language == name
-        ):
-            strings = parse_strings(text, strings, language)
+        for path, text in (*templates, *feature_texts):
+            if path in (f"strings/{name}.toml", name):
+                strings = parse_strings(text, strings, language)
     return strings

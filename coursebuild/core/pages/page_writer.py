@@ -6,7 +6,7 @@ import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from decimal import Decimal
-from typing import TypeAlias, assert_never
+from typing import TypeAlias
 
 from markupsafe import Markup, escape
 from msgspec import Struct
@@ -150,8 +150,6 @@ class PageWriter(PageContext, frozen=True):
                     )
             case model.FeatureBlock():
                 html = kind_of_block(block).draw(self, block)
-            case _:
-                assert_never(block)
         return html + Markup("\n") if html else html
 
     def _script(
@@ -224,8 +222,6 @@ def output_receipt(page: PageContext, block: model.Recording) -> Receipt:
             return Receipt("volatile", words("receipt.volatile", versions=versions))
         case "drift":
             return Receipt("unverified", words("receipt.drift", versions=versions))
-        case _:
-            assert_never(verdict.status)
 
 
 def _describe_comparison(words: Strings, comparison: model.Comparison) -> str:
@@ -242,8 +238,6 @@ def _describe_comparison(words: Strings, comparison: model.Comparison) -> str:
                 text = words("receipt.rtol", rtol=rtol)
             else:
                 text = words("receipt.atol", atol=atol)
-        case _:
-            assert_never(comparison.mode)
     if comparison.ellipsis:
         text += f"; {words('receipt.ellipsis')}"
     if comparison.volatile:

@@ -15,7 +15,6 @@ import json
 import re
 import shlex
 from collections.abc import Callable, Iterable, Iterator
-from typing import assert_never
 
 from msgspec import Struct
 
@@ -208,8 +207,6 @@ def reason_forgotten(run: ScriptRun) -> str:
             return "it did not find a module"
         case Outcome.OK | Outcome.FAILED | Outcome.OUTPUT_LIMIT | Outcome.ENCODING:
             pass
-        case _:
-            assert_never(run.outcome)
     if run.trace is None:
         return "what it reads could not be observed"
     changing = next((p for p in run.trace.outside if p.startswith(_VOLATILE_FOLDERS)), None)
@@ -268,8 +265,6 @@ def state_changes(
                 yield f"{before} → {now}"
             case Kind.PLACE:
                 yield f"it printed a path of this machine: {before} → {now}"
-            case _:
-                assert_never(dependency.kind)
 
 
 def _became(old: str, now: str) -> str:
@@ -306,5 +301,3 @@ def describe(dependency: Dependency) -> str:
             return dependency.state
         case Kind.PLACE:
             return f"that {dependency.state} is where it is: it printed that"
-        case _:
-            assert_never(dependency.kind)

@@ -36,7 +36,7 @@ from coursebuild.core.model.course import MJCF_KEYWORDS
 from coursebuild.core.model.results import CompileResult, Misspelling, ModelFacts
 from coursebuild.core.run import compile_main, mujoco_files
 from coursebuild.core.run.child import LIMITS, JsonChild
-from coursebuild.core.run.mujoco_files import ModelFiles
+from coursebuild.core.run.mujoco_files import ATTRIBUTE, MARKUP, ModelFiles
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.core.text.near import near
 from coursebuild.core.values import fingerprint
@@ -297,12 +297,6 @@ _SUBJECTS = (
     ("end", re.compile("MISMATCHED_ELEMENT")),
 )
 """What messages are about: an attribute, an element, an end tag; others are about a value."""
-_MARKUP = re.compile(
-    r"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<(?P<end>/?)(?P<name>[A-Za-z_][\w:.-]*+)"
-    r"(?P<rest>(?>(?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*))>",
-    re.DOTALL,
-)
-_ATTRIBUTE = re.compile(r"(?<![\w:.-])([\w:.-]++)\s*+=\s*+(?:\"([^\"]*+)\"|'([^']*+)')")
 
 _Place: TypeAlias = tuple[int, int]
 
@@ -394,7 +388,7 @@ def read_tags(text: str) -> list[_Tag]:
     tags: list[_Tag] = []
     open_tags: list[_Tag] = []
     line, offset = 1, 0
-    for match in _MARKUP.finditer(text):
+    for match in MARKUP.finditer(text):
         line, offset = line + text.count("\n", offset, match.start()), match.start()
         if match["name"] is None:
             continue
@@ -409,7 +403,7 @@ def read_tags(text: str) -> list[_Tag]:
         start = match.start("rest")
         attributes = [
             (a[1], (start + a.start(1), start + a.end(1)), a[number], place)
-            for a in _ATTRIBUTE.finditer(match["rest"])
+            for a in ATTRIBUTE.finditer(match["rest"])
             for number in (2 if a[2] is not None else 3,)
             for place in ((start + a.start(number), start + a.end(number)),)
         ]

@@ -31,9 +31,12 @@ _NAMING = _MESH | {"compiler", "flexcomp", "include", "model", "texture"}
 _DEEPEST = 32
 LONGEST = 8 << 20
 """Bytes of a file that is scanned."""
-_COMMENTS = re.compile(rb"<!--.*?(?:-->|\Z)", re.DOTALL)
-_TAGS = re.compile(rb"<([A-Za-z_][\w:.-]*+)((?>(?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*))>")
-_ATTRIBUTES = re.compile(rb"(?<![\w:.-])([\w:.-]++)\s*+=\s*+(?:\"([^\"]*+)\"|'([^']*+)')")
+MARKUP = re.compile(
+    r"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<(?P<end>/?)(?P<name>[A-Za-z_][\w:.-]*+)"
+    r"(?P<rest>(?>(?:[^<>\"']|\"[^\"]*+\"|'[^']*+')*))>",
+    re.DOTALL,
+)
+ATTRIBUTE = re.compile(r"(?<![\w:.-])([\w:.-]++)\s*+=\s*+(?:\"([^\"]*+)\"|'([^']*+)')")
 
 
 class ModelFiles:
@@ -149,14 +152,14 @@ def _tags(data: bytes) -> tuple[tuple[str, dict[str, str]], ...]:
     """The tags of a text that name files, with their attributes: many may include the same text."""
     return tuple(
         (
-            _decode(tag[1]),
+            tag["name"],
             {
-                _decode(key): html.unescape(_decode(double_quoted or single_quoted))
-                for key, double_quoted, single_quoted in _ATTRIBUTES.findall(tag[2])
+                key: html.unescape(double_quoted or single_quoted)
+                for key, double_quoted, single_quoted in ATTRIBUTE.findall(tag["rest"])
             },
         )
-        for tag in _TAGS.finditer(_COMMENTS.sub(b"", data))
-        if _decode(tag[1]) in _NAMING
+        for tag in MARKUP.finditer(_decode(data))
+        if tag["name"] in _NAMING and not tag["end"]
     )
 
 

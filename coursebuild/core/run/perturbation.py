@@ -93,22 +93,6 @@ class _Perturbation:
             self._count += 1
         elif _states(data) == extent.states and data.time >= extent.time:
             return
-        self._move(model, data, extent)
-
-    def _after(self, args: tuple[Any, ...], keywords: Mapping[str, Any], result: Any) -> None:
-        data = model_and_data(args, keywords)[1]
-        extent = self._extents.get(id(data))
-        if extent is not None and extent.of() is data:
-            extent.cover(data)
-            self._remember(extent, data)
-
-    def _remember(self, extent: _Extent, data: Any) -> None:
-        extent.time = data.time
-        extent.states = states = _states(data)
-        if len(self._known_hashes) < _MOST_KNOWN:
-            self._known_hashes.update(hash((i, state)) for i, state in enumerate(states))
-
-    def _move(self, model: Any, data: Any, extent: _Extent) -> None:
         begins = not extent.states or data.time < extent.time
         plan = self._get_plan(model)
         qpos, qvel, act = data.qpos, data.qvel, data.act
@@ -126,6 +110,19 @@ class _Perturbation:
         if has_moved:
             mujoco_tracing.active_tracer().note("p")
         self._remember(extent, data)
+
+    def _after(self, args: tuple[Any, ...], keywords: Mapping[str, Any], result: Any) -> None:
+        data = model_and_data(args, keywords)[1]
+        extent = self._extents.get(id(data))
+        if extent is not None and extent.of() is data:
+            extent.cover(data)
+            self._remember(extent, data)
+
+    def _remember(self, extent: _Extent, data: Any) -> None:
+        extent.time = data.time
+        extent.states = states = _states(data)
+        if len(self._known_hashes) < _MOST_KNOWN:
+            self._known_hashes.update(hash((i, state)) for i, state in enumerate(states))
 
     def _find_new(self, field: int, array: Any, before: bytes | None, begins: bool) -> Any:
         """A mask of the numbers of a field that belong to an initial state."""

@@ -19,7 +19,6 @@ import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import assert_never
 
 from msgspec.structs import replace
 
@@ -86,8 +85,6 @@ class States:
                 return self._installed.version(need.name)
             case Kind.PLACE:
                 return dict(self.places).get(need.name, "")
-            case _:
-                assert_never(need.kind)
 
 
 class RunStore:
@@ -253,8 +250,6 @@ class RunStore:
                     continue
                 case Kind.SOUGHT | Kind.MODULE | Kind.PLACE:
                     continue
-                case _:
-                    assert_never(dependency.kind)
             if digests.changed_since(path, since):
                 return _REASON.format(path.removeprefix(f"{self.states.root}/"))
         return ""

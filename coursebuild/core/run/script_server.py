@@ -312,6 +312,10 @@ class _Work:
         if len(err) == STDERR_KEPT:  # a letter may be cut in two
             err = err[next((i for i in range(4) if err[i] & 0xC0 != 0x80), 0) :]
         named_figures = zip(job.figures, figures, strict=False)
+        # The output of a part that is not reached begins, empty, at the end.
+        count = len(job.part_lines)
+        offsets = [*report.part_starts, *[len(out)] * count][:count]
+        befores = (out[:offset].decode("utf-8", "ignore") for offset in offsets)
         run = ScriptRun(
             job.path,
             outcome,
@@ -322,7 +326,7 @@ class _Work:
             missing=report.missing,
             trace=read_records(trace, str(self.root), job.path) if trace else None,
             figures=tuple((name, data) for name, data in named_figures if data is not None),
-            part_starts=_places_in_text(report.part_starts, out, len(job.part_lines)),
+            part_starts=tuple(len(before.replace("\r\n", "\n")) for before in befores),
         )
         if self.sandbox is not None and run.trace is not None:
             reason = run.trace.opaque or sandbox_difference(job, run.trace, self.sources)
@@ -335,10 +339,3 @@ class _Work:
     def _finish(self, index: int, run: ScriptRun) -> None:
         self.runs[index] = run
         self.on_finish(run)
-
-
-def _places_in_text(offsets: Sequence[int], data: bytes, count: int) -> tuple[int, ...]:
-    """Where the output of `count` parts begins in the text; that of parts not reached is empty."""
-    offsets = [*offsets, *[len(data)] * count][:count]
-    befores = (data[:offset].decode("utf-8", "ignore") for offset in offsets)
-    return tuple(len(before.replace("\r\n", "\n")) for before in befores)

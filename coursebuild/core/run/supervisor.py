@@ -142,7 +142,14 @@ class _Supervisor:
     def work(self) -> ScriptProcess | None:
         """Serve until the input closes; in the process of a script, return the script."""
         while True:
-            self._wait_for_job()
+            # A signal between Python's last look for one and the call that waits would not end a
+            # read.
+            poll = select.poll()
+            for fd in (self.jobs, self.awake):
+                poll.register(fd, select.POLLIN)
+            while self.jobs not in dict(poll.poll()):
+                with contextlib.suppress(BlockingIOError):
+                    os.read(self.awake, 4096)
             with open(self.jobs, "rb", closefd=False) as pipe:  # no job follows before the report
                 header = pipe.read(LENGTH.size)
                 length = LENGTH.unpack(header)[0] if len(header) == LENGTH.size else -1
@@ -155,18 +162,6 @@ class _Supervisor:
             if isinstance(answer, ScriptProcess):
                 return answer
             _send(self.reports, answer)
-
-    def _wait_for_job(self) -> None:
-        """Wait for a job, or the end of the input.
-
-        A signal between Python's last look for one and the call that waits would not end a read.
-        """
-        poll = select.poll()
-        for fd in (self.jobs, self.awake):
-            poll.register(fd, select.POLLIN)
-        while self.jobs not in dict(poll.poll()):
-            with contextlib.suppress(BlockingIOError):
-                os.read(self.awake, 4096)
 
     def _serve(self, job: Job) -> bytes | ScriptProcess:
         """The report on a script; in the process of the script, the script itself."""

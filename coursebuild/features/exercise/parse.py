@@ -35,7 +35,7 @@ from coursebuild.features.exercise.model import (
 )
 from coursebuild.features.exercise.schema import ExerciseFile, HiddenTrial
 from coursebuild.features.lab.model import SIMLAB, Entry, Lab
-from coursebuild.features.lab.relations import check_axes
+from coursebuild.features.lab.relations import check_axes, check_bounds
 from coursebuild.features.lab.schema import Button, Readout, SimLab
 
 
@@ -107,9 +107,7 @@ def _check(
         if not isinstance(trial, HiddenTrial):
             continue
         yield from require_one_of(trial_node, HiddenTrial, ("min", "max"), only=False)
-        if trial.min is not None and trial.max is not None and trial.min > trial.max:
-            message = f"`max` must be at least `min`, which is {trial.min:g}"
-            yield diagnose("field-value", trial_node.place("max"), message)
+        yield from check_bounds(trial_node, trial.min, trial.max)
     known_names = [name for name, _ in places]
     for attempt in node.objects("wrong"):
         fails = attempt.get("fails")

@@ -12,7 +12,7 @@ from coursebuild.features.lab import page
 from coursebuild.features.lab.compile import lab_trials, trial_inputs
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.parse import parse_fence
-from coursebuild.features.lab.relations import check_labs, check_legends, check_model_names
+from coursebuild.features.lab.relations import check_labs, check_model_names
 from coursebuild.features.lab.reply import publish_labs
 from coursebuild.features.lab.schema import OdeLab, PlotLab, SimLab, refine_schema
 
@@ -50,7 +50,6 @@ FEATURE = Feature(
     model_part=ModelPart(
         values=page.model_view, draw=page.draw_model, opens=True, picture=page.model_picture
     ),
-    summary=check_legends,
     check=check_labs,
     check_models=check_model_names,
     parts=(_LIVE,),

@@ -31,15 +31,7 @@ from coursebuild.api import (
 )
 from coursebuild.core.model import ModelTarget
 from coursebuild.core.pages.library import BY_LAB
-from coursebuild.core.pages.marks import (
-    code_span,
-    escape_line,
-    escape_marks,
-    fence,
-    link,
-    picture,
-    table,
-)
+from coursebuild.core.pages.marks import escape_marks, link, picture
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.lab.engines.native import LAB_ENGINE
@@ -97,11 +89,6 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
     opens_page = page.document.blocks[:1] == (block,)
     if view.key and page.inputs.address:  # leads from paper to the lab
         address = f"{page.inputs.address}#{quote(view.key)}"
-    if block.kind != MJCF or block.xml is None:
-        source = Markup("")
-    else:
-        html = page.highlight("xml", block.xml.text.rstrip("\n"))
-        source = page.template("blocks/code.html", language="xml", html=html)
     return page.template(
         "lab/lab.html",
         lab=view,
@@ -118,9 +105,17 @@ def draw_lab(page: PageContext, block: Lab) -> Markup:
             (entry.overlay, page.inlines(text))
             for entry, text in zip(block.fields.legend, block.legend, strict=True)
         ],
-        source=source,
+        source=_source(page, block),
         note=page.blocks(block.note),
     )
+
+
+def _source(page: PageContext, block: Lab) -> Markup:
+    """The model that a reader edits."""
+    if block.kind != MJCF or block.xml is None:
+        return Markup("")
+    html = page.highlight("xml", block.xml.text.rstrip("\n"))
+    return page.template("blocks/code.html", language="xml", html=html)
 
 
 def page_view(page: PageContext, block: Lab) -> LabView:
@@ -341,40 +336,14 @@ def lab_markdown(writer: MarkdownWriter, lab: Lab) -> str:
     """Write a lab as its trial recorded it, with a link to where it runs."""
     words, view = writer.words, page_view(writer.page, lab)
     parts = [f"**{words('lab.label')}: {escape_marks(view.title)}**"]
-    if view.recorded is not None:
+    if view.recorded is not None and view.recorded.record.scale is None:
+        # Plots, which the page has as drawings
         parts.append(picture(view.recorded.alt, writer.locate(view.recorded.picture)))
-        if readouts := view.recorded.record.readouts:
-            rows = [(escape_line(label), escape_line(value)) for label, value in readouts]
-            parts += [
-                f"{escape_marks(view.recorded.at)}:",
-                table((words("lab.readouts"), ""), rows),
-            ]
+    values = {"lab": view, "source": _source(writer.page, lab), "goal": "", "opens_page": False}
+    static = writer.page.template("lab/static.html", **values, copied=True)
+    parts.append(writer.html(static))
     if lab.goal:
         parts.append(f"**{words('lab.goal')}:** {writer.inlines(lab.goal)}")
-    text = f"{escape_marks(view.subject)}."
-    if view.model is not None:
-        name = link(escape_marks(view.model), writer.locate(view.model_href))
-        text = f"{escape_marks(view.subject)} {name}."
-    if view.start:
-        text += f" {words('lab.start')} {code_span(view.start)}."
-    if view.stop is not None:
-        text += f" {words('lab.stops', t=view.stop)}"
-    text += f" {escape_marks(view.still)}" if view.still else ""
-    parts.append(text)
-    if lab.kind == MJCF and lab.xml is not None:
-        parts.append(fence("xml", lab.xml.text))
-    if view.controls:
-        rows = [(escape_line(label), escape_line(values)) for label, values in view.controls]
-        parts.append(table((words("lab.control"), words("lab.range")), rows))
-    texts = writer.page.renderer.words
-    displays = list(view.plots)
-    if view.readouts and view.recorded is None:
-        displays.insert(0, (texts("lab.readouts"), view.readouts))
-    if view.overlays:
-        displays.append((texts("lab.overlays"), view.overlays))
-    parts.append(
-        "\n".join(f"- {escape_marks(n)}: {escape_marks(', '.join(p))}" for n, p in displays)
-    )
     parts += ["\n".join(f"- {writer.inlines(text)}" for text in lab.legend)]
     parts += [writer.blocks(lab.note), link(words("exports.run_lab"), writer.live)]
     return "\n\n".join(filter(None, parts))

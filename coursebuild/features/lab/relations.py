@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from xml.etree.ElementTree import Element, tostring
 
 from msgspec import Struct
 
@@ -17,15 +16,12 @@ from coursebuild.api import (
     Diagnostic,
     Document,
     FeatureBlock,
-    Mathml,
     ModelFacts,
-    Parsed,
     diagnose,
     did_you_mean,
     find_blocks,
     model,
 )
-from coursebuild.core.checks.formulas import parse_mathml
 from coursebuild.core.run.mjcf import read_tags
 from coursebuild.core.syntax.decode import check_unique, require_one_of
 from coursebuild.core.syntax.fence import with_units
@@ -39,7 +35,7 @@ from coursebuild.core.syntax.nodes import (
 )
 from coursebuild.core.text.quantities import unit_of_header
 from coursebuild.features.lab.model import BUILT_IN_KINDS, LONGEST_MODEL, Lab
-from coursebuild.features.lab.schema import Button, Expect, Select, SimLab, Slider
+from coursebuild.features.lab.schema import Button, CurveClaim, Expect, Select, SimLab, Slider
 
 Structs = Mapping[ObjectNode, Struct]
 Controls = Mapping[str, Struct | None]
@@ -59,16 +55,7 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
         claim = structs.get(claim_node)
         if not isinstance(claim, Expect):
             continue
-        yield from require_one_of(claim_node, Expect, ("expr", "diverges"))
-        if claim.expr is not None:
-            yield from require_one_of(claim_node, Expect, ("min", "max"), only=False)
-        elif claim.min is not None or claim.max is not None:
-            name = "min" if claim.min is not None else "max"
-            message = f"`{name}` bounds an `expr`, and this claim has none"
-            yield diagnose("field-value", claim_node.place(name), message)
-        if claim.min is not None and claim.max is not None and claim.min > claim.max:
-            message = f"`max` must be at least `min`, which is {claim.min:g}"
-            yield diagnose("field-value", claim_node.place("max"), message)
+        yield from check_claim(claim_node, claim)
         if (after := claim_node.get("after")) is not None:
             yield from check_steps(after, "after", controls)
     start = node.get("start")
@@ -86,6 +73,25 @@ def check_lab(node: ObjectNode, structs: Structs) -> Iterator[Diagnostic]:
                     message = f"`t` must be at least that of the entry before, {before:g}"
                     yield diagnose("field-value", time.mark, message)
                 before = time.value
+
+
+def check_claim(node: ObjectNode, claim: Expect | CurveClaim) -> Iterator[Diagnostic]:
+    """Check that a claim says one thing, which can be."""
+    yield from require_one_of(node, type(claim), ("expr", "diverges"))
+    if claim.expr is not None:
+        yield from require_one_of(node, type(claim), ("min", "max"), only=False)
+    elif claim.min is not None or claim.max is not None:
+        name = "min" if claim.min is not None else "max"
+        message = f"`{name}` bounds an `expr`, and this claim has none"
+        yield diagnose("field-value", node.place(name), message)
+    yield from check_bounds(node, claim.min, claim.max)
+
+
+def check_bounds(node: ObjectNode, least: float | None, most: float | None) -> Iterator[Diagnostic]:
+    """Check that a value can lie between `min` and `max`."""
+    if least is not None and most is not None and least > most:
+        message = f"`max` must be at least `min`, which is {least:g}"
+        yield diagnose("field-value", node.place("max"), message)
 
 
 def known_controls(node: ObjectNode, structs: Structs) -> Controls:
@@ -241,35 +247,6 @@ def is_editable(model: str) -> bool:
     """Whether a model needs no other files, and is not too long for an editor."""
     names = (name for tag in read_tags(model) for name, *_ in tag.attributes)
     return len(model) <= LONGEST_MODEL and not any(name.startswith("file") for name in names)
-
-
-_SCRIPTED = ("msub", "msubsup", "mover", "munder", "munderover")
-"""Elements whose first part is no symbol by itself; site/js/lab/page/legend.js has them too."""
-
-
-def check_legends(document: Document, mathml: Mathml) -> Parsed[None]:
-    """Report symbols of legends that stand in no other formula of the text."""
-    texts = [text for lab in find_blocks(document, Lab) for text in lab.legend]
-    firsts = (next((i for i in text if isinstance(i, model.Math)), None) for text in texts)
-    symbols = [symbol for symbol in firsts if symbol is not None]
-
-    def parts(element: Element) -> Iterator[bytes]:
-        for i, part in enumerate(element):
-            if i > 0 or element.tag not in _SCRIPTED:
-                yield tostring(part)
-            yield from parts(part)
-
-    def symbols_of(formula: model.Math | model.MathBlock) -> Iterator[bytes]:
-        root = parse_mathml(mathml(formula.tex.text, formula.display))
-        return iter(()) if root is None else parts(root[0])
-
-    formulas = (f for _, f in model.find_formulas(document) if f not in symbols) if symbols else ()
-    vocabulary = {b"", *(symbol for formula in formulas for symbol in symbols_of(formula))}
-    unused = [s.tex for s in symbols if next(symbols_of(s), b"") not in vocabulary]
-    message = "no other formula of this text has `${}$`"
-    return Parsed(
-        None, tuple(diagnose("lab-name", s.span(), message.format(s.text)) for s in unused)
-    )
 
 
 def check_model_names(

@@ -442,7 +442,7 @@ class OdeLab(EquationLab, frozen=True, kw_only=True):
     """A `lab ode`: equations that are solved."""
 
     t: Annotated[Axis, Meta(description="the time")]
-    states: Annotated[dict[str, State], Meta(description="the states by their names")]
+    states: Annotated[dict[str, State], Meta(min_length=1, description="the states by their names")]
     events: Annotated[tuple[Event, ...], Meta(description="what happens on the way")] = ()
     plots: Annotated[
         tuple[EquationPlot, ...], Meta(description="the plots; without them, one of all states")

@@ -329,32 +329,22 @@ def references(lab: Lab) -> list[NameReference]:
 
 
 def assignment_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
-    """Report expressions and conditions that assign; an expression may to variables of its own.
-
-    Assigned to on purpose, a condition has parentheses of its own, as is the custom.
-    """
+    """Report expressions that assign to anything but variables of their own."""
     for piece, text in _written_pieces(lab):
+        if piece.form != "expression":
+            continue
         nodes = list(walk(parse(piece.code)))
         declared_names = _declared_names(nodes)
         for node in nodes:
             target = node.child_by_field_name("left") or node.child_by_field_name("argument")
             if node.type not in _CHANGES or target is None:
                 continue
-            outer = node.parent
-            is_condition = (
-                outer is not None
-                and outer.type == "parenthesized_expression"
-                and outer.parent is not None
-                and outer.parent.type in _CONDITIONALS
-            )
             owner = target
             while (inner := owner.child_by_field_name("object")) is not None:
                 owner = inner
-            is_own = piece.form != "expression" or text_of(owner) in declared_names
-            if is_own and not (is_condition and node.type == "assignment_expression"):
+            if text_of(owner) in declared_names:
                 continue
-            name = "a condition" if is_condition else _entry_name(lab, piece.entry)
-            message = f"{name} changes `{text_of(target)}`"
+            message = f"{_entry_name(lab, piece.entry)} changes `{text_of(target)}`"
             operator = next((sign for sign in node.children if sign.type == "="), None)
             place, help = _place_in(text, operator or node), "an expression only reads"
             if operator is not None:
@@ -391,7 +381,6 @@ def parameter_diagnostics(lab: Lab) -> Iterator[Diagnostic]:
 
 
 _CHANGES = ("assignment_expression", "augmented_assignment_expression", "update_expression")
-_CONDITIONALS = ("if_statement", "while_statement", "do_statement")
 
 
 def _declared_names(nodes: Sequence[Node]) -> frozenset[str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, assert_never
+from typing import Any
 from urllib.parse import urlsplit
 
 from markupsafe import Markup
@@ -195,8 +195,6 @@ class _Writer:
                     "task": self.words("package.order"),
                     "options": [(names[i], self._line(question.items[i])) for i in order],
                 }
-            case _:
-                assert_never(question)
 
     def _output(self, question: model.OutputQuestion) -> dict[str, Any] | None:
         answer = output_line(self.page, question)

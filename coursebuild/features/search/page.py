@@ -11,7 +11,7 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from html import unescape
-from typing import Literal, TypeAlias, assert_never
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
@@ -160,8 +160,6 @@ class SectionReader:
                     self.add("output", block.body.text)
             case model.FeatureBlock():
                 kind_of_block(block).index(self, block)
-            case _:
-                assert_never(block)
 
     def _formula(self, tex: str) -> str:
         text, names = plain_formula(tex)

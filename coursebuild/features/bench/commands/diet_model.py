@@ -161,7 +161,12 @@ class Reruns:
             return ""
         with temporary_folder() as folder:
             root = Path(folder).resolve()
-            self._copy_course(root)
+            # Copy the course to another folder, and link what no change concerns
+            for entry in sorted(self.options.root.iterdir()):
+                if entry.name in _COPIED_FOLDERS and entry.is_dir():
+                    shutil.copytree(entry, root / entry.name)
+                elif entry.name not in ("examples", "public") and not entry.name.startswith("."):
+                    (root / entry.name).symlink_to(entry)
             for path, data in files.items():
                 (root / path).write_bytes(data)
             course = load(root).value
@@ -211,14 +216,6 @@ class Reruns:
             record = getattr(output, "record", None), getattr(output, "picture", None)
             outputs[trial.line.name] = (trial.line.status, trial.line.tried, record)
         return outputs
-
-    def _copy_course(self, root: Path) -> None:
-        """Copy the course to another folder, and link what no change concerns."""
-        for entry in sorted(self.options.root.iterdir()):
-            if entry.name in _COPIED_FOLDERS and entry.is_dir():
-                shutil.copytree(entry, root / entry.name)
-            elif entry.name not in ("examples", "public") and not entry.name.startswith("."):
-                (root / entry.name).symlink_to(entry)
 
 
 class DietModel:

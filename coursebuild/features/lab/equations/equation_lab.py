@@ -51,12 +51,6 @@ from coursebuild.features.lab.equations.formula import (
 )
 from coursebuild.features.lab.model import PLOT, Lab, values_in
 
-_MOST_STATES = 20
-_MOST = {
-    "controls": 12, "options": 12, "plots": 6, "traces": 6, "readouts": 20, "events": 20,
-    "expect": 20,
-}  # fmt: skip
-"""How many of each a page can show, and a trial try, without delay."""
 _FOREIGN = ("set", "apply", "init", "reset")
 """Fields of controls that act on a simulation."""
 
@@ -127,11 +121,6 @@ def _common_fields(fields: schema.EquationLab, config: Mapping[str, Any]) -> sch
 def _check(node: ObjectNode, structs: Mapping[ObjectNode, Struct]) -> Iterator[Diagnostic]:
     yield from relations.check_controls(node, structs, ("param",))
     yield from relations.check_axes(node, structs)
-    for owner in (node, *node.objects("controls"), *node.objects("plots")):
-        for name, most in _MOST.items():
-            if (count := len(owner.items(name))) > most:
-                message = f"`{name}` has {count} entries, and may have {most}"
-                yield diagnose("field-value", owner.place(name), message)
     for plot in node.objects("plots"):
         if "points" in plot.members and "x" in plot.members:
             message, help = "points belong to the axis of the lab", "leave `x` out"
@@ -190,9 +179,6 @@ class _Compiler:
         for member in state_nodes.values():
             self.declare(member.key.value, member.key.span)
         self.varying = set(self.slots.values())
-        if self.kind != PLOT and not 0 < len(state_nodes) <= _MOST_STATES:
-            message = f"a lab has 1 to {_MOST_STATES} states, and this one {len(state_nodes)}"
-            self.report("field-value", node.place("states"), message)
         for control in node.objects("controls"):
             parameter = control.get("param")
             if isinstance(parameter, StringNode):
@@ -363,16 +349,7 @@ class _Compiler:
 
     def claim(self, node: ObjectNode, controls: list[dict[str, Any]]) -> dict[str, Any]:
         claim = self.fields.expect[self.node.objects("expect").index(node)]
-        for name, is_due in (("expr", not claim.diverges), ("diverges", claim.expr is None)):
-            if (name in node.members) != is_due:
-                message = "a claim has either an `expr` with `min` or `max`, or `diverges`"
-                self.report("field-value", node.mark, message)
-                break
-        if claim.expr is not None and claim.min is None and claim.max is None:
-            self.report("field-missing", node.mark, "`min` or `max` is missing")
-        elif claim.min is not None and claim.max is not None and claim.min > claim.max:
-            message = f"`max` must be at least `min`, which is {claim.min:g}"
-            self.report("field-value", node.place("max"), message)
+        self.diagnostics += relations.check_claim(node, claim)
         value = None if claim.expr is None else self.formula(node.get("expr"))
         data: dict[str, Any] = to_builtins(claim)
         return data | {"value": value, "values": _values(controls, claim.after)}
