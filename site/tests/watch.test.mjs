@@ -108,3 +108,20 @@ test('too little memory for contacts is told', (t) => {
     assert.match(error.message, /memory|stack|arena/i)
   }
 })
+
+test('what is read from memory is what the bindings say, also where these cannot write it', (t) => {
+  const prototype = engine.mj.MjData.prototype
+  const property = Object.getOwnPropertyDescriptor(prototype, 'ncon')
+  Object.defineProperty(prototype, 'ncon', { ...property, set: undefined })
+  t.after(() => Object.defineProperty(prototype, 'ncon', property))
+  const lab = labOf(t, engine, FALLING.replace('<worldbody>', '<worldbody><geom type="plane" size="1 1 .1" pos="0 0 -1"/>'))
+  lab.start()
+  const { numbers } = lab.watch
+  const contacts = new Set()
+  for (let i = 0; i < 400; i++) {
+    lab.step(5)
+    contacts.add(numbers.contacts)
+    assert.deepEqual([numbers.time, numbers.contacts], [lab.data.time, lab.data.ncon])
+  }
+  assert.ok(contacts.size > 1)
+})

@@ -126,7 +126,7 @@ def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folde
     assert 'id="measured"' in cup, "so that links to it hold"
     whole, tables, alone = course.figures()
     assert '<a href="../models/box.html#measured-swing">box</a>: A pendulum swings' in whole
-    assert whole.count("<svg>") == 4 and '<details class="more-figures">' in whole
+    assert whole.count("<svg>") == 2 and '<details class="more-figures">' in whole
     assert "RK4 at 20 ms costs 0.39 times as much" in whole
     assert "coursebuild bench" not in whole and "NumPy 2.3.0" in whole
     assert "#measured-awkward" in tables and "<svg>" not in tables and "more-figures" not in tables
@@ -152,7 +152,7 @@ def test_report_is_in_markdown_notebook_ebook_and_search(course: Course) -> None
     assert course.folder.main("export", "epub").status == 0
     with zipfile.ZipFile(course.folder.root / "course.epub") as book:
         texts = [book.read(n).decode() for n in book.namelist() if n.endswith(".xhtml")]
-    assert sum(text.count('class="work-precision"') for text in texts) == 2
+    assert sum(text.count('class="work-precision"') for text in texts) == 1
     assert not any("plot-wide" in text for text in texts)
 
 

@@ -31,8 +31,8 @@ export class StepNumbers {
     this.ints = new Int32Array(0)
     this.doubles = new Float64Array(0)
     for (let i = 0; i < this.count; i++) this.verify(vector, i)
-    this.contactsAt = this.find('ncon', this.words(), 0x5eedbeef)
-    this.timeAt = this.find('time', this.doubles, Math.PI * 1e-300)
+    this.contactsAt = this.find('ncon')
+    this.timeAt = this.find('time') / 2
   }
 
   verify(vector, i) {
@@ -44,13 +44,17 @@ export class StepNumbers {
     copy.delete()
   }
 
-  /** Where a number of the data lies, which is found by writing one through the bindings. */
-  find(name, array, marker) {
+  /** The word whose change the bindings read in a number of the data. */
+  find(name) {
+    const words = this.words()
     const before = this.data[name]
-    this.data[name] = marker
-    const index = array.indexOf(marker)
-    this.data[name] = before
-    if (index < 0 || array[index] !== before) throw new EngineError(WRONG, true)
+    const index = words.findIndex((word, i) => {
+      words[i] = word + 1
+      const isPart = this.data[name] !== before
+      words[i] = word
+      return isPart
+    })
+    if (index < 0) throw new EngineError(WRONG, true)
     return index
   }
 
