@@ -134,7 +134,7 @@ def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folde
     assert 'aria-label="Settings: A pendulum swings"' in alone
     pairs = re.findall(r'aria-labelledby="(_bench[^"]*)"', lesson)
     names = {name for pair in pairs for name in pair.split()}
-    assert len(names) == 8 and all(lesson.count(f'id="{name}"') == 1 for name in names)
+    assert len(names) == 4 and all(lesson.count(f'id="{name}"') == 1 for name in names)
     anchors = re.findall(r'id="(measured[^"]*)"', page)
     assert anchors == ["measured", "measured-swing", "measured-awkward"]
     assert "1.2" in page.split('id="used"')[1], "the lesson uses the model"
