@@ -37,9 +37,9 @@ ELSEWHERE = {
     # The process of a script becomes what the map names for its language.
     ("coursebuild/core/run/script_process.py", "os.execvp"),
     ("coursebuild/core/run/script_process.py", "subprocess"),
-    # mjbench imports nothing of coursebuild: an engine, an exact motion, the processor's name.
-    ("mjbench/mjbench/engines/child.py", "subprocess"),
-    ("mjbench/mjbench/host.py", "subprocess"),
+    # mjbench imports nothing of coursebuild: an engine, whose Python takes nothing from the folder
+    # since the command has set `PYTHONSAFEPATH`, and the processor's name.
+    ("mjbench/mjbench/engines/child.py", "multiprocessing"),
     ("mjbench/mjbench/machine.py", "subprocess"),
 }
 """Other places where a process may begin: files, and what they use."""
