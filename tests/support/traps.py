@@ -58,7 +58,11 @@ COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "update": (("update",),),
 }
 """Each command with the options by which it does something else."""
-OF_MJBENCH = (("--help",), ("models/box.xml", "--quick"), ("diet", "models/box.xml", "--quick"))
+OF_MJBENCH = (
+    ("--help",),
+    ("models/box.xml", "--quick", "--engines", "threads"),
+    ("diet", "models/box.xml", "--quick"),
+)
 """Commands of mjbench, which are given without a course as well."""
 LESSON = f"""{GOOD}
 Text with `numpy.sqrt`, `mujoco.mj_step` and $x^2$, about the [box](model:box).
