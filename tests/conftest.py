@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
     from support.built_sites import BuiltCourses
-    from support.scratch_course import Folder, Make
+    from support.scratch_course import Make
 
 # No deadlines: a slow machine is no mistake. A change is judged by the same examples each time;
 # `make test-slow` tries new ones.
@@ -103,15 +103,10 @@ def built_courses(shared: Path, stores: Path) -> BuiltCourses:
 
 @pytest.fixture
 def make(tmp_path: Path, stores: Path) -> Make:
-    """Makes a course of these lessons, in a folder whose name has unusual characters."""
-    from support.scratch_course import Folder
+    """Makes a course of these lessons."""
+    from support.scratch_course import maker
 
-    def make(*lessons: str | bytes, name: str = "a cöurse") -> Folder:
-        folder = Folder(tmp_path / name)
-        folder.fill(lessons, stores)
-        return folder
-
-    return make
+    return maker(tmp_path, stores)
 
 
 @pytest.fixture(scope="session")

@@ -200,7 +200,18 @@ class Folder:
 
 
 Make = Callable[..., Folder]
-"""Makes a course of lessons; see the fixture `make`."""
+"""Makes a course of lessons; see `maker`."""
+
+
+def maker(parent: Path, stores: Path) -> Make:
+    """Return what makes a course of lessons, in a folder whose name has unusual characters."""
+
+    def make(*lessons: str | bytes, name: str = "a cöurse") -> Folder:
+        folder = Folder(parent / name)
+        folder.fill(lessons, stores)
+        return folder
+
+    return make
 
 
 def command(*arguments: str) -> list[str]:

@@ -253,10 +253,13 @@ class BoundNumber(Struct, frozen=True, dict=True):
         """
         binding, texts = self.binding, [text for group in self.groups for text in group]
         number_text = BoundText.of(binding.text, binding.comma, may_join=True)
-        for comma in {binding.comma, False}:
+        for comma in (False, binding.comma):
             several = BoundText.of(binding.text, comma)
-            may_be_list = len(several.numbers) > len(number_text.numbers)  # not `4,096`
-            if may_be_list and several.is_in(self.recorded) and not number_text.is_in(texts):
+            if (
+                len(several.numbers) > len(number_text.numbers)  # not `4,096`
+                and several.is_in(self.recorded)
+                and not number_text.is_in(texts)
+            ):
                 return several
         return number_text
 

@@ -25,6 +25,7 @@ from support.scratch_course import (
     Make,
     block,
     kill_at_end,
+    maker,
     wait_until_alone,
     without_seconds,
 )
@@ -106,12 +107,7 @@ def address(tmp_path_factory: pytest.TempPathFactory, path: str) -> Iterator[str
 
 @pytest.fixture
 def make(tmp_path: Path, stores: Path) -> Make:
-    def make(*lessons: str | bytes, name: str = "a cöurse") -> Folder:
-        folder = Folder(tmp_path / name)
-        folder.fill(lessons, stores)
-        return folder
-
-    return make
+    return maker(tmp_path, stores)
 
 
 @pytest.fixture
