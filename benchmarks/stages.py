@@ -37,7 +37,7 @@ from coursebuild.core.pages.page_writer import draw
 from coursebuild.core.pages.record import record
 from coursebuild.core.run import gate
 from coursebuild.core.run.script_environment import cpu_name
-from coursebuild.core.run.v8 import MathEngine
+from coursebuild.core.run.typesetting import MathEngine
 from coursebuild.core.syntax import python_syntax
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.python_code import find_imports
@@ -180,8 +180,7 @@ def measure_stages(course: Course, results: Results, root: Path, repeat: int) ->
 def typeset(course: Course) -> tuple[tuple[Formula, str | MathError], ...]:
     """The formulas of a course with their MathML, from a fresh engine."""
     formulas = tuple(dict.fromkeys(f for d in course.documents for f in document_formulas(d)))
-    with MathEngine() as engine:
-        return tuple(zip(formulas, engine.typeset(formulas), strict=True))
+    return tuple(zip(formulas, MathEngine().typeset(formulas), strict=True))
 
 
 def measure_lessons(course: Course, results: Results, repeat: int) -> None:

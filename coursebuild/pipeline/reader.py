@@ -62,7 +62,7 @@ from coursebuild.pipeline.requests import (
 )
 
 if TYPE_CHECKING:
-    from coursebuild.core.run.v8 import MathEngine
+    from coursebuild.core.run.typesetting import MathEngine
 
 Value = TypeVar("Value")
 
@@ -116,13 +116,6 @@ class Reader:
         self.close()
 
     def close(self) -> None:
-        """End the workers, and what typesets formulas: with it running, a process may hang."""
-        self.stop_workers()
-        if self._engine is not None:
-            self._engine.close()
-            self._engine = None
-
-    def stop_workers(self) -> None:
         """End the workers, which frees their memory with the documents that they have read."""
         if self._workers is not None:
             self._workers.close()
@@ -211,12 +204,8 @@ class Reader:
         missing = [text for text in texts if summaries[text.key] is None]
         if len(missing) >= _MIN_PARALLEL:
             # What is imported here, worker processes share, and what is prepared at its first use.
-            from coursebuild.core.run.v8 import start
-
-            document = missing[0].parse().value
+            self._whole_document(missing[0])
             highlight_lines("python", "x")
-            if document_formulas(document):
-                start()
         answers = self._answer_all("reading lessons and pages", iter(missing))
         for text, (summary, worker) in zip(missing, answers, strict=True):
             assert isinstance(summary, DocumentSummary)
@@ -287,7 +276,7 @@ class Reader:
         if not new:
             return {formula: mathml_before[formula] for formula in formulas}
         if self._engine is None:
-            from coursebuild.core.run.v8 import MathEngine
+            from coursebuild.core.run.typesetting import MathEngine
 
             self._engine = MathEngine()
         mathml = {**mathml_before, **dict(zip(new, self._engine.typeset(new), strict=True))}

@@ -128,7 +128,7 @@ class Site:
         all_pages = tuple(self._pages.values())
         if entries is None and all_pages != last_pages:
             self._store.put_value(_INDEX, index, all_pages)
-        reader.stop_workers()
+        reader.close()
 
     @property
     def keys(self) -> dict[str, str]:

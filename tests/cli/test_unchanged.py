@@ -235,7 +235,7 @@ def test_a_run_with_nothing_to_do_loads_next_to_nothing_and_says_the_same(make: 
 def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
     """A formula that the lesson had before is not typeset again."""
     folder = make(FIRST)
-    rare = "mujoco numpy fontTools coursebuild.core.run.v8"
+    rare = "mujoco numpy fontTools coursebuild.core.run.typesetting"
 
     def loaded_after(edit: bytes) -> str:
         folder.write(folder.lesson(), folder.read(folder.lesson()) + edit)
@@ -246,7 +246,7 @@ def test_an_edit_loads_nothing_that_few_pages_need(make: Make) -> None:
 
     loaded_after(b"\nIt is $a^2 + 1$.\n")
     assert loaded_after(b"\nIt is $a^2 + 1$.\n") == "[]\n"
-    assert "coursebuild.core.run.v8" in loaded_after(b"\nIt is $a^2 + 2$.\n")
+    assert "coursebuild.core.run.typesetting" in loaded_after(b"\nIt is $a^2 + 2$.\n")
 
 
 @pytest.mark.site

@@ -29,6 +29,11 @@ from support.scratch_course import (
 from support.waiting import wait_until
 
 MAP = "content/course.toml"
+BALL = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+LAB = """```lab
+{"title": "A", "model": "ball", "readouts": [{"label": "t", "expr": "data.time"}]}
+```
+"""
 
 
 def test_a_line_of_megabytes_is_told_and_not_read(make: Make) -> None:
@@ -156,20 +161,21 @@ def test_limits_of_files_are_told_and_as_many_as_said_are_enough(make: Make) -> 
 
 
 @pytest.mark.site
-def test_too_few_addresses_for_v8_are_told_where_it_is_needed(make: Make) -> None:
-    folder = make(GOOD)
-    folder.write("models/ball.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+def test_where_v8_has_too_few_addresses_all_but_labs_is_made(make: Make) -> None:
+    folder = make(GOOD + "$a_{18}$\n")
+    folder.write("models/ball.xml", BALL)
     status, output = run_limited(folder, "-v 8388608", "build")
     assert status == 0, output
     assert "the pages of models have no labs: V8 needs more than the 8 GiB" in output
+    assert "<msub>" in (folder.root / "public/lessons/1.1-one.html").read_text()
     page = folder.root / "public/models/ball.html"
     assert "data-lab" not in page.read_text()
     assert folder.run("build").status == 0
     assert "data-lab" in page.read_text()
-    folder.write(folder.lesson(1), GOOD + "$a_{18}$\n")
-    status, output = run_limited(folder, "-v 524288", "check")
+    folder.write(folder.lesson(1), GOOD + "$a_{19}$\n\n" + LAB)
+    status, output = run_limited(folder, "-v 8388608", "check")
     assert status == 2
-    assert "coursebuild: V8 needs more than the 0.5 GiB of address space" in output
+    assert "coursebuild: V8 needs more than the 8 GiB of address space" in output
     assert "`ulimit -v unlimited`" in output
     assert "Traceback" not in output
 
@@ -177,10 +183,8 @@ def test_too_few_addresses_for_v8_are_told_where_it_is_needed(make: Make) -> Non
 @pytest.mark.site
 @pytest.mark.engine
 def test_a_lab_is_tried_without_a_place_for_its_model(make: Make) -> None:
-    lab = '{"title": "A", "model": "ball", "readouts": [{"label": "t", "expr": "data.time"}]}'
-    folder = make(f"{GOOD}```lab\n{lab}\n```\n")
-    ball = "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
-    folder.write("models/ball.xml", ball)
+    folder = make(GOOD + LAB)
+    folder.write("models/ball.xml", BALL)
     status, output = run_limited(folder, "-f 1", "check")
     assert status == 0, output
     assert "1 lab tried: everything holds" in output

@@ -1,10 +1,8 @@
-"""JavaScript in this process: V8 with limits on time and memory, and Temml in it.
+"""JavaScript in this process as a browser runs it: V8 with limits on time and memory.
 
 mini-racer brings V8, which runs scripts in a thread of its own, and notifies an event loop when one
 has ended. Each isolate has such a loop, in one more thread. Both threads end when the isolate is
-closed, so that this process can be forked again. `MathEngine` typesets formulas many at a time, as
-JSON (see `typeset.js`). When a batch exceeds a limit, its isolate is thrown away, and its formulas
-are typeset one by one, to find the one to blame.
+closed, so that this process can be forked again.
 """
 
 from __future__ import annotations
@@ -14,31 +12,20 @@ import atexit
 import contextlib
 import json
 import os
-import re
 import resource
 import threading
 import time
-from collections.abc import Callable, Coroutine, Iterable, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterable
 from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from coursebuild.core.files.errors import EffectError, LackError, lacking
-from coursebuild.core.files.resources import assets_dir
-from coursebuild.core.model.results import Formula, MathError
-from coursebuild.core.text.units import write_quantities
 
-_FLAGS = (
-    "--single-threaded",
-    "--wasm-sync-tier-up",
-    "--no-opt",
-    "--invocation-count-for-maglev=2000",
-)
+_FLAGS = ("--single-threaded", "--wasm-sync-tier-up", "--no-opt")
 """V8 has no threads here to recompile hot WebAssembly, and would stay with its first code, which is
 several times slower; so it recompiles at once, in the same thread. Of the two compilers for hot
-JavaScript the slower one is off: typesetting a course is over before it pays, and takes a fifth
-less without it; the code of labs runs as fast with the other. That one compiles a function only
-after 2,000 calls: as early as V8 does by default, it took a quarter of the time of typesetting."""
+JavaScript the slower one is off: the code of labs runs as fast with the other."""
 _MEMORY = 128
 """MiB of JavaScript objects."""
 _ADDRESSES = 1 << 40
@@ -46,13 +33,6 @@ _ADDRESSES = 1 << 40
 _THREADS = 4
 """Threads that V8 needs beside one for each processor."""
 _START_SECONDS = 20.0
-_BATCH = 100
-"""Formulas at a time; one takes about 0.3 ms."""
-_MOST_REMEMBERED = 2000
-"""Formulas; they take 1 to 2 kB each."""
-_BATCH_SECONDS = 20.0
-_SINGLE_SECONDS = 5.0
-_LONGEST_MESSAGE = 160
 _LOOK = 1.0
 """Seconds between two checks of a script's progress."""
 _SLOWEST = 10.0
@@ -295,81 +275,3 @@ class V8Engine:
         scripts = (path.read_text(encoding="utf-8") for path in self._scripts())
         self._isolate = Isolate(*scripts, memory=self._memory)
         return self._isolate
-
-
-class MathEngine(V8Engine):
-    """Typesets formulas. May be used by several threads, one at a time."""
-
-    def __init__(self) -> None:
-        typeset = Path(__file__).with_name("typeset.js")
-        super().__init__(_MEMORY, lambda: (assets_dir() / "temml" / "temml.min.js", typeset))
-        self._mathml: dict[Formula, str] = {}
-        """Of formulas typeset before: half of those of a text stand in another one, too."""
-        self._lock = threading.Lock()
-
-    def typeset(self, formulas: Sequence[Formula]) -> list[str | MathError]:
-        """The MathML of each formula, or why there is none; no macro outlives its formula.
-
-        Raises:
-            EffectError: Temml or V8 is not installed.
-        """
-        with self._lock:
-            results: dict[Formula, str | MathError] = {
-                formula: self._mathml[formula] for formula in formulas if formula in self._mathml
-            }
-            new = [formula for formula in dict.fromkeys(formulas) if formula not in results]
-            for start in range(0, len(new), _BATCH):
-                batch = new[start : start + _BATCH]
-                results.update(zip(batch, self._batch(batch), strict=True))
-            if len(self._mathml) > _MOST_REMEMBERED:
-                self._mathml.clear()
-            # Not an error: a formula that took too long may not do so again.
-            self._mathml |= {f: html for f in new if isinstance(html := results[f], str)}
-            return [results[formula] for formula in formulas]
-
-    def _batch(self, formulas: Sequence[Formula]) -> Iterator[str | MathError]:
-        jobs = [
-            {"tex": write_quantities(f.tex), "source": f.tex, "display": f.display}
-            for f in formulas
-        ]
-        request = json.dumps(jobs)
-        seconds = _BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS
-        try:
-            replies = json.loads(self._running_isolate().call("typeset", request, seconds))
-            for formula, reply in zip(formulas, replies, strict=True):
-                if isinstance(reply, str):
-                    yield reply
-                    continue
-                position = reply["position"]
-                if position is not None:  # in UTF-16 units
-                    units = formula.tex.encode("utf-16-le", "surrogatepass")[: 2 * position]
-                    position = len(units.decode("utf-16-le", "ignore"))
-                yield MathError(readable(reply["message"]), position)
-        except LimitError as error:
-            self.close()
-            if len(formulas) > 1:
-                for formula in formulas:
-                    yield from self._batch([formula])
-            else:
-                yield MathError(f"the formula {error}", None)
-
-
-_WORDING = (
-    (re.compile(r"^Unsupported function name: "), "unknown command "),
-    (re.compile(r"^Expected 'EOF', got (.*)$", re.DOTALL), r"unexpected \1"),
-    (re.compile(r"^Too many expansions.*$", re.DOTALL), "a macro expands without end"),
-    (re.compile(r"'EOF'"), "the end of the formula"),
-    (re.compile(r"^it "), "the formula "),
-)
-_CAPITAL = re.compile(r"^[A-Z](?=[a-z]*\b)")
-
-
-def readable(message: str) -> str:
-    """Temml's message in our style: lower case, one line, no full stop, not too long."""
-    message = " ".join(message.removeprefix("ParseError:").split())
-    for pattern, words in _WORDING:
-        message = pattern.sub(words, message)
-    message = _CAPITAL.sub(lambda m: m.group().lower(), message)
-    if len(message) > _LONGEST_MESSAGE:
-        message = message[: _LONGEST_MESSAGE - 1] + "…"
-    return message.rstrip(".")

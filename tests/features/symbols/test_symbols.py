@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.model.results import Formula
-from coursebuild.core.run.v8 import MathEngine
+from coursebuild.core.run.typesetting import MathEngine
 from coursebuild.features.symbols import only_symbol, sort_key, symbols
 from support.fixture_cases import check_lines
 
@@ -19,7 +19,7 @@ Typeset = Callable[[str], str]
 
 
 @pytest.fixture(scope="module")
-def typeset() -> Iterator[Typeset]:
+def typeset() -> Typeset:
     engine = MathEngine()
 
     def make(tex: str) -> str:
@@ -27,8 +27,7 @@ def typeset() -> Iterator[Typeset]:
         assert isinstance(mathml, str), mathml
         return mathml
 
-    yield make
-    engine.close()
+    return make
 
 
 def read(mathml: str) -> list[str]:

@@ -1,0 +1,129 @@
+"""Formulas to MathML: Temml in QuickJS, with limits on time and memory.
+
+QuickJS starts within a millisecond, needs no thread and no addresses that it does not use, and may
+be forked; V8, in which labs run, typesets a formula in half the time, but takes as long to start as
+300 formulas take here. Formulas are typeset many at a time, as JSON (see `typeset.js`). When a
+batch exceeds a limit, its context is thrown away, and its formulas are typeset one by one, to find
+the one to blame.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import threading
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.resources import assets_dir
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.text.units import write_quantities
+
+_MEMORY = 128
+"""MiB."""
+_STACK = 1 << 20
+"""Bytes; the stack of a thread is eight times as large, where nobody chose otherwise."""
+_BATCH = 100
+"""Formulas at a time; one takes about 0.3 ms."""
+_MOST_REMEMBERED = 2000
+"""Formulas; they take 1 to 2 kB each."""
+_BATCH_SECONDS = 20
+_SINGLE_SECONDS = 5
+_LONGEST_MESSAGE = 160
+
+
+class MathEngine:
+    """Typesets formulas. May be used by several threads, one at a time."""
+
+    def __init__(self) -> None:
+        self._context: Any = None
+        self._mathml: dict[Formula, str] = {}
+        """Of formulas typeset before: half of those of a text stand in another one, too."""
+        self._lock = threading.Lock()
+
+    def typeset(self, formulas: Sequence[Formula]) -> list[str | MathError]:
+        """The MathML of each formula, or why there is none; no macro outlives its formula.
+
+        Raises:
+            EffectError: Temml or QuickJS is not installed.
+        """
+        with self._lock:
+            results: dict[Formula, str | MathError] = {
+                formula: self._mathml[formula] for formula in formulas if formula in self._mathml
+            }
+            new = [formula for formula in dict.fromkeys(formulas) if formula not in results]
+            for start in range(0, len(new), _BATCH):
+                batch = new[start : start + _BATCH]
+                results.update(zip(batch, self._batch(batch), strict=True))
+            if len(self._mathml) > _MOST_REMEMBERED:
+                self._mathml.clear()
+            # Not an error: a formula that took too long may not do so again.
+            self._mathml |= {f: html for f in new if isinstance(html := results[f], str)}
+            return [results[formula] for formula in formulas]
+
+    def _batch(self, formulas: Sequence[Formula]) -> Iterator[str | MathError]:
+        import quickjs
+
+        jobs = [
+            {"tex": write_quantities(f.tex), "source": f.tex, "display": f.display}
+            for f in formulas
+        ]
+        context = self._context = self._context or _start()
+        context.set_time_limit(_BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS)
+        try:
+            replies = json.loads(context.eval("typeset")(json.dumps(jobs)))
+        except quickjs.JSException as error:  # no formula throws: it is a limit
+            self._context = None
+            if len(formulas) == 1:
+                yield MathError(f"the formula cannot be typeset ({readable(str(error))})", None)
+                return
+            for formula in formulas:
+                yield from self._batch([formula])
+            return
+        for formula, reply in zip(formulas, replies, strict=True):
+            if isinstance(reply, str):
+                yield reply
+                continue
+            position = reply["position"]
+            if position is not None:  # in UTF-16 units
+                units = formula.tex.encode("utf-16-le", "surrogatepass")[: 2 * position]
+                position = len(units.decode("utf-16-le", "ignore"))
+            yield MathError(readable(reply["message"]), position)
+
+
+def _start() -> Any:
+    """A context that knows `typeset`."""
+    try:
+        import quickjs
+    except ImportError as error:
+        message = f"QuickJS cannot be used: {error}"
+        raise EffectError(message, help="run `pip install coursebuild` again") from None
+    context = quickjs.Context()
+    context.set_memory_limit(_MEMORY << 20)
+    context.set_max_stack_size(_STACK)
+    for path in (assets_dir() / "temml" / "temml.min.js", Path(__file__).with_name("typeset.js")):
+        context.eval(path.read_text(encoding="utf-8"))
+    return context
+
+
+_WORDING = (
+    (re.compile(r"^Unsupported function name: "), "unknown command "),
+    (re.compile(r"^Expected 'EOF', got (.*)$", re.DOTALL), r"unexpected \1"),
+    (re.compile(r"^Too many expansions.*$", re.DOTALL), "a macro expands without end"),
+    (re.compile(r"'EOF'"), "the end of the formula"),
+    (re.compile(r"^it "), "the formula "),
+)
+_CAPITAL = re.compile(r"^[A-Z](?=[a-z]*\b)")
+
+
+def readable(message: str) -> str:
+    """Temml's message in our style: lower case, one line, no full stop, not too long."""
+    message = " ".join(message.removeprefix("ParseError:").split())
+    for pattern, words in _WORDING:
+        message = pattern.sub(words, message)
+    message = _CAPITAL.sub(lambda m: m.group().lower(), message)
+    if len(message) > _LONGEST_MESSAGE:
+        message = message[: _LONGEST_MESSAGE - 1] + "…"
+    return message.rstrip(".")
