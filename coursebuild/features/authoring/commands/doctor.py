@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -213,6 +214,8 @@ def _try_code(code: str, **environment: str) -> str:
     if trial.status == 0:
         return ""
     line = trial.last_line()
-    if "can't start new thread" in line:
-        raise RuntimeError("can't start new thread")
+    number = re.search(r"\[Errno (\d+)\]", line)
+    error = OSError(int(number[1]), "") if number else RuntimeError(line.rpartition(": ")[2])
+    if lacking(error):
+        raise error
     return line or f"the process ended with status {trial.status}"
