@@ -349,9 +349,6 @@ def _card(compiled_model: CompiledModel, host: Host) -> SceneCard:
     first = compiled_model.scenarios[0].scenario
     key = None if first.keyframe < 0 else first.keyframe
     return SceneCard(
-        bodies=int(model.nbody) - 1,
-        geoms=int(model.ngeom),
-        freedom=int(model.nv),
         possible=len(possible_pairs(model)),
         touched=len(touching_pairs),
         mjcf=len(subject.mjcf.encode()) + subject.parts,

@@ -19,7 +19,7 @@ import numpy as np
 
 from mjbench.costs import inputs_of
 from mjbench.problem import Array, Inputs
-from mjbench.reports.scene_report import PhaseProfile, WorkPrecisionRow, step_evaluations
+from mjbench.reports.scene_report import PhaseProfile, WorkPrecisionRow
 from mjbench.scene import Scene
 from mjbench.settings import with_setting
 from mjbench.simulation import STATE, full_state, initial_data, silent
@@ -102,7 +102,6 @@ class _Job:
             row=self._number,
             name=self._row.name,
             steps=steps,
-            evaluations=steps * step_evaluations(self._row.setting.integrator),
             step=float(times[_TIMERS.mjTIMER_STEP]),
             phases=phases,
             contacts=(float(counts[:, 0].mean()), int(counts[:, 0].max())),

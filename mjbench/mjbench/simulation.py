@@ -246,16 +246,6 @@ def motion_of(model: Any, states: EngineStates) -> Motion:
     return Motion(states.times, states.qpos[:, places], attitude, states.qvel)
 
 
-def states_of(model: Any, motion: Motion, template: EngineStates) -> EngineStates:
-    """A motion in the engine's coordinates; what it does not hold comes from the template."""
-    places, turns = coordinates(model)
-    qpos = template.qpos.copy()
-    qpos[:, places] = motion.position
-    for index, at in enumerate(turns):
-        qpos[:, at : at + 4] = motion.attitude[:, index]
-    return EngineStates(motion.times, qpos, motion.velocity, template.act)
-
-
 class Run(Struct, frozen=True):
     """A simulation, sampled n times."""
 

@@ -39,9 +39,6 @@ class StabilityTrial(Struct, frozen=True):
     timestep: float
     """s."""
     status: RunStatus
-    growth: float
-    """The factor by which velocities grow in a step, from half the run to its end; NaN where the
-    run was lost before."""
     reason: str = ""
     """Why it was lost."""
     astray: str = ""
@@ -129,7 +126,6 @@ def run_trial(
         {*range(1, _TRANSIENT + 1), *range(0, steps, interval), steps, *commands, *samples}
     )
     passages, astray = Passages(model, setup), ""
-    sizes: list[tuple[int, float]] = []
     limits, count, excess_end, is_lost = setup, 0, 0.0, False
     peak_speed = 0.0
     for stop in (stop for stop in stops if stop <= steps):
@@ -138,7 +134,7 @@ def run_trial(
                 watch_steps(model, data, stop - count, passages)
         except mujoco.FatalError:  # MuJoCo does not run it
             reason = "MuJoCo does not run it"
-            return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan, reason, reason)
+            return StabilityTrial(timestep, RunStatus.DIVERGED, reason, reason)
         count, now = stop, update_peaks(data, Peaks())
         if not count:  # before the first step MuJoCo has computed no energy: it says 0
             now = replace(now, energy=-math.inf)
@@ -158,7 +154,6 @@ def run_trial(
                 astray += _LATE if late and late[0] < data.time else ""
         if stop in commands:
             commands[stop].give(data)
-        sizes.append((count, math.hypot(*data.qvel.tolist())))
     is_lost = is_lost or excess_end > _DECAY * span  # it shot up, and has not come down
     judgement = judge(data, now, setup if is_lost else limits)
     status, reason = judgement.status, "; ".join(judgement.reasons)
@@ -166,7 +161,7 @@ def run_trial(
         status, reason = RunStatus.SLOW_GROWTH, "what shot up in the first steps did not come down"
     through = "; ".join(passages.texts())
     astray = astray or ("it is lost" if is_lost else "")
-    return StabilityTrial(timestep, status, _growth(sizes), reason, astray, through)
+    return StabilityTrial(timestep, status, reason, astray, through)
 
 
 def _nearest_samples(times: Sequence[float], timestep: float) -> dict[int, int]:
@@ -179,14 +174,3 @@ def _nearest_samples(times: Sequence[float], timestep: float) -> dict[int, int]:
     ways = [abs(time - count * timestep) for time, count in zip(times, counts, strict=True)]
     nearest_last = sorted(range(len(times)), key=lambda n: -ways[n])
     return {counts[n]: n for n in nearest_last if counts[n]}
-
-
-def _growth(sizes: list[tuple[int, float]]) -> float:
-    """The factor by which velocities grow in a step, from the middle of a run to its end."""
-    if len(sizes) < 2:
-        return math.nan
-    middle = next(n for n, (count, _) in enumerate(sizes) if 2 * count >= sizes[-1][0])
-    (before, small), (after, large) = sizes[min(middle, len(sizes) - 2)], sizes[-1]
-    if not 0 < small < math.inf or not 0 < large < math.inf:
-        return math.nan
-    return float((large / small) ** (1 / (after - before)))

@@ -105,7 +105,6 @@ def measure_scenario(
         agreement=reference.agreement,
         lyapunov=pilot.lyapunov,
         horizons=None if pilot.lyapunov is None else pilot.horizons,
-        smooth=pilot.smooth,
         notes=tuple(filter(None, notes)),
         overlaps=pilot.overlaps,
         figure=measure.quantity_name(model, scene),
@@ -299,8 +298,7 @@ def _nearby_ratios(
         motions = {}
         for name in {basis.baseline.cone, rival.cone}:
             base = with_setting(model, replace(basis.baseline, cone=name))
-            reference = basis.cones[name].reference
-            exact = known_motion.find_nearby(base, near, reference, quick=quick)
+            exact = known_motion.find_nearby(base, near, quick=quick)
             if exact is None:
                 return None
             motions[name] = exact

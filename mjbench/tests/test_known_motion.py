@@ -161,43 +161,6 @@ def test_an_author_may_choose() -> None:
     assert caught.value.message == "no integration can be the reference: there is contact"
 
 
-SPRING = """\
-<mujoco>
-  <option timestep="0.001"/>
-  <worldbody>
-    <body>
-      <joint type="slide" axis="1 0 0" stiffness="{stiffness}" damping="2"/>
-      <geom size="0.1" mass="1" contype="0" conaffinity="0"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-
-
-def spring(stiffness: float) -> Any:
-    return mujoco.MjModel.from_xml_string(SPRING.format(stiffness=stiffness))
-
-
-def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else() -> None:
-    text = (
-        'name = "a"\nduration = 1\nqpos = [1]\nqvel = [5]\nreference = "closed:damped-spring-0.1"\n'
-    )
-    reference = reference_of(spring(100), text)
-    assert (reference.kind, reference.second) == ("closed", "Bulirsch–Stoer over mj_forward")
-    assert reference.agreement < 1e-11
-    message_of_form = "the closed form of `damped-spring-0.1` is not this scene's motion"
-    fast, coin = text.replace("[5]", "[5.1]"), text.replace("damped-spring-0.1", "coin")
-    for model, toml, message in (
-        (spring(101), text, message_of_form),
-        (spring(100), fast, "the scenario starts differently from"),
-        (pendulum(), coin, "the model has different joints"),
-    ):
-        with pytest.raises(SceneError) as caught:
-            reference_of(model, toml)
-        assert caught.value.message.startswith(message)
-        assert str(caught.value.place) == "models/a.toml: scenario.0.reference"
-
-
 SLIDING = """\
 <mujoco>
   <option timestep="0.002"/>

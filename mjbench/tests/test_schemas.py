@@ -46,8 +46,8 @@ def test_reports_are_as_their_schema_says() -> None:
 
 def test_fields_of_reports_are_described() -> None:
     definitions = schema("reports")["$defs"]
-    row = definitions["BoundaryLine"]["properties"]
-    assert row["growth"]["description"].startswith("The factor by which velocities grew in a step")
+    row = definitions["StableRow"]["properties"]
+    assert row["energy"]["description"].startswith("Most energy that a stable run may have, J")
 
 
 def test_declarations_have_the_fields_of_their_schema() -> None:

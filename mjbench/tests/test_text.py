@@ -82,7 +82,7 @@ def test_a_page_needs_nothing_else_and_escapes_names() -> None:
 
 def finding(kind: str, label: str, time: float | None, **fields: object) -> Finding:
     place = ModelPlace(kind, "mujoco", "arm.xml", 9, 5)
-    edit = TextEdit("arm.xml", 9, 1, 0, 9, "<gyro/>", "")
+    edit = TextEdit("arm.xml", 9, 1, "<gyro/>", "")
     values: dict[str, object] = {
         "kind": kind, "message": f"nothing reads the {kind}", "places": (place,), "label": label,
         "difference": 0.0, "scenarios": ("go",), "proof": "",
@@ -93,8 +93,8 @@ def finding(kind: str, label: str, time: float | None, **fields: object) -> Find
 
 
 def diet(*findings: Finding) -> DietReport:
-    go = DietScenario("go", 10, "ok", ())
-    return DietReport("arm", "0", False, MACHINE, (), (go,), findings, (), None, None, None, ())
+    go = DietScenario("go", "ok", ())
+    return DietReport("arm", "0", False, MACHINE, (go,), findings, (), ())
 
 
 def test_the_diet_names_what_shows_a_saving_and_folds_what_saves_little() -> None:

@@ -22,6 +22,7 @@ from msgspec.structs import asdict, replace
 
 from mjbench.cones import find_references
 from mjbench.costs import Clock, time_jobs
+from mjbench.detector import Peaks, judge
 from mjbench.known_motion import KnownMotion
 from mjbench.measure import energy_drift, errors
 from mjbench.pilot import Pilot, nudges, position_distances, run_pilot
@@ -266,23 +267,16 @@ def judge_motion(basis: EngineBasis, row: EngineRow, motion: EngineMotion) -> En
     times = scenario.times[: len(motion.qpos)]
     qpos, qvel = motion.qpos, motion.qvel
     states = EngineStates(times, qpos, qvel, np.zeros((len(times), int(model.na))))
-    if not (np.isfinite(qpos).all() and np.isfinite(qvel).all()):
-        lost = int(np.argmin(np.isfinite(np.hstack([qpos, qvel])).all(axis=1)))
-        message = f"the state is not finite at {times[lost]:.6g} s"
-        return replace(row, status="diverged", message=message)
     beginning, scratch = initial_data(scenario, model), initial_data(scenario, model)
     moments = [(beginning.qpos, beginning.qvel), *zip(qpos, qvel, strict=True)]
-    table = np.array([invariants(model, scratch, *moment) for moment in moments])
-    energies, setup = table[:, :2], basis.pilot.setup
-    bounds = (
-        ("position", np.abs(qpos).max(), setup.position_bound),
-        ("velocity", np.abs(qvel).max(), setup.velocity_bound),
-        ("energy", energies.sum(axis=1).max(), setup.energy_bound),
-    )
-    for name, size, bound in bounds:
-        if size > bound:
-            message = f"its {name} reaches {size:.3g}, over {bound:.3g}"
-            return replace(row, status="diverged", message=message)
+    with silent():  # of states that are no numbers
+        energies = np.array([invariants(model, scratch, *moment)[:2] for moment in moments])
+    sizes = (np.abs(qpos).max(), np.abs(qvel).max())
+    peaks = Peaks(*map(float, sizes), energy=float(energies.sum(axis=1).max()))
+    beginning.energy[:] = energies[0]
+    judgement = judge(beginning, peaks, basis.pilot.setup)
+    if not judgement.ok:
+        return replace(row, status="diverged", message="; ".join(judgement.reasons))
     exact, count = motion_of(model, reference.states), len(reference.states.times)
     near = errors(motion_of(model, states.head(count)), exact, reference.floor)
     apart = position_distances(model, states.qpos[:count], basis.baseline.qpos[:count])

@@ -30,10 +30,10 @@ from mjbench.scene import Scene, SceneError, scenes
 from mjbench.simulation import (
     STATE,
     advance,
-    advance_watching,
     full_state,
     initial_data,
     integrator_of,
+    simulate,
     with_integrator,
     without_sleep,
 )
@@ -225,32 +225,17 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
             gauge.look(data, twin)
             horizon = float(data.time) if gauge.seen > ALIKE else horizon
     setup = Setup(scenario=scene.scenario)
-    if peaks.sunk > 1:  # small steps say what goes through what, and how fast things are after it
-        passing, fastest = _small_steps(model, scene)
-        setup = replace(setup, passing=passing, velocity_bound=_FASTER * fastest)
+    if peaks.sunk > 1:  # small steps say what goes through what there too
+        step = scene.timestep / _FINER
+        fine = without_sleep(with_integrator(model, integrator_of(model), step))
+        setup = replace(setup, passing=simulate(setup, fine).passing)
         passages.setup = setup
     judgement = judge(data, peaks, setup, passages.texts())
-    observations = frozenset(touching), displacements, speeds, horizon
-    return WatchedRun(scene, judgement, *observations)
+    return WatchedRun(scene, judgement, frozenset(touching), displacements, speeds, horizon)
 
 
 _FINER = 8
 """How many times shorter the steps are that tell a soft contact from a lost run."""
-_FASTER = 2.0
-"""How many times faster than in small steps what went deep may come out again."""
-
-
-def _small_steps(model: Any, scene: Scene) -> tuple[frozenset[tuple[int, int]], float]:
-    """The pairs of geoms that go through each other in small steps, and the largest velocity."""
-    step = scene.timestep / _FINER
-    fine = without_sleep(with_integrator(model, integrator_of(model), step))
-    data, peaks, passages = initial_data(scene.scenario, fine), Peaks(), Passages(fine)
-    for inputs in scene.scenario.inputs(scene.timestep):
-        inputs.give(data)
-        peaks = advance_watching(fine, data, _FINER, peaks, passages)
-        if not peaks.finite:
-            return frozenset(), math.inf
-    return passages.pairs(), peaks.velocity
 
 
 def nearby_scenes(model: Any, run: WatchedRun, count: int) -> Iterator[Scene]:

@@ -10,17 +10,6 @@ RIGHT = 1e-3
 """m or rad: the error at which costs are compared."""
 
 
-class BoundaryLine(scene_report.StableRow, frozen=True):
-    """The largest stable timestep of an integrator, compared with theory."""
-
-    difference: float | None = None
-    """Measured against theory, relative."""
-    beyond: str = ""
-    """The status of the run with the shortest unstable timestep that was tried."""
-    growth: float | None = None
-    """The factor by which velocities grew in a step of that run, where they stayed finite."""
-
-
 class StepCost(Record, frozen=True):
     """The time of a step of an integrator."""
 
@@ -63,7 +52,7 @@ class CaseReport(Record, frozen=True):
     machine: Machine
     note: str
     reference: ReferenceLine
-    boundaries: tuple[BoundaryLine, ...]
+    boundaries: tuple[scene_report.StableRow, ...]
     figures: tuple[scene_report.FigureLine, ...]
     orders: tuple[scene_report.OrderRow, ...]
     errors: tuple[ErrorLine, ...]

@@ -78,10 +78,6 @@ def _summary(report: DietReport, command: str, declarations: str) -> Iterator[st
         yield f"nothing {'else ' if report.findings else ''}in it is proved useless"
     elif report.ok:
         yield "nothing in it is proved useless; what is named above was not needed in what was run"
-    if report.slim is not None and len(faults) > 1:
-        yield f"without all of them: {saving_text(report.slim)}"
-    if report.fixed is not None and 1 < len(fixable) < len(faults):
-        yield f"after --fix: {saving_text(report.fixed)}"
     kinds_by_reason: dict[str, list[str]] = {}
     found_kinds = {finding.kind for finding in report.findings}
     for attempt in report.tried:

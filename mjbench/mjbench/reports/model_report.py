@@ -10,11 +10,6 @@ from mjbench.reports.scene_report import ScenarioReport, SweepReport
 class SceneCard(Record, frozen=True):
     """The size of a model, and how fast the browser's engine runs it."""
 
-    bodies: int
-    """Without the world."""
-    geoms: int
-    freedom: int
-    """Degrees of freedom."""
     possible: int
     """Pairs of geoms between which MuJoCo looks for contact when they are near each other."""
     touched: int

@@ -27,39 +27,17 @@ def profile_text(
     most = f"of the phases {phase} takes the most, {100 * share:.0f} % of a step"
     if rival is None:
         return most
-    often = math.log(rival.evaluations / own_profile.evaluations)
-    times = _evaluation(own_profile), _evaluation(rival)
-    length = math.log(times[1] / times[0]) if all(times) else 0.0
-    if is_alike or max(abs(often), abs(length)) < _ALIKE:
-        return f"{most}; the verdict rests on errors, not on time"
-    if abs(often) < abs(length):
-        change = f"{_text(times[0])} → {_text(times[1])} under {rival.name}"
-        return (
-            f"{most}; the verdict rests on {_changed(own_profile, rival)}: an evaluation {change}"
-        )
-    number = f"{rival.evaluations / own_profile.evaluations:.2g} times as often"
-    text = f"the verdict rests on how often the dynamics are evaluated: {number} under {rival.name}"
-    speed = "takes about as long"
-    if abs(length) >= _ALIKE:
-        speed = f"is {'slower' if length > 0 else 'faster'}, by {_changed(own_profile, rival)}"
-    return f"{most}; {text}, and each {speed}"
-
-
-def _evaluation(profile: PhaseProfile) -> float:
-    """What an evaluation of the forward dynamics takes, with its share of the step, s."""
-    return profile.step * profile.steps / profile.evaluations
-
-
-def _changed(own_profile: PhaseProfile, rival: PhaseProfile) -> str:
-    """The phase with most of the difference, and what it takes of an evaluation in both."""
-    shares = [p.steps / p.evaluations for p in (own_profile, rival)]
-    sign = math.copysign(1.0, _evaluation(rival) - _evaluation(own_profile))
     pairs = {
-        name: (shares[0] * time, shares[1] * rival.phases.get(name, 0.0))
+        name: (own_profile.steps * time, rival.steps * rival.phases.get(name, 0.0))
         for name, time in own_profile.phases.items()
     }
+    before, after = (sum(times) for times in zip(*pairs.values(), strict=True))
+    if is_alike or not (before and after) or abs(math.log(after / before)) < _ALIKE:
+        return f"{most}; the verdict rests on errors, not on time"
+    sign = math.copysign(1.0, after - before)
     phase = max(pairs, key=lambda name: sign * (pairs[name][1] - pairs[name][0]))
-    return f"{phase} ({_text(pairs[phase][0])} → {_text(pairs[phase][1])})"
+    change = " → ".join(map(_text, pairs[phase]))
+    return f"{most}; the verdict rests on {phase}: over the scenario {change} under {rival.name}"
 
 
 def _text(seconds: float) -> str:

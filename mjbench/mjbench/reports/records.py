@@ -319,10 +319,7 @@ def _case(case: CaseReport) -> _Table:
     )
     table: _Table = {("", "case"): {}}
     for line in case.boundaries:
-        figures = _largest(line) | {"beyond": _Figure(status_text(line.beyond))}
-        if line.monotone:
-            figures["growth"] = _Figure(line.growth, share)
-        table[line.integrator, "stable timestep"] = figures
+        table[line.integrator, "stable timestep"] = _largest(line)
     for figure in case.figures:
         exact, value = figure.exact, figure.measured
         figures = {f"exact {figure.name}": _Figure(exact, _TIGHT_BAND)}

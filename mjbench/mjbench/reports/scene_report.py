@@ -288,8 +288,6 @@ class PhaseProfile(Record, frozen=True):
     name: str
     """The setting in words."""
     steps: int
-    evaluations: int
-    """Of the forward dynamics, over the scenario."""
     step: float
     """Wall time of a step, s: of each stretch of steps the quickest of all rounds."""
     phases: Mapping[str, float]
@@ -376,8 +374,6 @@ class ScenarioReport(Record, frozen=True):
     verdict: RowVerdict
     velocity_floor: float = 0.0
     """As `floor`, for velocities: around an impact they are known far worse than places."""
-    smooth: bool = True
-    """Whether accelerations are a smooth function of the state; else there are no orders."""
     notes: tuple[str, ...] = ()
     """Remarks for reading the figures."""
     overlaps: str = ""
