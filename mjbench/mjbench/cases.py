@@ -37,7 +37,7 @@ from mjbench.problem import (
     SecondReference,
     Sizes,
 )
-from mjbench.reports.case_report import (
+from mjbench.reports.model_report import (
     CaseReport,
     ErrorLine,
     ReferenceLine,

@@ -27,10 +27,10 @@ from mjbench.judge import (
     mark_luck,
     rival_row,
 )
+from mjbench.profile import profile_text
 from mjbench.reports import Interval, PartFailure
-from mjbench.reports.case_report import RIGHT, CaseReport
 from mjbench.reports.limits import largest_of, limit_text
-from mjbench.reports.profile_table import profile_text
+from mjbench.reports.model_report import RIGHT, CaseReport
 from mjbench.reports.scene_report import (
     ErrorQuantity,
     MeasuredSetting,

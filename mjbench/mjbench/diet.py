@@ -70,15 +70,15 @@ class DietResult(Struct, frozen=True):
 
 
 def look_at(
-    subject: Subject,
     host: Host,
-    sources: Sequence[ReaderSource] = (),
     *,
+    subject: Subject,
+    readers: Sequence[ReaderSource] = (),
     modules: frozenset[str] = frozenset(),
     keeps: Sequence[Keep] = (),
     locked: Mapping[str, str] | None = None,
     only: Sequence[str] = (),
-    quick: bool,
+    quick: bool = False,
     rerun: bool = False,
 ) -> DietResult:
     """Look at a model; a `CannotMeasureError` where it cannot be done.
@@ -104,8 +104,8 @@ def look_at(
 
     files[subject.path] = subject.mjcf.encode("utf-8", "surrogatepass")
     text = _open_text(subject, read)
-    readers = [reader for source in sources for reader in _read(source, modules)]
-    readers += _declared_readers(declarations)
+    all_readers = [reader for source in readers for reader in _read(source, modules)]
+    all_readers += _declared_readers(declarations)
     with report_errors(subject, _FAILURE, ModelTextError, ValueError):
         survey = Surveyor(
             model=subject.name,
@@ -113,7 +113,7 @@ def look_at(
             machine=this_machine(),
             text=text,
             scenes=pruning_scenes(text.model, declarations, quick=quick),
-            readers=tuple(readers),
+            readers=tuple(all_readers),
             keeps={" ".join(keep.finding.split()): keep for keep in keeps},
             locked=locked or {},
             clock=time.thread_time_ns,

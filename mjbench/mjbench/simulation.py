@@ -41,7 +41,7 @@ _CODE = {
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the next step depends on."""
 _LOOK_INTERVAL = 8
-"""Steps from one look at the state to the next, as a rule."""
+"""Steps from one look at the state to the next: what shoots up takes longer to come back."""
 
 
 @lru_cache(maxsize=64)
@@ -156,27 +156,6 @@ def watch_steps(
                 iterations.append(int(data.solver_niter.sum()))
 
 
-def advance_watching(
-    model: Any,
-    data: Any,
-    steps: int,
-    peaks: Peaks,
-    passages: Passages,
-    iterations: list[int] | None = None,
-) -> Peaks:
-    """Make so many steps; stop once the state is not finite. Returns the updated `peaks`.
-
-    `passages` watches what goes through what. Only one state in a few is looked at, which suffices:
-    what shoots up takes longer to come back.
-    """
-    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    for done in range(0, steps, _LOOK_INTERVAL):
-        if peaks.finite:
-            watch_steps(model, data, min(_LOOK_INTERVAL, steps - done), passages, iterations)
-            peaks = update_peaks(data, peaks, passages.thickness)
-    return peaks
-
-
 def initial_data(scenario: Scenario, model: Any) -> Any:
     """`mjData` in the initial state of a scenario."""
     data = mujoco.MjData(model)
@@ -266,6 +245,7 @@ class Run(Struct, frozen=True):
 def simulate(setup: Setup, model: Any, iterations: list[int] | None = None) -> Run:
     """Run a scenario with a model under its own options; `iterations` as for `watch_steps`."""
     scenario, times = setup.scenario, setup.scenario.times
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     steps = scenario.steps(float(model.opt.timestep))
     data, scratch = initial_data(scenario, model), initial_data(scenario, model)
     qpos, qvel, act = (np.full((len(times), n), np.nan) for n in (model.nq, model.nv, model.na))
@@ -274,7 +254,10 @@ def simulate(setup: Setup, model: Any, iterations: list[int] | None = None) -> R
     peaks, passages = Peaks(penetration=deepest_contact(scratch)), Passages(model, setup)
     for index, inputs in enumerate(scenario.inputs(scenario.sample)):
         inputs.give(data)
-        peaks = advance_watching(model, data, steps, peaks, passages, iterations)
+        for done in range(0, steps, _LOOK_INTERVAL):
+            if peaks.finite:
+                watch_steps(model, data, min(_LOOK_INTERVAL, steps - done), passages, iterations)
+                peaks = update_peaks(data, peaks, passages.thickness)
         if not peaks.finite:
             break
         qpos[index], qvel[index], act[index] = data.qpos, data.qvel, data.act

@@ -50,13 +50,14 @@ from mjbench.stability_runs import (
     STARTS,
     KeptMotion,
     StabilityTrial,
+    bisect,
     kept_motion,
     run_trial,
 )
 
-_REACH, _NEAR = 10.0, 2.0
-"""The grid is tried down to this part of the shortest timestep that is lost; from other starts so
-far below and beyond it."""
+_NEAR = 2.0
+"""How many times below and beyond the shortest timestep that is lost others are tried from starts
+nearby."""
 _GRID, _FINE, _CLOSER = 16, 1e-4, 32
 _QUICK_GRID, _COARSE, _QUICK_CLOSER = 6, 1e-2, 8
 """The timesteps that are tried in a decade, the relative width at which a bisection ends, and the
@@ -236,38 +237,6 @@ def _limit_of(
     largest = bisect(is_lost, steps, max(resolution, _COARSE), math.inf, snap=laboratory.snap)
     lost = [h for h in laboratory.own_steps() if h > largest and is_lost(h)]
     return reach(largest), getattr(laboratory.trial(0, lost[0]), kind) if lost else ""
-
-
-def bisect(
-    is_lost: Callable[[float], bool],
-    grid: Sequence[float],
-    resolution: float,
-    reach: float = _REACH,
-    enough: float = 0.0,
-    snap: Callable[[float], float] = float,
-) -> float:
-    """The largest timestep below which none is lost: infinite for all of the grid, 0 for none.
-
-    The grid is tried from above, down to `1 / reach` of the shortest that is lost, or to `enough`
-    (s) where none is. `snap`: as of a `Laboratory`.
-    """
-    lost = math.inf
-    stable = 0.0
-    for step in reversed(grid):
-        if step < (enough if math.isinf(lost) else lost / reach):
-            break
-        if is_lost(step):
-            lost, stable = step, 0.0
-        elif not stable:
-            stable = step
-    if math.isinf(lost) or not stable:
-        return math.inf if math.isinf(lost) else 0.0
-    while lost / stable > 1 + resolution:
-        middle = snap(math.sqrt(lost * stable))
-        if middle <= stable:  # none that is tried lies between
-            break
-        lost, stable = (middle, stable) if is_lost(middle) else (lost, middle)
-    return stable
 
 
 def _look_closer(

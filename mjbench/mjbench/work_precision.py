@@ -22,7 +22,6 @@ from mjbench import known_motion, measure, simulation
 from mjbench.columns import LOST, WHOLE, Column, row_ratios
 from mjbench.cones import find_references, least_known
 from mjbench.costs import Clock, costs
-from mjbench.delays import loop_note
 from mjbench.derive import derive_charts, derive_failures, derive_profile, derive_scenario
 from mjbench.detector import driving_force
 from mjbench.judge import compared_rows
@@ -39,6 +38,7 @@ from mjbench.reports.shown_errors import (
 from mjbench.scene import Scene, SceneError
 from mjbench.settings import own_setting, settings, with_setting
 from mjbench.stability import stable_rows
+from mjbench.stability_runs import loop_note
 from mjbench.sweep import DrawnModel
 from mjbench.theory_figures import measure_expected
 
@@ -63,7 +63,7 @@ def measure_scenario(
     `tell` gets a line about each stage; `profile`: whether to say where the time goes. A
     `SceneError` where the scenario does not fit the model, or diverges at every timestep.
     """
-    basis = _find_basis(model, scene, quick=quick, tell=tell)
+    basis = find_basis(model, scene, quick=quick, tell=tell)
     pilot, cones, baseline, reference = basis.pilot, basis.cones, basis.baseline, basis.reference
     parts = Parts(tell)
     # A mistake in what is expected is told before all the rest is measured.
@@ -151,7 +151,7 @@ def measure_scenario(
     return report
 
 
-def _find_basis(
+def find_basis(
     model: Any, scene: Scene, *, quick: bool, tell: Callable[[str], None] = lambda _: None
 ) -> Basis:
     """What settings are compared with; a `SceneError` where the scene has no motion."""
@@ -332,7 +332,7 @@ def _measure_draws(basis: Basis, variants: Sequence[DrawnModel], quick: bool) ->
     for part in variants:
         words = f"with {part.text} (drawn) the scene's own setting"
         try:
-            drawn_basis = _find_basis(part.model, scene, quick=quick)
+            drawn_basis = find_basis(part.model, scene, quick=quick)
         except SceneError as error:
             yield _Draw(None, None, f"{words} cannot be measured: {error.message}")
             continue

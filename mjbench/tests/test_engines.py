@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from mjbench.bench import read_subject
 from mjbench.engines.engine_run import (
     ChosenEngine,
     UnknownEngineError,
@@ -15,8 +16,7 @@ from mjbench.engines.engine_run import (
     measure_engines,
 )
 from mjbench.host import LocalHost
-from mjbench.reports.engine_report import EngineRow
-from mjbench.subjects import read_subject
+from mjbench.reports.model_report import EngineRow
 from samples.fake_engines import ENGINES as FAKE_ENGINES
 
 FAKES = ("samples.fake_engines",)

@@ -13,8 +13,7 @@ from msgspec.structs import replace
 from mjbench.cli import main
 from mjbench.derive import derive_profile, derive_scenario
 from mjbench.judge import compared_rows
-from mjbench.profile import profile_rows
-from mjbench.reports.profile_table import profile_lines, profile_text
+from mjbench.profile import profile_lines, profile_rows, profile_text
 from mjbench.reports.scene_report import PhaseProfile
 from mjbench.reports.terminal import Style
 from mjbench.scene import Scene, scenes

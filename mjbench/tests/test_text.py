@@ -18,12 +18,11 @@ from mjbench.reports.diet_report import (
     Saving,
     TextEdit,
 )
-from mjbench.reports.diet_text import diet_text
-from mjbench.reports.engine_report import BatchCost, EngineReport, EngineRow, EngineScenario
+from mjbench.reports.model_report import BatchCost, EngineReport, EngineRow, EngineScenario
 from mjbench.reports.page import scene_page
 from mjbench.reports.scene_report import SweepReport, SweepRow, WorkPrecisionRow
 from mjbench.reports.terminal import Style
-from mjbench.text import case_text, engines_text, scene_text
+from mjbench.text import case_text, diet_text, engines_text, scene_text
 from samples.cases import case
 from samples.reports import MACHINE, awkward, row, scenario, scene, setting, swing
 

@@ -183,37 +183,6 @@ def test_chaos_has_a_horizon(line: str, error: float) -> None:
     assert f"chaotic: off by {error:g} rad at" in report.verdict.text
 
 
-TWO_POINTS = """\
-<mujoco>
-  <option timestep="0.0005"><flag contact="disable"/></option>
-  <worldbody><body><joint axis="0 1 0"/>
-    <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
-    <body pos="0 0 -1"><joint axis="0 1 0"/>
-      <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/></body></body></worldbody>
-  <keyframe><key qpos="2 0.5"/></keyframe>
-</mujoco>
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("error", "euler", "rk4"), [(0.1, 2.42, 13.56), (0.01, 1.78, 12.4)])
-def test_chaotic_settings_have_the_horizons_that_extended_precision_gives(
-    error: float, euler: float, rk4: float
-) -> None:
-    """When the angles are so far from Lagrange's equations with 40 digits, by MuJoCo alone, s."""
-    toml = '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 16\nsample = 0.02\n'
-    toml += f"timesteps = [0.0005]\nhorizon_error = {{ rad = {error} }}\n"
-    (report,) = measure(mujoco.MjModel.from_xml_string(TWO_POINTS), toml, quick=True)
-    horizons = {row.setting.integrator: row.parted for row in report.rows}
-    assert horizons["Euler"] == pytest.approx(euler, abs=0.005)
-    for name in ("implicit", "implicitfast", "discrete"):
-        assert horizons[name] == pytest.approx(euler, abs=0.05)
-    assert horizons["RK4"] == pytest.approx(rk4, abs=0.3)
-    assert all(row.seen is None and row.position is None for row in report.rows)
-    text = f"off by {error:g} rad at {euler:g} s, under RK4 at 500 µs at "
-    assert text in report.verdict.text
-
-
 BLOCK = """\
 <mujoco>
   <option timestep="0.002" gravity="2 0 -9.6"/>

@@ -20,17 +20,15 @@ import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from mjbench.cones import find_references
 from mjbench.costs import Clock, time_jobs
 from mjbench.detector import Peaks, judge
-from mjbench.known_motion import KnownMotion
 from mjbench.measure import energy_drift, errors
-from mjbench.pilot import Pilot, nudges, position_distances, run_pilot
+from mjbench.measured_setting import Basis
+from mjbench.pilot import nudges, position_distances
 from mjbench.problem import Array, Scenario
 from mjbench.reports import Interval
-from mjbench.reports.engine_report import EngineRow, EngineScenario
+from mjbench.reports.model_report import EngineRow, EngineScenario
 from mjbench.scene import Scene
-from mjbench.settings import own_setting
 from mjbench.simulation import (
     STATE,
     EngineStates,
@@ -43,7 +41,7 @@ from mjbench.simulation import (
     simulate,
     with_integrator,
 )
-from mjbench.work_precision import find_conserved
+from mjbench.work_precision import find_basis
 
 
 class Variant(Struct, frozen=True):
@@ -221,46 +219,33 @@ def _time(work: Callable[[], None], clock: Clock) -> float:
     return (clock() - before) * 1e-9
 
 
-class EngineBasis(Struct, frozen=True, eq=False):
-    """What is known of a scene before any engine is asked."""
-
-    model: Any
-    pilot: Pilot
-    reference: KnownMotion
-    energy: float | None
-    """The scale for changes of energy, J; `None` where energy is not conserved."""
-    baseline: EngineStates
-    """The motion in MuJoCo itself, at the model's own setting."""
-
-    @property
-    def report(self) -> EngineScenario:
-        """The report, without rows."""
-        scene, reference = self.pilot.scene, self.reference
-        return EngineScenario(
-            name=scene.name,
-            title=scene.title,
-            duration=scene.scenario.duration,
-            horizon=reference.horizon,
-            reference=reference.kind,
-            source=reference.source,
-            floor=reference.floor.place,
-            velocity_floor=reference.floor.velocity,
-            setting=own_setting(self.model, self.pilot),
-            rows=(),
-        )
-
-
-def engine_basis(model: Any, scene: Scene, *, quick: bool = False) -> EngineBasis:
-    """Find the reference of a scene, and how MuJoCo itself moves."""
-    pilot = run_pilot(model, scene)
-    setting = own_setting(model, pilot)
-    reference = find_references(model, pilot, quick=quick)[setting.cone].reference
-    energy, _ = find_conserved(model, pilot, reference)
+def engine_basis(model: Any, scene: Scene, *, quick: bool = False) -> tuple[Basis, EngineStates]:
+    """What motions are compared with, and how MuJoCo itself moves at the model's own setting."""
+    basis = find_basis(model, scene, quick=quick)
     own_model = with_integrator(model, integrator_of(model), scene.timestep)
-    return EngineBasis(model, pilot, reference, energy, simulate(pilot.setup, own_model).states)
+    return basis, simulate(basis.pilot.setup, own_model).states
 
 
-def judge_motion(basis: EngineBasis, row: EngineRow, motion: EngineMotion) -> EngineRow:
+def engine_scenario(basis: Basis, rows: tuple[EngineRow, ...]) -> EngineScenario:
+    """The report on a scenario."""
+    scene, reference = basis.pilot.scene, basis.reference
+    return EngineScenario(
+        name=scene.name,
+        title=scene.title,
+        duration=scene.scenario.duration,
+        horizon=reference.horizon,
+        reference=reference.kind,
+        source=reference.source,
+        floor=reference.floor.place,
+        velocity_floor=reference.floor.velocity,
+        setting=basis.baseline,
+        rows=rows,
+    )
+
+
+def judge_motion(
+    basis: Basis, baseline: EngineStates, row: EngineRow, motion: EngineMotion
+) -> EngineRow:
     """Add to a row how far a motion is from the reference, and what it does to energy."""
     model, scenario, reference = basis.model, basis.pilot.scene.scenario, basis.reference
     row = replace(row, compile_seconds=motion.compile_seconds)
@@ -279,6 +264,6 @@ def judge_motion(basis: EngineBasis, row: EngineRow, motion: EngineMotion) -> En
         return replace(row, status="diverged", message="; ".join(judgement.reasons))
     exact, count = motion_of(model, reference.states), len(reference.states.times)
     near = errors(motion_of(model, states.head(count)), exact, reference.floor)
-    apart = position_distances(model, states.qpos[:count], basis.baseline.qpos[:count])
+    apart = position_distances(model, states.qpos[:count], baseline.qpos[:count])
     drift = None if basis.energy is None else energy_drift(energies, basis.energy)
     return replace(row, **asdict(near), apart=float(apart.max()), energy_drift=drift)

@@ -12,8 +12,8 @@ import statistics
 from collections.abc import Iterator, Sequence
 
 from mjbench.reports import Interval
-from mjbench.reports.case_report import CaseReport, ErrorLine
 from mjbench.reports.charts import Chart, ChartLevel, ChartLine, ChartMark, ChartPoint, chart_point
+from mjbench.reports.model_report import CaseReport, ErrorLine
 from mjbench.reports.scene_report import FLOORS, ErrorQuantity, ScenarioReport, WorkPrecisionRow
 from mjbench.reports.shown_errors import (
     INTEGRATORS,

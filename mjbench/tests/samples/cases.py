@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mjbench.reports import Interval
-from mjbench.reports.case_report import (
+from mjbench.reports.model_report import (
     CaseReport,
     ErrorLine,
     ReferenceLine,

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import Reports
 from coursebuild.features.bench.grids import bounded, factor, percent, power, sentence, size
-from mjbench.reports.case_report import StepCost
+from mjbench.reports.model_report import StepCost
 from samples.reports import interval
 from support.bench_reports import swing
 from support.model_reports import box, case, diet, reports, row, run, scenario, scene
