@@ -146,9 +146,8 @@ def test_halves_count_as_much_as_the_whole() -> None:
     rows[0] = replace(rows[0], halves=halves)
     report = judged(rows, contact_model=CONES)
     assert report.verdict.better is None
-    assert report.verdict.worse == (
-        "the error of position is 1.7 times as large in its first half",
-    )
+    reason = "the error of position is 1.7 times as large in its first half"
+    assert reason in report.verdict.text
 
 
 def test_what_is_worse_from_starts_nearby_is_not_better() -> None:
@@ -184,7 +183,7 @@ def test_what_is_better_under_one_seed_and_worse_under_another_is_not_better() -
     reason = "in seed-2 the error of position is 2.1 times as large over the whole run"
     claim = "no difference that holds: here implicit at 4.16667 ms takes 0.47 of the time and errs "
     assert first.verdict.text.startswith(f"{claim}no more in any column, but {reason}; ")
-    assert first.verdict.better is None and first.verdict.worse == (reason,)
+    assert first.verdict.better is None
     assert any(reason in line for line in first.verdict.lines)
     alike = [replace(seeds[0], name=name) for name in ("seed-1", "seed-2")]
     assert list(derive_seeds(alike)) == alike

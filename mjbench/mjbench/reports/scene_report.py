@@ -311,8 +311,6 @@ class RowVerdict(Record, frozen=True):
     """The row that is better in no column worse, from starts nearby too; `None` where none is."""
     text: str
     """The same in a sentence or two."""
-    worse: tuple[str, ...] = ()
-    """In which errors, and when, the setting is worse that would else be better."""
     lines: tuple[str, ...] = ()
     """The whole in at most five lines: speed, error, what is better, stability, what is not
     known."""
