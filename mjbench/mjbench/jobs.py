@@ -43,7 +43,7 @@ from mjbench.reports.records import (
 )
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.reports.terminal import Style
-from mjbench.text import report_text
+from mjbench.text import AnyReport, report_text
 
 
 class Facts(Struct, frozen=True):
@@ -64,7 +64,7 @@ class EngineChoice(Struct, frozen=True):
     remarks: tuple[str, ...]
 
 
-def about(_: Host) -> Facts:
+def facts(_: Host) -> Facts:
     """Say what is here: code, machine, problems."""
     return Facts(code_digest(), this_machine(), this_machine(pinned=True), tuple(all_problems()))
 
@@ -154,7 +154,8 @@ def text(
     `command` looks at a model again, with `{}` for its name; `declarations` is the file that
     declares what is kept, the same way.
     """
-    style, reports = Style(width, colour), (*bench, *engines, *cases, *diet)
+    style = Style(width, colour)
+    reports: tuple[AnyReport, ...] = (*bench, *engines, *cases, *diet)
     return "\n".join(report_text(r, style, command, declarations) for r in reports)
 
 
@@ -162,19 +163,19 @@ def compare(
     _: Host,
     *,
     recorded: SceneReport | None = None,
-    measured: SceneReport | None = None,
+    measurement: SceneReport | None = None,
     bands: BenchTable | None = None,
     recorded_cases: tuple[CaseReport, ...] = (),
     measured_cases: tuple[CaseReport, ...] = (),
 ) -> tuple[Departure, ...]:
     """Compare what was recorded with what was measured."""
-    if recorded is not None and measured is not None:
-        return scene_departures(recorded, measured, bands or BenchTable())
+    if recorded is not None and measurement is not None:
+        return scene_departures(recorded, measurement, bands or BenchTable())
     return case_departures(recorded_cases, measured_cases)
 
 
 JOBS: dict[str, Callable[..., object]] = {
-    "about": about,
+    "about": facts,
     "scenario": scenario,
     "sweep": sweep,
     "join": join,

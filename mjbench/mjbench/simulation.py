@@ -174,6 +174,18 @@ def initial_data(scenario: Scenario, model: Any) -> Any:
     return data
 
 
+def nudged(scenario: Scenario, model: Any, change: Array) -> Scenario:
+    """A scenario that begins aside by changes of positions and velocities, (2, nv)."""
+    data = initial_data(scenario, model)
+    mujoco.mj_integratePos(model, data.qpos, change[0], 1.0)
+    return replace(scenario, qpos=tuple(data.qpos), qvel=tuple(data.qvel + change[1]))
+
+
+def runnable(model: Any) -> Any:
+    """A copy of a `mjModel` under its own setting, with automatic reset off."""
+    return with_integrator(model, integrator_of(model), float(model.opt.timestep))
+
+
 def full_state(model: Any, data: Any) -> Array:
     """The present state, as `STATE` selects it."""
     state = np.empty(mujoco.mj_stateSize(model, STATE))

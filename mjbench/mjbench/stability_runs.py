@@ -24,10 +24,10 @@ from mjbench.reports.shown_errors import horizon_error_text
 from mjbench.simulation import (
     EngineStates,
     initial_data,
-    integrator_of,
+    nudged,
+    runnable,
     simulate,
     watch_steps,
-    with_integrator,
 )
 
 STARTS, QUICK_STARTS, NEARBY = 5, 3, 1e-4
@@ -238,7 +238,7 @@ def loop_note(model: Any, pilot: Pilot, reference: EngineStates) -> str:
     loop = scene.scenario.loop
     assert loop is not None
     motion = kept_motion(model, pilot, reference)
-    variant = with_integrator(model, integrator_of(model), scene.timestep)
+    variant = runnable(model)
 
     def setup(delay: float) -> Setup:
         late = replace(loop, delay=loop.delay + delay)
@@ -280,11 +280,8 @@ def loop_note(model: Any, pilot: Pilot, reference: EngineStates) -> str:
 
 def _grows(model: Any, setup: Setup) -> bool:
     """Whether a run from nearby goes farther from the scenario's own in its second half."""
-    data = initial_data(setup.scenario, model)
-    position, velocity = nudges(model, 2, NEARBY)[0]
-    mujoco.mj_integratePos(model, data.qpos, position, 1.0)
-    start = {"qpos": tuple(data.qpos), "qvel": tuple(data.qvel + velocity)}
-    nudged = replace(setup, scenario=replace(setup.scenario, **start))
-    differences = simulate(nudged, model).states.qvel - simulate(setup, model).states.qvel
+    aside = nudged(setup.scenario, model, nudges(model, 2, NEARBY)[0])
+    states = simulate(replace(setup, scenario=aside), model).states
+    differences = states.qvel - simulate(setup, model).states.qvel
     first, second = np.array_split(differences, 2)
     return not np.linalg.norm(second) <= (1 + _RESOLUTION) * np.linalg.norm(first)

@@ -20,12 +20,11 @@ from msgspec.structs import replace
 
 from mjbench import known_motion, measure, simulation
 from mjbench.columns import LOST, WHOLE, Column, row_ratios
-from mjbench.cones import find_references, least_known
 from mjbench.costs import Clock, costs
 from mjbench.derive import derive_charts, derive_failures, derive_profile, derive_scenario
 from mjbench.detector import driving_force
 from mjbench.judge import compared_rows
-from mjbench.measured_setting import Basis, measure_setting
+from mjbench.measured_setting import Basis, find_references, least_known, measure_setting
 from mjbench.parts import Parts
 from mjbench.pilot import Pilot, horizon_error, nudges, run_pilot
 from mjbench.profile import profile_rows
@@ -187,10 +186,8 @@ def _error_parts(basis: Basis) -> scene_report.ErrorParts | None:
     runs = [simulation.simulate(setup, own_model)]
     if pilot.constrained:
         runs.append(simulation.simulate(setup, simulation.with_converged_solver(own_model)))
-    data = simulation.initial_data(scene.scenario, model)
-    mujoco.mj_integratePos(model, data.qpos, nudges(model, 2, _LAST_DIGITS)[0][0], 1.0)
-    nudged = replace(setup, scenario=replace(setup.scenario, qpos=tuple(data.qpos)))
-    runs.append(simulation.simulate(nudged, own_model))
+    nudged = simulation.nudged(setup.scenario, model, nudges(model, 2, _LAST_DIGITS)[0])
+    runs.append(simulation.simulate(replace(setup, scenario=nudged), own_model))
     if not all(run.judgement.ok for run in runs):
         return None
     count = len(cone.reference.states.times)

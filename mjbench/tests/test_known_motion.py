@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from mjbench.cones import find_references
 from mjbench.integrate import (
     NoConvergenceError,
     State,
@@ -20,6 +19,7 @@ from mjbench.integrate import (
     dop853,
 )
 from mjbench.known_motion import KnownMotion, find_reference, self_reference
+from mjbench.measured_setting import find_references
 from mjbench.pilot import run_pilot
 from mjbench.problem import Integrator
 from mjbench.scene import SceneError, scenes

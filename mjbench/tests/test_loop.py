@@ -12,9 +12,9 @@ import pytest
 
 from mjbench.bench import CompiledModel, compile_subject, read_subject
 from mjbench.cli import main
-from mjbench.cones import find_references
 from mjbench.host import LocalHost
 from mjbench.loop import Loop, read_loop
+from mjbench.measured_setting import find_references
 from mjbench.parts import Parts
 from mjbench.pilot import run_pilot
 from mjbench.problem import Array, Integrator, Scenario, Setup

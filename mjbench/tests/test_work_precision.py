@@ -8,13 +8,11 @@ import math
 from typing import Any
 
 import mujoco
-import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from mjbench.problem import Array
 from mjbench.reports.scene_report import ScenarioReport
-from mjbench.scene import ExactMotion, SceneError, scenes
+from mjbench.scene import SceneError, scenes
 from mjbench.work_precision import measure_scenario
 from samples.runs import BOX, FLIP, measure, orders, row, with_search
 from samples.surveys import parse_declared
@@ -297,47 +295,6 @@ def test_refsafe_is_not_told_of_what_never_touches() -> None:
     (report,) = measure(model, text + "search = [0.02, 0.03]\n", quick=True)
     assert not any(line.refsafe for line in report.rows)
     assert not any("refsafe" in note for note in report.notes)
-
-
-TURNTABLE = """<mujoco><option timestep="0.004" integrator="{}"/><worldbody><body>
-  <joint axis="0 0 1"/><joint axis="0 1 0"/><geom size=".05" pos="0 0 -1" mass="1"/>
-</body></worldbody></mujoco>"""
-
-
-def test_an_exact_motion_of_one_start_says_nothing_of_starts_nearby(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A conical pendulum goes round evenly, so every timestep is exact; beside it none is."""
-    model = mujoco.MjModel.from_xml_string(TURNTABLE.format("implicitfast"))
-    tilt = 0.7
-    rate = math.sqrt(9.81 / math.cos(tilt))
-    text = f"""[[scenario]]
-name = "a"
-qpos = [0, {tilt}]
-qvel = [{rate!r}, 0]
-duration = 0.8
-sample = 0.08
-"""
-    (scene,) = scenes(model, parse_declared(text), quick=True)
-
-    def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array]:
-        turns = np.column_stack([qpos[0] + qvel[0] * times, np.full_like(times, qpos[1])])
-        return turns, np.tile(qvel, (len(times), 1))
-
-    scene = replace(scene, exact=ExactMotion("a.exact.py", states))
-    advance, now = mujoco.mj_step, [0]
-
-    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:
-        now[0] += 10_000 * nstep
-        advance(model, data, nstep)
-
-    monkeypatch.setattr(mujoco, "mj_step", step)
-    report = measure_scenario(model, scene, quick=True, clock=lambda: now[0])
-    costs = [line.cost.value for line in report.rows if line.cost]
-    assert min(costs) < 0.9 * max(costs), "longer steps cost less"
-    assert report.reference == "closed"
-    assert all(line.seen is not None and line.seen < 1e-9 for line in report.rows)
-    assert report.verdict.better is None, report.verdict.text
 
 
 def test_a_reference_does_not_sleep() -> None:

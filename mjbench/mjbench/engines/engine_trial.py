@@ -34,12 +34,11 @@ from mjbench.simulation import (
     EngineStates,
     full_state,
     initial_data,
-    integrator_of,
     invariants,
     motion_of,
+    runnable,
     silent,
     simulate,
-    with_integrator,
 )
 from mjbench.work_precision import find_basis
 
@@ -222,8 +221,7 @@ def _time(work: Callable[[], None], clock: Clock) -> float:
 def engine_basis(model: Any, scene: Scene, *, quick: bool = False) -> tuple[Basis, EngineStates]:
     """What motions are compared with, and how MuJoCo itself moves at the model's own setting."""
     basis = find_basis(model, scene, quick=quick)
-    own_model = with_integrator(model, integrator_of(model), scene.timestep)
-    return basis, simulate(basis.pilot.setup, own_model).states
+    return basis, simulate(basis.pilot.setup, runnable(model)).states
 
 
 def engine_scenario(basis: Basis, rows: tuple[EngineRow, ...]) -> EngineScenario:
@@ -256,8 +254,8 @@ def judge_motion(
     moments = [(beginning.qpos, beginning.qvel), *zip(qpos, qvel, strict=True)]
     with silent():  # of states that are no numbers
         energies = np.array([invariants(model, scratch, *moment)[:2] for moment in moments])
-    sizes = (np.abs(qpos).max(), np.abs(qvel).max())
-    peaks = Peaks(*map(float, sizes), energy=float(energies.sum(axis=1).max()))
+    energy = float(energies.sum(axis=1).max())
+    peaks = Peaks(float(np.abs(qpos).max()), float(np.abs(qvel).max()), energy=energy)
     beginning.energy[:] = energies[0]
     judgement = judge(beginning, peaks, basis.pilot.setup)
     if not judgement.ok:

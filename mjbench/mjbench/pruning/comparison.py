@@ -33,6 +33,7 @@ from mjbench.simulation import (
     full_state,
     initial_data,
     integrator_of,
+    nudged,
     simulate,
     with_integrator,
     without_sleep,
@@ -196,10 +197,8 @@ class WatchedRun(Struct, frozen=True, eq=False):
 def watch(model: Any, scene: Scene) -> WatchedRun:
     """Run the whole model in a scenario, and beside it a twin."""
     without_reset(model)
-    data, twin = initial_data(scene.scenario, model), initial_data(scene.scenario, model)
-    position, velocity = nudges(model, 2, NUDGE)[0] if model.nv else (twin.qvel, twin.qvel)
-    mujoco.mj_integratePos(model, twin.qpos, position, 1.0)
-    twin.qvel[:] += velocity
+    data = initial_data(scene.scenario, model)
+    twin = initial_data(nudged(scene.scenario, model, nudges(model, 2, NUDGE)[0]), model)
     start, change = data.qpos.copy(), np.zeros(model.nv)
     displacements, speeds = np.zeros(model.nv), np.zeros(model.nv)
     horizon = math.inf
@@ -242,10 +241,8 @@ def nearby_scenes(model: Any, run: WatchedRun, count: int) -> Iterator[Scene]:
     """The scenario of a run from random starts nearby, always the same ones."""
     scenario, random = run.scene.scenario, np.random.default_rng(2)
     for number in range(count if np.any(run.displacements) or np.any(run.speeds) else 0):
-        data = initial_data(scenario, model)
-        far, fast = random.normal(size=(2, model.nv)) * NEARBY * (run.displacements, run.speeds)
-        mujoco.mj_integratePos(model, data.qpos, far, 1.0)
-        nearby = replace(scenario, qpos=tuple(data.qpos), qvel=tuple(data.qvel + fast))
+        change = random.normal(size=(2, model.nv)) * NEARBY * (run.displacements, run.speeds)
+        nearby = nudged(scenario, model, change)
         yield replace(run.scene, name=f"{run.scene.name}, nearby {number + 1}", scenario=nearby)
 
 

@@ -234,7 +234,7 @@ def _text_of(value: float | str | bool | None, *, is_step: bool) -> str:
 def _error(name: str, error: tuple[float, float] | None, share: float, least: float) -> _Figures:
     """An error, at its largest and at the end; none is known better than to `least`."""
     values = {"": None} if error is None else {"": error[0], " at the end": error[1]}
-    return {f"error of {name}{when}": _Figure(v, share, least) for when, v in values.items()}
+    return {f"error of {name}{moment}": _Figure(v, share, least) for moment, v in values.items()}
 
 
 def _run(
