@@ -82,8 +82,6 @@ def mark_luck(
                 work = "shorter timesteps" if dear.timestep < setting.timestep else ""
             elif dear == replace(setting, iterations=dear.iterations):
                 work = "more iterations" if dear.iterations > setting.iterations else ""
-            elif dear == replace(setting, cone=own_row.setting.cone):
-                luck = luck or _luck_of_cone(row, rival, quantity)
             if luck or not work or row.status != "ok":
                 continue
             known_until = math.inf if row.parted is None else (1 - _WORTH_SAYING) * row.parted
@@ -93,21 +91,6 @@ def mark_luck(
                 luck = f"its error rises with {work}"
         marked_rows.append(replace(row, lucky=luck))
     return tuple(marked_rows)
-
-
-def _luck_of_cone(row: WorkPrecisionRow, rival: WorkPrecisionRow, quantity: ErrorQuantity) -> str:
-    """Why a smaller error than under the scene's own cone is luck; empty where it is none.
-
-    Where the model under that cone errs no less, it has cancelled with the error of the timestep.
-    """
-
-    def is_less(error: float | None, than: float | None) -> bool:
-        return error is not None and than is not None and error * (1 + ERROR_SLACK) < than
-
-    if row.model_error is None or not is_less(quantity.value_of(row), quantity.value_of(rival)):
-        return ""
-    is_nearer = rival.model_error is None or is_less(row.model_error, rival.model_error)
-    return "" if is_nearer else "in small steps that cone errs no less"
 
 
 def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:

@@ -15,7 +15,7 @@ from msgspec import Struct
 
 from coursebuild.api import Command, Feature, Library, PageKind, urls
 from coursebuild.core.model.addresses import document_anchors
-from coursebuild.core.model.measurements import CaseReport, FigureLine, StableRow
+from coursebuild.core.model.measurements import CaseReport, FigureLine
 from coursebuild.core.model.report_files import STABILITY
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids, scenario_view
@@ -25,7 +25,6 @@ from coursebuild.features.bench.shown_errors import INTEGRATORS, seconds_text
 _DIGITS = 3
 _BOUNDARY = (
     *scenario_view.STABLE,
-    "measured.difference",
     "measured.remark",
 )
 _FIGURE = ("numerics.measured", "numerics.spread", "numerics.exact", "measured.difference")
@@ -189,7 +188,6 @@ def case_view(words: Strings, report: CaseReport) -> CaseView:
             line.integrator,
             (
                 *scenario_view.stable_cells(words, line),
-                grids.percent(_difference(line)),
                 scenario_view.stable_again(words, line),
             ),
         )
@@ -214,13 +212,6 @@ def case_view(words: Strings, report: CaseReport) -> CaseView:
         tuple(grid for grid in tables if grid is not None),
         tuple(_notes(words, report)),
     )
-
-
-def _difference(line: StableRow) -> float | None:
-    """How far the largest stable timestep is from theory, relative to it."""
-    if isinstance(line.largest, str) or not isinstance(line.theory, float):
-        return None
-    return line.largest / line.theory - 1
 
 
 def _describe(words: Strings, report: CaseReport) -> Iterator[str]:

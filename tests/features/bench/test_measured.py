@@ -172,7 +172,7 @@ def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
         "References: the oscillator; Bulirsch–Stoer. The motion is known to "
         "1 × 10<sup>−13</sup> in position and 4 × 10<sup>−13</sup> in velocity."
     ) in words
-    assert "Euler 200 ms 200.1 ms −0.050 %" in words
+    assert "Euler 200 ms 200.1 ms" in words
     assert "RK4 250 ms; elsewhere 290 ms" in words
     assert "implicit, discrete all up to 1 s" in words
     assert "Theory: 2/ω." in words
