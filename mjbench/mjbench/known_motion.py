@@ -53,8 +53,6 @@ FINER, QUICK_FINER = 16, 8
 PARTING_DISTANCE, _PARTING_SHARE = 0.01, 0.1
 """The difference from which on motions have nothing in common, rad or relative to the extent; the
 same of two that are to be a reference, relative to the error to be told."""
-FOREIGN = 1e-3
-"""The difference from which on a closed form is that of another scene, in the same units."""
 PRECISION, _VOTES = 1e-8, 100.0
 """How far a course's exact motion may be off, relative to the largest number in it where this is
 over 1, unless its scenario says; and floors of the integration within which it always may."""
@@ -98,7 +96,18 @@ def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMot
         return reference
     states = exact.engine_states(model, pilot.scene.scenario, reference.states)
     least = _check_exact(model, pilot, exact, states, reference, quick=quick)
-    return _with_exact(model, reference, exact, states, least)
+    gap = motion_gap(model, states, reference.states)
+    return replace(
+        reference,
+        kind="closed",
+        source=exact.path,
+        states=states,
+        second_states=reference.states,
+        floor=least.at_least(gap) if reference.kind == "ode" else least,
+        second=reference.source,
+        agreement=gap.largest,
+        note="",
+    )
 
 
 def find_nearby(model: Any, pilot: Pilot, *, quick: bool) -> EngineStates | None:
@@ -306,31 +315,3 @@ def _combine(
 def motion_gap(model: Any, states: EngineStates, second_states: EngineStates) -> Sizes:
     """How far two motions are apart at most."""
     return largest_errors(errors(motion_of(model, states), motion_of(model, second_states)))
-
-
-def _with_exact(
-    model: Any, second: KnownMotion, exact: ExactMotion, states: EngineStates, least: Sizes
-) -> KnownMotion:
-    """Put an exact motion first, and what was integrated second."""
-    count = min(len(states.times), len(second.states.times))
-    states = states.head(count)
-    gap = motion_gap(model, states, second.states)
-    distance = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
-    floor = least
-    if second.kind == "ode":
-        if not distance <= FOREIGN:
-            message = f"`{exact.path}` is not this scene's motion"
-            help = f"the two are {distance:.2g} apart (rad, or relative to the extent)"
-            raise SceneError(message, Place(exact.path), help)
-        floor = least.at_least(gap)
-    return replace(
-        second,
-        kind="closed",
-        source=exact.path,
-        states=states,
-        second_states=second.states,
-        floor=floor,
-        second=second.source,
-        agreement=gap.largest,
-        note="",
-    )

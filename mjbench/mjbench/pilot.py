@@ -293,9 +293,7 @@ class _Observer:
             (self.friction, "dry friction"),
             (self.full, "an activation at its limit"),
             (bool(model.nplugin), "a plugin"),
-            (bool(np.any(model.actuator_history[:, 0] > 0)), "a delayed actuator")
-            if hasattr(model, "actuator_history")
-            else (False, ""),
+            (bool(np.any(model.actuator_history[:, 0] > 0)), "a delayed actuator"),
         )
         return tuple(words for is_present, words in causes if is_present)
 

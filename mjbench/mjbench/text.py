@@ -246,16 +246,7 @@ def case_text(report: CaseReport, style: Style = _PLAIN) -> str:
             ("source", [line.source for line in figures]),
         ]
         parts += ["", *fitted_table(columns, inner.width)]
-    runs = report.errors
-    columns = [
-        ("integrator", [run.integrator for run in runs]),
-        ("timestep", [seconds_text(run.timestep) for run in runs]),
-    ]
-    for name in ("position", "attitude", "velocity"):
-        pairs = [getattr(run, name) for run in runs]
-        columns.append((name, ["" if pair is None else f"{pair[0]:.3g}" for pair in pairs]))
-    columns.append(("status", [_lost(run.status, run.reasons) for run in runs]))
-    parts += ["", *fitted_table(columns, inner.width), ""]
+    parts.append("")
     for chart in report.charts[:1]:
         parts += plot_lines(chart, inner.width)
     lines += style.wrap(report.machine.text, "  ")

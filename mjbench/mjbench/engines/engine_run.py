@@ -25,10 +25,12 @@ from mjbench.bench import (
     report_errors,
 )
 from mjbench.engines import MODULES
-from mjbench.engines.child import EngineChild, Reply, Request
 from mjbench.engines.engine_trial import (
     Engine,
+    EngineChild,
     EngineTrial,
+    Reply,
+    Request,
     engine_basis,
     engine_scenario,
     judge_motion,

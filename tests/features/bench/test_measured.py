@@ -247,7 +247,7 @@ def test_errors_and_energy_are_drawn_against_time(make: Make) -> None:
     site_reports = Reports(cases=(case("a", 4, errors=(lost, *runs), costs=costs),))
     page = pages(make, site_reports)["numerics/case-4.html"]
     assert page.count("<svg") == 2 and page.index("<svg") < page.index("more-figures")
-    assert "Euler: 0.1 at 10 µs, 0.025 at 40 µs. RK4: 0.0001 at 10 µs" in page
+    assert "Euler: errors 0.1 to 0.025 at 1e-05 to 4e-05 s. RK4: errors 0.0001 to " in page
     assert "error of position (m or rad) against processor time" in page
     assert "energy drift, relative against processor time" in page
     assert "<title>Euler at 200 ms: diverged</title>" in page
