@@ -43,7 +43,6 @@ from mjbench.pruning.trials import (
     PrunedGroup,
     PrunedModel,
     PruningTrials,
-    is_to_go,
     largest_subset,
     views_of,
 )
@@ -181,7 +180,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     def _settle(self, groups: Sequence[PrunedGroup]) -> list[PrunedGroup]:
         """Confirm groups, and try the rest without them, but for what is kept."""
         groups = self._confirm(groups) if groups else []
-        unkept = [group for group in groups if is_to_go(group.finding)]
+        unkept = [g for g in groups if not g.finding.kept and g.finding.label != INTERFACE_LABEL]
         self.trials.absences += tuple(item for group in unkept for item in group.items)
         return groups
 

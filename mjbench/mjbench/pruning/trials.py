@@ -33,7 +33,7 @@ from mjbench.pruning.xml_edits import (
     merge_edits,
     remove_elements,
 )
-from mjbench.reports.diet_report import INTERFACE_LABEL, Finding, Saving
+from mjbench.reports.diet_report import Finding, Saving
 from mjbench.scene import Scene
 from mjbench.simulation import STATE, advance, full_state, initial_data, silent
 
@@ -80,11 +80,6 @@ class PrunedGroup(Struct, frozen=True, eq=False):
 
     items: tuple[Item, ...]
     finding: Finding
-
-
-def is_to_go(finding: Finding) -> bool:
-    """Whether a finding is about something that is to go."""
-    return not finding.kept and finding.label != INTERFACE_LABEL
 
 
 def views_of(items: Iterable[Item]) -> frozenset[str]:
