@@ -27,6 +27,7 @@ from mjbench.problems import all_problems
 from mjbench.reports import PartFailure
 from mjbench.reports.diet_report import DietReport, Keep
 from mjbench.reports.model_report import SceneReport
+from mjbench.reports.page import scene_page
 from mjbench.reports.records import (
     BENCH,
     DIET,
@@ -41,7 +42,7 @@ from mjbench.reports.records import (
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.reports.terminal import Style
 from mjbench.schemas import schema_text
-from mjbench.text import diet_text, scene_page
+from mjbench.text import diet_text
 from mjbench.work_precision import StoppedError
 
 _COMMANDS = ("bench", "stability", "diet", "show", "schema", "jobs")

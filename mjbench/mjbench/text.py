@@ -1,4 +1,4 @@
-"""Reports as text for a terminal, and as a page: the verdict first, then the table, then the plot.
+"""Reports as text for a terminal: the verdict first, then the table, then the plot.
 
 The JSON has all of it.
 """
@@ -6,7 +6,6 @@ The JSON has all of it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from html import escape
 from typing import TypeAlias
 
 from mjbench.profile import profile_lines
@@ -405,39 +404,3 @@ def saving_text(saving: Saving) -> str:
             fewer = "fewer" if count > 0 else "more"
             parts.append(f"{abs(count):,} bytes of {place} {fewer}")
     return ", ".join(parts) or "saves nothing measurable"
-
-
-_STYLE = """\
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem }
-pre { overflow-x: auto; font-size: 13px; line-height: 1.35 }
-ul { padding-left: 1.2rem } li:first-child { font-weight: 600 }
-"""
-
-
-def scene_page(report: SceneReport) -> str:
-    """The page of a model."""
-    title = escape(report.model)
-    parts = [
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><title>{title}</title>',
-        '<meta name="viewport" content="width=device-width">',
-        f"<style>{_STYLE}</style></head><body><h1>{title}</h1>",
-    ]
-    for failure in report.failures:
-        text = f"{failure.part} was not measured: {failure.reason}"
-        parts.append(f"<p>{escape(text)}</p>")
-    for scenario in report.scenarios:
-        parts += _page_part(scenario)
-    parts.append(f"<p>{escape(report.machine.text)}</p></body></html>")
-    return "\n".join(parts) + "\n"
-
-
-def _page_part(report: ScenarioReport) -> Iterator[str]:
-    yield f"<h2>{escape(report.name)}: {escape(report.title)}</h2>"
-    lines = "".join(f"<li>{escape(line)}</li>" for line in report.verdict.lines)
-    yield f"<ul>{lines}</ul>"
-    for chart in report.charts[:1]:
-        plot = "\n".join(plot_lines(chart))
-        yield f"<pre>{escape(plot)}</pre>"
-    table = "\n".join(scenario_lines(report, Style(400), plot=False))
-    yield f"<details><summary>All settings, limits and orders</summary><pre>{escape(table)}</pre>"
-    yield "</details>"
