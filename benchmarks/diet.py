@@ -4,7 +4,7 @@ Run: python benchmarks/diet.py [--pieces N] [--out DIR]
 
 The scenes are written into a course of their own, in a temporary folder if no other is named, and
 `coursebuild diet` looks at them. Printed are the time of a step as it is over that without what was
-found, with its spread, for each finding and for all together, and how far both motions are apart.
+found, with its spread, for each finding.
 """
 
 from __future__ import annotations
@@ -68,21 +68,17 @@ def main() -> None:
         (root / "models" / "rubble.xml").write_text(field)
         with Mjbench(root, "this benchmark") as mjbench:
             measurement = diet(Options(root, 1, Store(root)), mjbench)
-    for report, values in zip(measurement.reports, measurement.values, strict=True):
-        show(report, values["slim_difference"])
+    for report in measurement.reports:
+        show(report)
 
 
-def show(report: DietReport, difference: float | None) -> None:
-    """A line for each finding that saves time, and one for all together."""
+def show(report: DietReport) -> None:
+    """A line for each finding that saves time."""
     print(f"{report.model}  (MuJoCo {report.machine.engine}, {report.machine.cpu})")
     for finding in report.findings:
         saving = finding.saving
         if saving.time is not None and saving.certain:
             print(f"  ×{saving.time:6.2f} ± {saving.spread:.2f}  {finding.kind}: {finding.label}")
-    slim = report.slim
-    if slim is not None and slim.time is not None:
-        remark = f"differs by {difference:.1e}" if difference else "the same bits"
-        print(f"  ×{slim.time:6.2f} ± {slim.spread:.2f}  all that goes together: {remark}")
 
 
 if __name__ == "__main__":

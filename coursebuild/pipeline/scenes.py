@@ -147,7 +147,7 @@ def scene_digest(root: Path, model: MjcfModel, declarations: Declarations) -> st
         fields = (
             *(s.name, s.title or "", s.keyframe, s.qpos, s.qvel, s.duration),
             *(s.sample, s.controls, s.hold, s.observable),
-            *(None if s.closed_form else s.reference, s.closed_form),
+            *(s.reference, ""),  # reports were recorded when there was another kind of reference
             *(s.conserved, s.timesteps),
             # What was added later counts only where it is given.
             *((name, value) for name in _LATER if (value := getattr(s, name)) != _PLAIN[name]),

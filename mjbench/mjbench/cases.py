@@ -9,15 +9,12 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import lru_cache
-from typing import Any
 
-import mujoco
 import numpy as np
 from msgspec.structs import asdict, astuple
 
 from mjbench import simulation
 from mjbench.costs import Clock, scenario_job, time_jobs
-from mjbench.declarations import DeclaredScenario
 from mjbench.derive import derive_case
 from mjbench.detector import driving_force
 from mjbench.integrate import forward_motion
@@ -34,25 +31,19 @@ from mjbench.measure import (
 from mjbench.problem import (
     ROUNDING,
     STANDARD,
-    Array,
     Integrator,
-    Motion,
     Problem,
     ScalarCheck,
-    Scenario,
     SecondReference,
     Sizes,
 )
-from mjbench.problems import all_problems
-from mjbench.reports.case_report import (
+from mjbench.reports.model_report import (
     CaseReport,
     ErrorLine,
     ReferenceLine,
     StepCost,
 )
 from mjbench.reports.scene_report import Errors, FigureLine, OrderRow
-from mjbench.rotations import quat_conj, quat_mul
-from mjbench.scene import Scene, SceneError
 from mjbench.stability import boundaries
 
 _ENGINE = SecondReference("MuJoCo’s accelerations over the MJCF, DOP853", forward_motion)
@@ -210,40 +201,3 @@ def floor(problem: Problem) -> Sizes:
             message = f"the references of `{problem.name}` differ by {difference:.2g} in {part}"
             raise DisagreementError(f"{message}, where {most:.0e} is said")
     return gaps[0].at_least(ROUNDING)
-
-
-def closed_motion(
-    model: Any, scene: Scene, declaration: DeclaredScenario, times: Array
-) -> tuple[Problem, Motion]:
-    """The hard case that a scenario names, and its motion from where the scene begins.
-
-    A `SceneError` where that differs from where the case begins, but for places of free bodies.
-    """
-    problem, place = all_problems().get(declaration.closed_form), declaration.place("reference")
-    if problem is None:
-        raise SceneError(f"no hard case is called `{declaration.closed_form}`", place)
-    case_model = simulation.compile_model(problem.mjcf, Integrator.EULER, 1e-3)
-    if (case_model.jnt_type.tolist(), case_model.nq) != (model.jnt_type.tolist(), model.nq):
-        message = f"the model has different joints from the hard case `{declaration.closed_form}`"
-        raise SceneError(message, place)
-    scene_start, case_start = _start(model, scene.scenario), _start(case_model, problem.scenario)
-    shift = scene_start.position - case_start.position
-    of_free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
-    widths = np.where(of_free, 3, model.jnt_type != mujoco.mjtJoint.mjJNT_BALL)
-    free_columns = np.repeat(of_free, widths)
-    speeds = np.abs(scene_start.velocity - case_start.velocity).max(initial=0.0)
-    if np.abs(shift[:, ~free_columns]).max(initial=0.0) > 1e-9 or speeds > 1e-9:
-        message = f"the scenario starts differently from the hard case `{declaration.closed_form}`"
-        raise SceneError(message, place, "its closed form holds for its own start only")
-    turn = quat_mul(scene_start.attitude, quat_conj(case_start.attitude))
-    motion = problem.reference.solution.motion(times)
-    attitude = quat_mul(turn, motion.attitude)
-    return problem, Motion(times, motion.position + shift, attitude, motion.velocity)
-
-
-def _start(model: Any, scenario: Scenario) -> Motion:
-    data = simulation.initial_data(scenario, model)
-    return simulation.motion_of(
-        model,
-        simulation.EngineStates(np.zeros(1), data.qpos[None], data.qvel[None], data.act[None]),
-    )

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from mjbench import bench, diet, text
-from mjbench.bench import CannotMeasureError, Subject
+from mjbench.bench import CannotMeasureError, Subject, UsageError, read_subject
 from mjbench.cases import measure_case
 from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measure_engines
 from mjbench.host import LocalHost
@@ -26,7 +26,6 @@ from mjbench.parts import LATE, Parts
 from mjbench.problems import all_problems
 from mjbench.reports import PartFailure
 from mjbench.reports.diet_report import DietReport, Keep
-from mjbench.reports.diet_text import diet_text
 from mjbench.reports.model_report import SceneReport
 from mjbench.reports.page import scene_page
 from mjbench.reports.records import (
@@ -43,7 +42,7 @@ from mjbench.reports.records import (
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
 from mjbench.reports.terminal import Style
 from mjbench.schemas import schema_text
-from mjbench.subjects import UsageError, read_subject
+from mjbench.text import diet_text
 from mjbench.work_precision import StoppedError
 
 _COMMANDS = ("bench", "stability", "diet", "show", "schema", "jobs")
@@ -328,9 +327,9 @@ def _diet(arguments: argparse.Namespace) -> int:
             raise UsageError("the diet edits the source of a model, and this one has none")
         keeps = tuple(_keeps(subject))
         result = diet.look_at(
-            subject,
             _host(subject),
-            readers,
+            subject=subject,
+            readers=readers,
             modules=modules,
             keeps=keeps,
             only=arguments.only,

@@ -8,7 +8,7 @@ maximum over all of them would hide that a longer timestep doubles the rest.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 from msgspec import Struct
@@ -120,25 +120,10 @@ class Spread(Struct, frozen=True):
     low: float
     high: float
 
-    @property
-    def is_worse(self) -> bool:
-        """Whether it is larger from every start."""
-        return self.low > 1 + ERROR_SLACK
-
-    @property
-    def is_doubtful(self) -> bool:
-        """Whether it is larger from some starts and not from others."""
-        return self.high > 1 + ERROR_SLACK and not self.is_worse
-
-    def text(self, figure: str, unresolved: Collection[Column] = ()) -> str:
-        """In words: what is how many times as large, and when.
-
-        `unresolved`: columns in which no error of the other setting is known, only that it is less
-        than can be: the factor is the least then.
-        """
+    def text(self, figure: str, *, is_least: bool) -> str:
+        """In words: what is how many times as large, and when; `is_least`: so many at least."""
         if self.column[0] == LOST:
             return "it is lost"
-        is_least = self.is_worse and self.column in unresolved
         times = times_text(self.low, math.inf if is_least else self.high)
         return f"{self.label(figure)} is {times} as large {self.column[1]}"
 
@@ -148,14 +133,23 @@ class Spread(Struct, frozen=True):
         return (figure.partition(" [")[0] or "the figure") if name == "figure" else LABELS[name]
 
 
-def unresolved_columns(report: ScenarioReport, row: WorkPrecisionRow) -> frozenset[Column]:
-    """The columns whose errors are too small for the reference to resolve, and not 0 exactly."""
-    columns, leasts = columns_of(row, report.contact_model), leasts_of(report)
-    return frozenset(
-        column
-        for column, value in columns.items()
-        if value <= (least := _least(column, columns, leasts)) * (1 + 1e-9) and least
-    )
+def worse_texts(
+    report: ScenarioReport, baseline: WorkPrecisionRow, starts: Sequence[Mapping[Column, float]]
+) -> tuple[str, ...]:
+    """In which errors a setting is worse, or not known to be no worse, each where it is so most.
+
+    Where no error of the other setting is known, only that it is less than can be, a factor is the
+    least.
+    """
+    columns, leasts = columns_of(baseline, report.contact_model), leasts_of(report)
+    texts: dict[str, str] = {}
+    for part in spreads(starts):
+        least = _least(part.column, columns, leasts)
+        is_vague = bool(least) and columns.get(part.column, math.inf) <= least * (1 + 1e-9)
+        if part.high > 1 + ERROR_SLACK and part.column[0] not in texts:
+            is_least = is_vague and part.low > 1 + ERROR_SLACK
+            texts[part.column[0]] = part.text(report.figure, is_least=is_least)
+    return tuple(texts.values())
 
 
 def spreads(starts: Sequence[Mapping[Column, float]]) -> list[Spread]:
@@ -225,12 +219,3 @@ def mark_dominated(report: ScenarioReport) -> Rows:
         on_front = n in present and not rivals and not row.lucky
         placed_rows.append(replace(row, front=on_front, dominated_by=best))
     return tuple(placed_rows)
-
-
-def worse_columns(spread: Iterable[Spread]) -> Iterator[Spread]:
-    """Columns that are worse, or not known to be no worse; one for each error, the worst."""
-    names: set[str] = set()
-    for part in spread:
-        if (part.is_worse or part.is_doubtful) and part.column[0] not in names:
-            names.add(part.column[0])
-            yield part

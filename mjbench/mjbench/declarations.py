@@ -107,7 +107,7 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     draw: dict[str, tuple[float, float] | Deviation] = {}
     draws: Annotated[int, Meta(ge=1, le=100)] = 3
     measure: Annotated[str, Meta(pattern=r"^(body|site|sensor):\S.*$")] | None = None
-    reference: Annotated[str, Meta(pattern=r"^(ode|self|closed:\S.*)$")] | None = None
+    reference: Literal["ode", "self"] | None = None
     conserved: tuple[Literal["energy", "angular-momentum"], ...] | None = None
     timesteps: tuple[Positive, ...] = ()
     expected: dict[Expected, float] = {}
@@ -125,12 +125,6 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
                 return Measured(kind, name)
             case _:
                 return None
-
-    @property
-    def closed_form(self) -> str:
-        """The hard case whose closed form is the reference; empty if none is."""
-        kind, _, name = (self.reference or "").partition(":")
-        return name if kind == "closed" else ""
 
 
 class DeclaredScenario(ScenarioTable, frozen=True, kw_only=True):

@@ -15,9 +15,7 @@ from msgspec.structs import replace
 from mjbench.columns import (
     mark_dominated,
     row_ratios,
-    spreads,
-    unresolved_columns,
-    worse_columns,
+    worse_texts,
 )
 from mjbench.judge import (
     Starts,
@@ -27,10 +25,10 @@ from mjbench.judge import (
     mark_luck,
     rival_row,
 )
+from mjbench.profile import profile_text
 from mjbench.reports import Interval, PartFailure
-from mjbench.reports.case_report import RIGHT, CaseReport
 from mjbench.reports.limits import largest_of, limit_text
-from mjbench.reports.profile_table import profile_text
+from mjbench.reports.model_report import RIGHT, CaseReport
 from mjbench.reports.scene_report import (
     ErrorQuantity,
     MeasuredSetting,
@@ -127,7 +125,7 @@ def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...
                 claim, semicolon, remark = verdict.text.partition("; ")
                 claim = claim.replace(" is better: it ", " ", 1)
                 text = f"no difference that holds: here {claim}, but {reason}{semicolon}{remark}"
-                verdict = replace(verdict, better=None, text=text, worse=(reason, *verdict.worse))
+                verdict = replace(verdict, better=None, text=text)
                 report = _with_lines(replace(report, verdict=verdict))
         derived.append(report)
     return tuple(derived)
@@ -143,10 +141,8 @@ def _why_worse(report: ScenarioReport, setting: MeasuredSetting) -> str:
         return f"in {report.name} it is lost"
     if row.parted is not None and baseline.parted is None:
         return f"in {report.name} it is off at {row.parted:.3g} s"
-    worse = next(worse_columns(spreads([row_ratios(report, baseline, row)])), None)
-    if worse is None:
-        return ""
-    return f"in {report.name} {worse.text(report.figure, unresolved_columns(report, baseline))}"
+    worse = worse_texts(report, baseline, [row_ratios(report, baseline, row)])
+    return f"in {report.name} {worse[0]}" if worse else ""
 
 
 def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) -> ScenarioReport:

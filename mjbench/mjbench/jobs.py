@@ -1,7 +1,7 @@
 """Measuring for another program: requests and answers as lines of JSON (`mjbench jobs`).
 
-A request is an object with the key `job` and what that job takes, see `Job` for all of them. On
-standard output it is answered by lines with one key each:
+A request is an object with the key `job`, one of `JOBS`, and what that function takes. On standard
+output it is answered by lines with one key each:
 
 - `tell`: what is measured now;
 - `ask`: something that only the other program knows; it writes a line with the answer, see
@@ -16,8 +16,8 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Mapping
-from typing import IO, Any, Literal, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from typing import IO, Any, Literal, get_type_hints
 
 import msgspec
 from msgspec import Struct
@@ -30,15 +30,14 @@ from mjbench.engines.engine_run import UnknownEngineError, chosen_engines, measu
 from mjbench.host import EXACT_SCRIPT, ExactRun, Host
 from mjbench.machine import Machine, code_digest, one_processor, this_machine
 from mjbench.problems import all_problems
-from mjbench.reports.case_report import CaseReport
-from mjbench.reports.diet_report import DietReport, Keep
-from mjbench.reports.engine_report import EngineReport
-from mjbench.reports.model_report import SceneReport
+from mjbench.reports.diet_report import DietReport
+from mjbench.reports.model_report import CaseReport, EngineReport, SceneReport
 from mjbench.reports.records import (
     BENCH,
     DIET,
     ENGINES,
     STABILITY,
+    Departure,
     case_departures,
     scene_departures,
 )
@@ -47,12 +46,8 @@ from mjbench.reports.terminal import Style
 from mjbench.text import AnyReport, report_text
 
 
-class About(Struct, frozen=True, tag_field="job", tag="about"):
-    """Ask what is here: code, machine, problems."""
-
-
 class Facts(Struct, frozen=True):
-    """The answer."""
+    """What is here."""
 
     code: str
     """A hash of the code: other code may measure other figures."""
@@ -62,62 +57,6 @@ class Facts(Struct, frozen=True):
     problems: tuple[str, ...]
 
 
-class Scenario(Struct, frozen=True, tag_field="job", tag="scenario"):
-    """Measure a scenario by its number: a `ScenarioReport`."""
-
-    subject: Subject
-    number: int
-    quick: bool = False
-    timed: bool = True
-
-
-class Sweep(Struct, frozen=True, tag_field="job", tag="sweep"):
-    """Measure a sweep: a `SweepReport`."""
-
-    subject: Subject
-    name: str
-    quick: bool = False
-    timed: bool = True
-
-
-class Join(Struct, frozen=True, tag_field="job", tag="join"):
-    """Make a `SceneReport` of parts."""
-
-    subject: Subject
-    scenarios: tuple[ScenarioReport, ...]
-    sweeps: tuple[SweepReport, ...] = ()
-    quick: bool = False
-    card: bool = False
-    """Whether to say what the model is made of."""
-
-
-class Case(Struct, frozen=True, tag_field="job", tag="case"):
-    """Measure a hard case: a `CaseReport`."""
-
-    name: str
-
-
-class Diet(Struct, frozen=True, tag_field="job", tag="diet"):
-    """Look for what a model could do without: a `DietResult`."""
-
-    subject: Subject
-    readers: tuple[diet.ReaderSource, ...] = ()
-    modules: frozenset[str] = frozenset()
-    keeps: tuple[Keep, ...] = ()
-    locked: Mapping[str, str] = {}
-    only: tuple[str, ...] = ()
-    """The kinds of findings to look for; all if none is named."""
-    quick: bool = False
-    rerun: bool = False
-    """Whether the other program is asked for what it runs with the changed files."""
-
-
-class ChooseEngines(Struct, frozen=True, tag_field="job", tag="choose-engines"):
-    """Ask which engines are meant by names, or are installed: an `EngineChoice`."""
-
-    names: tuple[str, ...] = ()
-
-
 class EngineChoice(Struct, frozen=True):
     """Names of engines with the versions of their packages, and what is not installed."""
 
@@ -125,51 +64,129 @@ class EngineChoice(Struct, frozen=True):
     remarks: tuple[str, ...]
 
 
-class Engines(Struct, frozen=True, tag_field="job", tag="engines"):
-    """Measure a model in engines: an `EngineReport`."""
-
-    subject: Subject
-    names: tuple[str, ...]
-    quick: bool = False
+def facts(_: Host) -> Facts:
+    """Say what is here: code, machine, problems."""
+    return Facts(code_digest(), this_machine(), this_machine(pinned=True), tuple(all_problems()))
 
 
-class Write(Struct, frozen=True, tag_field="job", tag="write"):
-    """Ask for the text of a file with a report of one of these kinds."""
-
-    bench: SceneReport | None = None
-    engines: EngineReport | None = None
-    diet: DietReport | None = None
-    cases: tuple[CaseReport, ...] | None = None
-
-
-class Text(Struct, frozen=True, tag_field="job", tag="text"):
-    """Ask for reports of one kind in words, for a terminal."""
-
-    bench: tuple[SceneReport, ...] = ()
-    engines: tuple[EngineReport, ...] = ()
-    diet: tuple[DietReport, ...] = ()
-    cases: tuple[CaseReport, ...] = ()
-    width: int = 100
-    colour: bool = False
-    command: str = ""
-    """What looks at a model again, with `{}` for its name."""
-    declarations: str = ""
-    """The file that declares what is kept, the same way."""
+def scenario(
+    host: Host, *, subject: Subject, number: int, quick: bool = False, timed: bool = True
+) -> ScenarioReport:
+    """Measure a scenario by its number."""
+    compiled_model = bench.compile_subject(subject, host, quick=quick)
+    return bench.run_scenario(compiled_model, number, host, quick=quick, timed=timed)
 
 
-class Compare(Struct, frozen=True, tag_field="job", tag="compare"):
-    """Compare what was recorded with what was measured: a list of `Departure`."""
-
-    recorded: SceneReport | None = None
-    measured: SceneReport | None = None
-    bands: BenchTable = BenchTable()
-    recorded_cases: tuple[CaseReport, ...] = ()
-    measured_cases: tuple[CaseReport, ...] = ()
+def sweep(
+    host: Host, *, subject: Subject, name: str, quick: bool = False, timed: bool = True
+) -> SweepReport:
+    """Measure a sweep."""
+    compiled_model = bench.compile_subject(subject, host, quick=quick)
+    return bench.run_sweep(compiled_model, name, host, quick=quick, timed=timed)
 
 
-Job: TypeAlias = (
-    About | Scenario | Sweep | Join | Case | Diet | ChooseEngines | Engines | Write | Text | Compare
-)
+def join(
+    host: Host,
+    *,
+    subject: Subject,
+    scenarios: tuple[ScenarioReport, ...],
+    sweeps: tuple[SweepReport, ...] = (),
+    quick: bool = False,
+    card: bool = False,
+) -> SceneReport:
+    """Make a report of parts; `card`: whether to say what the model is made of."""
+    compiled_model = bench.compile_subject(subject, host, quick=quick)
+    return bench.join_parts(compiled_model, scenarios, sweeps, host, quick=quick, card=card)
+
+
+def case(_: Host, *, name: str) -> CaseReport:
+    """Measure a hard case."""
+    with one_processor():
+        problem = all_problems()[name]
+        return measure_case(problem, this_machine(pinned=True), time.thread_time_ns)
+
+
+def choose_engines(_: Host, *, names: tuple[str, ...] = ()) -> EngineChoice:
+    """Which engines are meant by names, or are installed."""
+    engines, remarks = chosen_engines(names)
+    return EngineChoice(tuple((e.name, e.versions) for e in engines), remarks)
+
+
+def engines(
+    host: Host, *, subject: Subject, names: tuple[str, ...], quick: bool = False
+) -> EngineReport:
+    """Measure a model in engines."""
+    return measure_engines(subject, chosen_engines(names)[0], host, quick=quick)
+
+
+def write(
+    _: Host,
+    *,
+    bench: SceneReport | None = None,
+    engines: EngineReport | None = None,
+    diet: DietReport | None = None,
+    cases: Sequence[CaseReport] = (),
+) -> str:
+    """The text of a file with a report of one of these kinds."""
+    if bench is not None:
+        return BENCH.encode(bench).decode()
+    if engines is not None:
+        return ENGINES.encode(engines).decode()
+    if diet is not None:
+        return DIET.encode(diet).decode()
+    return STABILITY.encode(tuple(sorted(cases, key=lambda c: (c.case, c.name)))).decode()
+
+
+def text(
+    _: Host,
+    *,
+    bench: tuple[SceneReport, ...] = (),
+    engines: tuple[EngineReport, ...] = (),
+    diet: tuple[DietReport, ...] = (),
+    cases: tuple[CaseReport, ...] = (),
+    width: int = 100,
+    colour: bool = False,
+    command: str = "",
+    declarations: str = "",
+) -> str:
+    """Reports of one kind in words, for a terminal.
+
+    `command` looks at a model again, with `{}` for its name; `declarations` is the file that
+    declares what is kept, the same way.
+    """
+    style = Style(width, colour)
+    reports: tuple[AnyReport, ...] = (*bench, *engines, *cases, *diet)
+    return "\n".join(report_text(r, style, command, declarations) for r in reports)
+
+
+def compare(
+    _: Host,
+    *,
+    recorded: SceneReport | None = None,
+    measurement: SceneReport | None = None,
+    bands: BenchTable | None = None,
+    recorded_cases: tuple[CaseReport, ...] = (),
+    measured_cases: tuple[CaseReport, ...] = (),
+) -> tuple[Departure, ...]:
+    """Compare what was recorded with what was measured."""
+    if recorded is not None and measurement is not None:
+        return scene_departures(recorded, measurement, bands or BenchTable())
+    return case_departures(recorded_cases, measured_cases)
+
+
+JOBS: dict[str, Callable[..., object]] = {
+    "about": facts,
+    "scenario": scenario,
+    "sweep": sweep,
+    "join": join,
+    "case": case,
+    "diet": diet.look_at,
+    "choose-engines": choose_engines,
+    "engines": engines,
+    "write": write,
+    "text": text,
+    "compare": compare,
+}
 
 
 class Question(Struct, frozen=True, omit_defaults=True):
@@ -240,9 +257,8 @@ def serve() -> None:
     os.dup2(2, 1)  # what MuJoCo or an engine prints is no answer
     pipe = Pipe(sys.stdin.buffer, answers)
     while line := sys.stdin.buffer.readline():
-        job = msgspec.json.decode(line, type=Job)
         try:
-            pipe.say(result=answer(job, pipe))
+            pipe.say(result=answer(line, pipe))
         except CannotMeasureError as error:
             pipe.say(failure=Failure(error.message, error.help, error.place, error.cause))
         except DisagreementError as error:
@@ -252,72 +268,9 @@ def serve() -> None:
             pipe.say(failure=Failure(str(error)))
 
 
-def answer(job: Job, host: Host) -> object:
-    """Do a job."""
-    match job:
-        case About():
-            return Facts(
-                code_digest(), this_machine(), this_machine(pinned=True), tuple(all_problems())
-            )
-        case Scenario():
-            compiled_model = bench.compile_subject(job.subject, host, quick=job.quick)
-            return bench.run_scenario(
-                compiled_model, job.number, host, quick=job.quick, timed=job.timed
-            )
-        case Sweep():
-            compiled_model = bench.compile_subject(job.subject, host, quick=job.quick)
-            return bench.run_sweep(compiled_model, job.name, host, quick=job.quick, timed=job.timed)
-        case Join():
-            compiled_model = bench.compile_subject(job.subject, host, quick=job.quick)
-            return bench.join_parts(
-                compiled_model, job.scenarios, job.sweeps, host, quick=job.quick, card=job.card
-            )
-        case Case():
-            with one_processor():
-                problem = all_problems()[job.name]
-                return measure_case(problem, this_machine(pinned=True), time.thread_time_ns)
-        case Diet():
-            return diet.look_at(
-                job.subject,
-                host,
-                job.readers,
-                modules=job.modules,
-                keeps=job.keeps,
-                locked=job.locked,
-                only=job.only,
-                quick=job.quick,
-                rerun=job.rerun,
-            )
-        case ChooseEngines():
-            engines, remarks = chosen_engines(job.names)
-            return EngineChoice(tuple((e.name, e.versions) for e in engines), remarks)
-        case Engines():
-            engines, _ = chosen_engines(job.names)
-            return measure_engines(job.subject, engines, host, quick=job.quick)
-        case Write():
-            return _file_text(job)
-        case Text():
-            return _words(job)
-        case Compare():
-            if job.recorded is not None and job.measured is not None:
-                return scene_departures(job.recorded, job.measured, job.bands)
-            return case_departures(job.recorded_cases, job.measured_cases)
-
-
-def _file_text(job: Write) -> str:
-    if job.bench is not None:
-        data = BENCH.encode(job.bench)
-    elif job.engines is not None:
-        data = ENGINES.encode(job.engines)
-    elif job.diet is not None:
-        data = DIET.encode(job.diet)
-    else:
-        cases = sorted(job.cases or (), key=lambda case: (case.case, case.name))
-        data = STABILITY.encode(tuple(cases))
-    return data.decode()
-
-
-def _words(job: Text) -> str:
-    style = Style(job.width, job.colour)
-    reports: tuple[AnyReport, ...] = (*job.bench, *job.engines, *job.cases, *job.diet)
-    return "\n".join(report_text(r, style, job.command, job.declarations) for r in reports)
+def answer(request: bytes, host: Host) -> object:
+    """Do the job that a line asks for."""
+    values = msgspec.json.decode(request)
+    job = JOBS[values.pop("job")]
+    forms = get_type_hints(job)
+    return job(host, **{name: msgspec.convert(part, forms[name]) for name, part in values.items()})

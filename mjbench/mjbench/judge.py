@@ -27,8 +27,7 @@ from mjbench.columns import (
     row_ratios,
     spreads,
     times_text,
-    unresolved_columns,
-    worse_columns,
+    worse_texts,
 )
 from mjbench.reports.limits import stability_text, stray_timestep
 from mjbench.reports.scene_report import (
@@ -83,8 +82,6 @@ def mark_luck(
                 work = "shorter timesteps" if dear.timestep < setting.timestep else ""
             elif dear == replace(setting, iterations=dear.iterations):
                 work = "more iterations" if dear.iterations > setting.iterations else ""
-            elif dear == replace(setting, cone=own_row.setting.cone):
-                luck = luck or _luck_of_cone(row, rival, quantity)
             if luck or not work or row.status != "ok":
                 continue
             known_until = math.inf if row.parted is None else (1 - _WORTH_SAYING) * row.parted
@@ -94,21 +91,6 @@ def mark_luck(
                 luck = f"its error rises with {work}"
         marked_rows.append(replace(row, lucky=luck))
     return tuple(marked_rows)
-
-
-def _luck_of_cone(row: WorkPrecisionRow, rival: WorkPrecisionRow, quantity: ErrorQuantity) -> str:
-    """Why a smaller error than under the scene's own cone is luck; empty where it is none.
-
-    Where the model under that cone errs no less, it has cancelled with the error of the timestep.
-    """
-
-    def is_less(error: float | None, than: float | None) -> bool:
-        return error is not None and than is not None and error * (1 + ERROR_SLACK) < than
-
-    if row.model_error is None or not is_less(quantity.value_of(row), quantity.value_of(rival)):
-        return ""
-    is_nearer = rival.model_error is None or is_less(row.model_error, rival.model_error)
-    return "" if is_nearer else "in small steps that cone errs no less"
 
 
 def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
@@ -132,12 +114,11 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
         text = f"nothing can be said of the scene's own setting: {row.lucky}"
         return RowVerdict(None, text + remark)
     if row.dominated_by is None:
-        text, worse = _describe_rival(report)
         scope = " that was measured" if report.failures else ""
-        text = text or f"no other setting{scope} is cheaper without being less accurate"
-        return RowVerdict(None, text + remark, worse)
-    text, is_better, worse = _judge_rival(report, row.dominated_by, starts)
-    return RowVerdict(row.dominated_by if is_better else None, text + remark, worse)
+        text = f"no other setting{scope} is cheaper without being less accurate"
+        return RowVerdict(None, (_describe_rival(report) or text) + remark)
+    text, is_better = _judge_rival(report, row.dominated_by, starts)
+    return RowVerdict(row.dominated_by if is_better else None, text + remark)
 
 
 def quantity_of(report: ScenarioReport) -> ErrorQuantity:
@@ -146,13 +127,11 @@ def quantity_of(report: ScenarioReport) -> ErrorQuantity:
     return next(matches, replace(SEEN, least=report.least_seen))
 
 
-def _judge_rival(
-    report: ScenarioReport, number: int, starts: Starts
-) -> tuple[str, bool, tuple[str, ...]]:
-    """What is said of a row that is better here, whether it is, and in which columns it is not."""
+def _judge_rival(report: ScenarioReport, number: int, starts: Starts) -> tuple[str, bool]:
+    """What is said of a row that is better here, and whether it is better."""
     baseline, rival = next(r for r in report.rows if r.own), report.rows[number]
     figure, none = report.figure, "no difference that holds: "
-    own_ratios, vague = row_ratios(report, baseline, rival), unresolved_columns(report, baseline)
+    own_ratios = row_ratios(report, baseline, rival)
     if baseline.setting.cone == rival.setting.cone:  # the model errs alike under both
         own_ratios.pop(("contact_model", WHOLE), None)
     pair = [columns_of(row, report.contact_model) for row in (baseline, rival)]
@@ -160,26 +139,23 @@ def _judge_rival(
     resolved = [c for c in own_ratios if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
     if not resolved and (baseline.seen is None or report.least_seen >= 1):
         text = "no setting can be called better: the reference resolves no error of "
-        return f"{text}{rival.name}, or of the scene's own setting", False, ()
+        return f"{text}{rival.name}, or of the scene's own setting", False
     price, is_cheap = _price(rival), _is_cheap(rival)
     claim = f"{rival.name} {price} and {_gain_text([own_ratios], figure)}"
     if not is_cheap and min(own_ratios.values()) > 1 - _WORTH_SAYING:
-        return f"{none}{claim} here, which is within what such runs differ by", False, ()
+        return f"{none}{claim} here, which is within what such runs differ by", False
     nearby, elsewhere = starts(number), "from starts nearby"
     elsewhere += " or with drawn parameters" if report.drawn else ""
     if nearby is None:
-        text = f"{claim} here; whether that holds {elsewhere} was not measured"
-        return text, False, ()
+        return f"{claim} here; whether that holds {elsewhere} was not measured", False
     everywhere = [own_ratios, *nearby]
-    gain, worse = _gain(everywhere), tuple(worse_columns(spreads(everywhere)))
-    if worse:
-        texts = tuple(part.text(figure, vague) for part in worse)
-        return f"{none}{claim} here, but {elsewhere} {texts[0]}", False, texts
-    if not is_cheap and gain.high > 1 - _WORTH_SAYING:
-        return f"{none}{claim} here, but is no better {elsewhere}", False, ()
+    if worse := worse_texts(report, baseline, everywhere):
+        return f"{none}{claim} here, but {elsewhere} {worse[0]}", False
+    if not is_cheap and _gain(everywhere).high > 1 - _WORTH_SAYING:
+        return f"{none}{claim} here, but is no better {elsewhere}", False
     if limit := stray_timestep(report, rival):
         reason = f"leaves the motion of small steps at some timesteps beyond {limit}"
-        return f"{none}{claim} here, but {rival.setting.integrator} {reason}", False, ()
+        return f"{none}{claim} here, but {rival.setting.integrator} {reason}", False
     text = f"{rival.name} is better: it {price} and {_gain_text(everywhere, figure)}"
     quantity = quantity_of(report)
     if quantity.name == "seen" and rival.step_error is not None:
@@ -189,7 +165,7 @@ def _judge_rival(
     elif (value := quantity.value_of(rival)) is not None and value <= quantity.least:
         is_less = " less" in text
         text += ", or more: the reference resolves no more" if is_less else _AS_FAR
-    return text, True, ()
+    return text, True
 
 
 _AS_FAR = ", as far as the reference resolves"
@@ -226,20 +202,18 @@ def _is_cheap(row: WorkPrecisionRow) -> bool:
     return row.cost is not None and row.cost.value <= 1 - _WORTH_SAYING and row.cost.high < 1
 
 
-def _describe_rival(report: ScenarioReport) -> tuple[str, tuple[str, ...]]:
+def _describe_rival(report: ScenarioReport) -> str:
     """The cheapest setting that would be better by one number, and why it is not; empty if none."""
-    row = _cheapest_rival(report)
-    baseline = report.own_row
+    row, baseline = _cheapest_rival(report), report.own_row
     if row is None or baseline is None:
-        return "", ()
-    own_ratios, unresolved = row_ratios(report, baseline, row), unresolved_columns(report, baseline)
-    worse = worse_columns(spreads([own_ratios]))
-    texts = tuple(part.text(report.figure, unresolved) for part in worse)
-    if row.lucky or not texts:
+        return ""
+    own_ratios = row_ratios(report, baseline, row)
+    worse = worse_texts(report, baseline, [own_ratios])
+    if row.lucky or not worse:
         gain = f"{_price(row)} and {_gain_text([own_ratios], report.figure)}"
         reason = row.lucky or "that is within what such runs differ by"
-        return f"no difference that holds: {row.name} {gain} here, but {reason}", ()
-    return f"no setting is better: {row.name} {_price(row)}, but {texts[0]}", texts
+        return f"no difference that holds: {row.name} {gain} here, but {reason}"
+    return f"no setting is better: {row.name} {_price(row)}, but {worse[0]}"
 
 
 def _cheapest_rival(report: ScenarioReport) -> WorkPrecisionRow | None:
@@ -401,8 +375,8 @@ def _mend(report: ScenarioReport, baseline: WorkPrecisionRow, name: str) -> str:
     times = times_text(ratio, math.inf if is_least else ratio)
     text = f"{row.name} errs {times} less in all"
     text += "" if row.cost is None else f" and {_price(row)}"
-    worse = next(worse_columns(spreads([row_ratios(report, baseline, row)])), None)
-    return text if worse is None else f"{text}, but {worse.text(report.figure)}"
+    worse = worse_texts(report, baseline, [row_ratios(report, baseline, row)])
+    return f"{text}, but {worse[0]}" if worse else text
 
 
 def _mending_row(

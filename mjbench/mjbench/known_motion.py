@@ -3,10 +3,10 @@
 1. A smooth scene is integrated over `mj_forward` by Bulirsch–Stoer; DOP853 does it again. Their
    difference bounds the error of the reference. Both take the same accelerations, so the engine in
    ever smaller steps must tend to the same motion.
-2. A closed form that the scenario names, or that the course has, comes first, and that integration
-   second. A course's own is believed after it was checked only: in a smooth scene two integrations
-   that agree, and the engine that tends to them, outvote it; elsewhere the model must come nearer
-   to it the stiffer its contacts and the shorter its timesteps are.
+2. The exact motion that a course has comes first, and that integration second. It is believed after
+   it was checked only: in a smooth scene two integrations that agree, and the engine that tends to
+   them, outvote it; elsewhere the model must come nearer to it the stiffer its contacts and the
+   shorter its timesteps are.
 3. Where accelerations jump, the engine tends elsewhere, or the scene is too stiff for an
    integration in reasonable time, only the engine itself is left: in small steps, and again in
    steps twice as long under another integrator. This reference is called `self`.
@@ -25,7 +25,6 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from mjbench import integrate
-from mjbench.cases import closed_motion, floor
 from mjbench.declarations import DeclaredScenario, Place
 from mjbench.measure import (
     errors,
@@ -40,7 +39,6 @@ from mjbench.simulation import (
     initial_data,
     motion_of,
     simulate,
-    states_of,
     stiffened,
     with_integrator,
     without_sleep,
@@ -55,8 +53,6 @@ FINER, QUICK_FINER = 16, 8
 PARTING_DISTANCE, _PARTING_SHARE = 0.01, 0.1
 """The difference from which on motions have nothing in common, rad or relative to the extent; the
 same of two that are to be a reference, relative to the error to be told."""
-FOREIGN = 1e-3
-"""The difference from which on a closed form is that of another scene, in the same units."""
 PRECISION, _VOTES = 1e-8, 100.0
 """How far a course's exact motion may be off, relative to the largest number in it where this is
 over 1, unless its scenario says; and floors of the integration within which it always may."""
@@ -67,8 +63,6 @@ _APPROACH, _NEAR, _ELSEWHERE = 0.8, 3.0, 5.0
 """The part of a difference that twice the stiffness may leave; within how many floors of the engine
 an exact motion is the engine's; how many times farther it is from stiff contacts than these moved
 at last, and can be known, where it is another one."""
-_NEARBY_GAP = 2.0
-"""The same from starts nearby."""
 _STEP = 1e-6
 """s, of the model whose accelerations are integrated: `refsafe` softens nothing then."""
 _TENDS_ELSEWHERE = "the engine with small steps converges to something else"
@@ -94,48 +88,37 @@ class KnownMotion(Struct, frozen=True):
 
 
 def find_reference(model: Any, pilot: Pilot, *, quick: bool = False) -> KnownMotion:
-    """The reference of a scene; a `SceneError` where a closed form is not this scene's."""
+    """The reference of a scene; a `SceneError` where its exact motion is not this scene's."""
     reference = _find_computed(model, pilot, quick=quick)
     declaration = pilot.scene.declaration
-    if declaration.closed_form:
-        problem, motion = closed_motion(model, pilot.scene, declaration, reference.states.times)
-        states = states_of(model, motion, reference.states)
-        subject = f"the closed form of `{declaration.closed_form}`"
-        place, source = declaration.place("reference"), problem.reference.source
-        return _with_closed_form(model, reference, states, source, floor(problem), subject, place)
     exact = None if declaration.reference else pilot.scene.exact
     if exact is None:
         return reference
     states = exact.engine_states(model, pilot.scene.scenario, reference.states)
     least = _check_exact(model, pilot, exact, states, reference, quick=quick)
-    subject, place = f"`{exact.path}`", Place(exact.path)
-    return _with_closed_form(model, reference, states, exact.path, least, subject, place)
+    gap = motion_gap(model, states, reference.states)
+    return replace(
+        reference,
+        kind="closed",
+        source=exact.path,
+        states=states,
+        second_states=reference.states,
+        floor=least.at_least(gap) if reference.kind == "ode" else least,
+        second=reference.source,
+        agreement=gap.largest,
+        note="",
+    )
 
 
-def find_nearby(
-    model: Any, pilot: Pilot, declared_reference: KnownMotion, *, quick: bool
-) -> EngineStates | None:
+def find_nearby(model: Any, pilot: Pilot, *, quick: bool) -> EngineStates | None:
     """The states of a scene's reference from another start; `None` where nobody knows them.
 
-    `declared_reference`: the reference from the start that is declared, which was checked. A
-    course's own exact motion may hold from there only, so it counts where nothing is integrated,
-    and as long as it stays about as near to the engine as it does there.
+    A course's own exact motion may hold from the declared start only.
     """
-    if pilot.scene.declaration.closed_form:
-        return None
-    model = without_sleep(model)
     try:
-        reference = _find_computed(model, pilot, quick=quick)
+        return _find_computed(without_sleep(model), pilot, quick=quick).states
     except SceneError:
         return None
-    exact = pilot.scene.exact if declared_reference.kind == "closed" else None
-    if exact is None or reference.kind == "ode":
-        return reference.states
-    states = exact.engine_states(model, pilot.scene.scenario, reference.states)
-    gap = motion_gap(model, states, reference.states).place
-    usual_gap = motion_gap(model, declared_reference.states, declared_reference.second_states).place
-    is_usual = gap <= _NEARBY_GAP * max(usual_gap, reference.floor.place)
-    return states if is_usual else reference.states
 
 
 def _find_computed(model: Any, pilot: Pilot, *, quick: bool) -> KnownMotion:
@@ -332,37 +315,3 @@ def _combine(
 def motion_gap(model: Any, states: EngineStates, second_states: EngineStates) -> Sizes:
     """How far two motions are apart at most."""
     return largest_errors(errors(motion_of(model, states), motion_of(model, second_states)))
-
-
-def _with_closed_form(
-    model: Any,
-    second: KnownMotion,
-    states: EngineStates,
-    source: str,
-    least: Sizes,
-    subject: str,
-    place: Place,
-) -> KnownMotion:
-    """Put a closed form first, and what was integrated second."""
-    count = min(len(states.times), len(second.states.times))
-    states = states.head(count)
-    gap = motion_gap(model, states, second.states)
-    distance = float(position_distances(model, states.qpos, second.states.qpos).max(initial=0.0))
-    floor = least
-    if second.kind == "ode":
-        if not distance <= FOREIGN:
-            message = f"{subject} is not this scene's motion"
-            help = f"the two are {distance:.2g} apart (rad, or relative to the extent)"
-            raise SceneError(message, place, help)
-        floor = least.at_least(gap)
-    return replace(
-        second,
-        kind="closed",
-        source=source,
-        states=states,
-        second_states=second.states,
-        floor=floor,
-        second=second.source,
-        agreement=gap.largest,
-        note="",
-    )

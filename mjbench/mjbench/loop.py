@@ -144,7 +144,7 @@ def close_loop(loop: Loop, model: Any, data: Any) -> None:
 
 
 class TimeLimitError(Exception):
-    """The time of what is measured is over; the text is what is known until then."""
+    """The time of what is measured is over."""
 
 
 _deadlines = [math.inf]

@@ -54,8 +54,8 @@ class Parts:
                 return measure()
         except SceneError:
             raise
-        except TimeLimitError as error:  # which says what is known until then, if anything
-            self.failures.append(PartFailure(name, "; ".join(filter(None, (LATE, str(error))))))
+        except TimeLimitError:
+            self.failures.append(PartFailure(name, LATE))
         except KeyboardInterrupt:
             self.stopped = True
             self.failures.append(PartFailure(name, STOPPED))

@@ -134,12 +134,10 @@ def _pilot_of(model: Any, scene: Scene) -> Pilot:
     variant.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     data, errors = simulation.initial_data(scenario, variant), horizon_errors(variant, scene)
     twins, nudge_sizes = [], []
-    for position, velocity in nudges(variant, 2 * _DIRECTIONS, NUDGE):
-        twin = simulation.initial_data(scenario, variant)
-        mujoco.mj_integratePos(variant, twin.qpos, position, 1.0)
-        twin.qvel[:] += velocity
-        twins.append(twin)
-        nudge_sizes.append(float(np.max(np.abs(position / errors), initial=0.0)))
+    for change in nudges(variant, 2 * _DIRECTIONS, NUDGE):
+        aside = simulation.nudged(scenario, variant, change)
+        twins.append(simulation.initial_data(aside, variant))
+        nudge_sizes.append(float(np.max(np.abs(change[0] / errors), initial=0.0)))
     look = _Observer(variant)
     peaks, half_thickness, passages = Peaks(), thickness(variant), Passages(variant)
     times, steps_per_sample = scenario.times, scenario.steps(step)
@@ -295,9 +293,7 @@ class _Observer:
             (self.friction, "dry friction"),
             (self.full, "an activation at its limit"),
             (bool(model.nplugin), "a plugin"),
-            (bool(np.any(model.actuator_history[:, 0] > 0)), "a delayed actuator")
-            if hasattr(model, "actuator_history")
-            else (False, ""),
+            (bool(np.any(model.actuator_history[:, 0] > 0)), "a delayed actuator"),
         )
         return tuple(words for is_present, words in causes if is_present)
 

@@ -64,10 +64,8 @@ def _field_descriptions() -> dict[tuple[str, str], str]:
     """What stands below the fields of all types of reports, by class and field."""
     from mjbench import machine, reports
     from mjbench.reports import (
-        case_report,
         charts,
         diet_report,
-        engine_report,
         model_report,
         scene_report,
     )
@@ -77,9 +75,7 @@ def _field_descriptions() -> dict[tuple[str, str], str]:
         machine,
         charts,
         scene_report,
-        case_report,
         model_report,
-        engine_report,
         diet_report,
     )
     fields: dict[str, dict[str, str]] = {}

@@ -41,7 +41,7 @@ _CODE = {
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """All that the next step depends on."""
 _LOOK_INTERVAL = 8
-"""Steps from one look at the state to the next, as a rule."""
+"""Steps from one look at the state to the next: what shoots up takes longer to come back."""
 
 
 @lru_cache(maxsize=64)
@@ -156,27 +156,6 @@ def watch_steps(
                 iterations.append(int(data.solver_niter.sum()))
 
 
-def advance_watching(
-    model: Any,
-    data: Any,
-    steps: int,
-    peaks: Peaks,
-    passages: Passages,
-    iterations: list[int] | None = None,
-) -> Peaks:
-    """Make so many steps; stop once the state is not finite. Returns the updated `peaks`.
-
-    `passages` watches what goes through what. Only one state in a few is looked at, which suffices:
-    what shoots up takes longer to come back.
-    """
-    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
-    for done in range(0, steps, _LOOK_INTERVAL):
-        if peaks.finite:
-            watch_steps(model, data, min(_LOOK_INTERVAL, steps - done), passages, iterations)
-            peaks = update_peaks(data, peaks, passages.thickness)
-    return peaks
-
-
 def initial_data(scenario: Scenario, model: Any) -> Any:
     """`mjData` in the initial state of a scenario."""
     data = mujoco.MjData(model)
@@ -193,6 +172,18 @@ def initial_data(scenario: Scenario, model: Any) -> Any:
     if scenario.loop is not None:
         close_loop(scenario.loop, model, data)
     return data
+
+
+def nudged(scenario: Scenario, model: Any, change: Array) -> Scenario:
+    """A scenario that begins aside by changes of positions and velocities, (2, nv)."""
+    data = initial_data(scenario, model)
+    mujoco.mj_integratePos(model, data.qpos, change[0], 1.0)
+    return replace(scenario, qpos=tuple(data.qpos), qvel=tuple(data.qvel + change[1]))
+
+
+def runnable(model: Any) -> Any:
+    """A copy of a `mjModel` under its own setting, with automatic reset off."""
+    return with_integrator(model, integrator_of(model), float(model.opt.timestep))
 
 
 def full_state(model: Any, data: Any) -> Array:
@@ -246,16 +237,6 @@ def motion_of(model: Any, states: EngineStates) -> Motion:
     return Motion(states.times, states.qpos[:, places], attitude, states.qvel)
 
 
-def states_of(model: Any, motion: Motion, template: EngineStates) -> EngineStates:
-    """A motion in the engine's coordinates; what it does not hold comes from the template."""
-    places, turns = coordinates(model)
-    qpos = template.qpos.copy()
-    qpos[:, places] = motion.position
-    for index, at in enumerate(turns):
-        qpos[:, at : at + 4] = motion.attitude[:, index]
-    return EngineStates(motion.times, qpos, motion.velocity, template.act)
-
-
 class Run(Struct, frozen=True):
     """A simulation, sampled n times."""
 
@@ -276,6 +257,7 @@ class Run(Struct, frozen=True):
 def simulate(setup: Setup, model: Any, iterations: list[int] | None = None) -> Run:
     """Run a scenario with a model under its own options; `iterations` as for `watch_steps`."""
     scenario, times = setup.scenario, setup.scenario.times
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     steps = scenario.steps(float(model.opt.timestep))
     data, scratch = initial_data(scenario, model), initial_data(scenario, model)
     qpos, qvel, act = (np.full((len(times), n), np.nan) for n in (model.nq, model.nv, model.na))
@@ -284,7 +266,10 @@ def simulate(setup: Setup, model: Any, iterations: list[int] | None = None) -> R
     peaks, passages = Peaks(penetration=deepest_contact(scratch)), Passages(model, setup)
     for index, inputs in enumerate(scenario.inputs(scenario.sample)):
         inputs.give(data)
-        peaks = advance_watching(model, data, steps, peaks, passages, iterations)
+        for done in range(0, steps, _LOOK_INTERVAL):
+            if peaks.finite:
+                watch_steps(model, data, min(_LOOK_INTERVAL, steps - done), passages, iterations)
+                peaks = update_peaks(data, peaks, passages.thickness)
         if not peaks.finite:
             break
         qpos[index], qvel[index], act[index] = data.qpos, data.qvel, data.act

@@ -22,11 +22,10 @@ from typing import Any
 
 import numpy as np
 from msgspec import Struct, field
-from msgspec.structs import asdict, replace
+from msgspec.structs import replace
 
 from mjbench.detector import Passages, driving_force
 from mjbench.linearization import Theory, find_theory
-from mjbench.loop import TimeLimitError
 from mjbench.parts import Parts
 from mjbench.pilot import MOST_STEPS, Pilot, longer_setup, position_distances
 from mjbench.problem import (
@@ -37,9 +36,8 @@ from mjbench.problem import (
     Setup,
 )
 from mjbench.reports import Reach, reach
-from mjbench.reports.case_report import BoundaryLine
 from mjbench.reports.scene_report import StableRow
-from mjbench.reports.shown_errors import FEWEST_STEPS, seconds_text
+from mjbench.reports.shown_errors import FEWEST_STEPS
 from mjbench.simulation import (
     EngineStates,
     compile_model,
@@ -52,13 +50,14 @@ from mjbench.stability_runs import (
     STARTS,
     KeptMotion,
     StabilityTrial,
+    bisect,
     kept_motion,
     run_trial,
 )
 
-_REACH, _NEAR = 10.0, 2.0
-"""The grid is tried down to this part of the shortest timestep that is lost; from other starts so
-far below and beyond it."""
+_NEAR = 2.0
+"""How many times below and beyond the shortest timestep that is lost others are tried from starts
+nearby."""
 _GRID, _FINE, _CLOSER = 16, 1e-4, 32
 _QUICK_GRID, _COARSE, _QUICK_CLOSER = 6, 1e-2, 8
 """The timesteps that are tried in a decade, the relative width at which a bisection ends, and the
@@ -107,23 +106,8 @@ class Laboratory(Struct, frozen=True, eq=False):
             step for (start, step), runs in self.trials.items() if not start and 1 in runs
         )
 
-    def findings(self) -> str:
-        """What a search that was cut has seen, in words; empty before its first run."""
-        steps, clauses = self.own_steps(), []
-        for words, is_lost in (
-            ("near the motion of small steps", lambda step: self.trial(0, step).astray),
-            ("bounded", lambda step: self.is_lost(0, step)),
-        ):
-            lost = next((step for step in steps if is_lost(step)), math.inf)
-            shorter = [step for step in steps if step < lost]
-            texts = [f"{words} at {seconds_text(shorter[-1], 3)}"] if shorter else []
-            if lost < math.inf:
-                texts.append(f"not {'' if shorter else f'{words} '}at {seconds_text(lost, 3)}")
-            clauses += [", ".join(texts)] if texts else []
-        return f"so far {'; '.join(clauses)}" if clauses else ""
 
-
-def boundaries(problem: Problem) -> tuple[BoundaryLine, ...]:
+def boundaries(problem: Problem) -> tuple[StableRow, ...]:
     """The boundaries of all integrators for which they may differ.
 
     None where the problem names no timesteps to look between.
@@ -152,9 +136,7 @@ def with_energy_bound(problem: Problem) -> Problem:
     return replace(problem, energy_bound=bound)
 
 
-def boundary(
-    problem: Problem, integrator: Integrator, theory: Theory | None = None
-) -> BoundaryLine:
+def boundary(problem: Problem, integrator: Integrator, theory: Theory | None = None) -> StableRow:
     """Search for the largest stable timestep of a problem with a search interval."""
     assert problem.search is not None
     low, high = problem.search
@@ -164,23 +146,7 @@ def boundary(
         return run_trial(problem, compile_model(problem.mjcf, integrator, step), span, start=start)
 
     laboratory = Laboratory(run, problem.span, STARTS)
-    row = search_row(laboratory, integrator, search, problem, theory or Theory(problem.limit))
-    trials = (laboratory.trial(0, step) for step in laboratory.own_steps())
-    lost = next((trial for trial in trials if not trial.stable), None)
-    limits = row.largest, row.theory
-    difference = None
-    if isinstance(limits[0], float) and isinstance(limits[1], float):
-        difference = limits[0] / limits[1] - 1
-    return BoundaryLine(
-        **asdict(row),
-        difference=difference,
-        beyond="" if lost is None else lost.status.value,
-        growth=None if lost is None else _finite(lost.growth),
-    )
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return search_row(laboratory, integrator, search, problem, theory or Theory(problem.limit))
 
 
 def search_row(
@@ -244,7 +210,7 @@ def search_row(
         searched=(steps[0], steps[-1]),
         islands=(islands[0], islands[-1]) if islands and not is_all else None,
         duration=laboratory.span,
-        energy=_finite(setup.energy_bound),
+        energy=setup.energy_bound if math.isfinite(setup.energy_bound) else None,
         bracket=(min(bounds), max(bounds)) if estimates and min(bounds) < grid[-1] else None,
         theory=None if limit is None else reach(limit.timestep),
         formula="" if limit is None else limit.source,
@@ -271,38 +237,6 @@ def _limit_of(
     largest = bisect(is_lost, steps, max(resolution, _COARSE), math.inf, snap=laboratory.snap)
     lost = [h for h in laboratory.own_steps() if h > largest and is_lost(h)]
     return reach(largest), getattr(laboratory.trial(0, lost[0]), kind) if lost else ""
-
-
-def bisect(
-    is_lost: Callable[[float], bool],
-    grid: Sequence[float],
-    resolution: float,
-    reach: float = _REACH,
-    enough: float = 0.0,
-    snap: Callable[[float], float] = float,
-) -> float:
-    """The largest timestep below which none is lost: infinite for all of the grid, 0 for none.
-
-    The grid is tried from above, down to `1 / reach` of the shortest that is lost, or to `enough`
-    (s) where none is. `snap`: as of a `Laboratory`.
-    """
-    lost = math.inf
-    stable = 0.0
-    for step in reversed(grid):
-        if step < (enough if math.isinf(lost) else lost / reach):
-            break
-        if is_lost(step):
-            lost, stable = step, 0.0
-        elif not stable:
-            stable = step
-    if math.isinf(lost) or not stable:
-        return math.inf if math.isinf(lost) else 0.0
-    while lost / stable > 1 + resolution:
-        middle = snap(math.sqrt(lost * stable))
-        if middle <= stable:  # none that is tried lies between
-            break
-        lost, stable = (middle, stable) if is_lost(middle) else (lost, middle)
-    return stable
 
 
 def _look_closer(
@@ -386,10 +320,7 @@ def stable_rows(
         snap = float if loop is None else loop.timestep_below
         laboratory = Laboratory(run, span, starts, questions, shortest, snap)
         look = partial(find, laboratory, integrator, search)
-        try:
-            return look(closer=False), partial(look, closer=True)
-        except TimeLimitError:
-            raise TimeLimitError(laboratory.findings()) from None
+        return look(closer=False), partial(look, closer=True)
 
     baseline = integrator_of(model)  # of which the verdict tells, so it comes first
     order = sorted(STANDARD, key=lambda i: i is not baseline)

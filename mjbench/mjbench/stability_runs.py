@@ -1,9 +1,14 @@
-"""Runs of a model over a span, and what ends in them: bounds, nearness, passing through."""
+"""Runs of a model over a span, and what ends in them: bounds, nearness, passing through.
+
+And up to which delay a controller in the loop does what it does without it.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -16,7 +21,14 @@ from mjbench.detector import Passages, Peaks, RunStatus, has_bad_state, judge, u
 from mjbench.pilot import Pilot, horizon_error, nudges, position_distance, scales
 from mjbench.problem import Array, Setup
 from mjbench.reports.shown_errors import horizon_error_text
-from mjbench.simulation import EngineStates, initial_data, watch_steps
+from mjbench.simulation import (
+    EngineStates,
+    initial_data,
+    nudged,
+    runnable,
+    simulate,
+    watch_steps,
+)
 
 STARTS, QUICK_STARTS, NEARBY = 5, 3, 1e-4
 """The starts of runs, the own one among them, and how far the others are from it: rad, or relative
@@ -39,9 +51,6 @@ class StabilityTrial(Struct, frozen=True):
     timestep: float
     """s."""
     status: RunStatus
-    growth: float
-    """The factor by which velocities grow in a step, from half the run to its end; NaN where the
-    run was lost before."""
     reason: str = ""
     """Why it was lost."""
     astray: str = ""
@@ -129,7 +138,6 @@ def run_trial(
         {*range(1, _TRANSIENT + 1), *range(0, steps, interval), steps, *commands, *samples}
     )
     passages, astray = Passages(model, setup), ""
-    sizes: list[tuple[int, float]] = []
     limits, count, excess_end, is_lost = setup, 0, 0.0, False
     peak_speed = 0.0
     for stop in (stop for stop in stops if stop <= steps):
@@ -138,7 +146,7 @@ def run_trial(
                 watch_steps(model, data, stop - count, passages)
         except mujoco.FatalError:  # MuJoCo does not run it
             reason = "MuJoCo does not run it"
-            return StabilityTrial(timestep, RunStatus.DIVERGED, math.nan, reason, reason)
+            return StabilityTrial(timestep, RunStatus.DIVERGED, reason, reason)
         count, now = stop, update_peaks(data, Peaks())
         if not count:  # before the first step MuJoCo has computed no energy: it says 0
             now = replace(now, energy=-math.inf)
@@ -158,7 +166,6 @@ def run_trial(
                 astray += _LATE if late and late[0] < data.time else ""
         if stop in commands:
             commands[stop].give(data)
-        sizes.append((count, math.hypot(*data.qvel.tolist())))
     is_lost = is_lost or excess_end > _DECAY * span  # it shot up, and has not come down
     judgement = judge(data, now, setup if is_lost else limits)
     status, reason = judgement.status, "; ".join(judgement.reasons)
@@ -166,7 +173,39 @@ def run_trial(
         status, reason = RunStatus.SLOW_GROWTH, "what shot up in the first steps did not come down"
     through = "; ".join(passages.texts())
     astray = astray or ("it is lost" if is_lost else "")
-    return StabilityTrial(timestep, status, _growth(sizes), reason, astray, through)
+    return StabilityTrial(timestep, status, reason, astray, through)
+
+
+def bisect(
+    is_lost: Callable[[float], bool],
+    grid: Sequence[float],
+    resolution: float,
+    reach: float = 10.0,
+    enough: float = 0.0,
+    snap: Callable[[float], float] = float,
+) -> float:
+    """The largest timestep below which none is lost: infinite for all of the grid, 0 for none.
+
+    The grid is tried from above, down to `1 / reach` of the shortest that is lost, or to `enough`
+    (s) where none is. `snap`: as of a `Laboratory`.
+    """
+    lost = math.inf
+    stable = 0.0
+    for step in reversed(grid):
+        if step < (enough if math.isinf(lost) else lost / reach):
+            break
+        if is_lost(step):
+            lost, stable = step, 0.0
+        elif not stable:
+            stable = step
+    if math.isinf(lost) or not stable:
+        return math.inf if math.isinf(lost) else 0.0
+    while lost / stable > 1 + resolution:
+        middle = snap(math.sqrt(lost * stable))
+        if middle <= stable:  # none that is tried lies between
+            break
+        lost, stable = (middle, stable) if is_lost(middle) else (lost, middle)
+    return stable
 
 
 def _nearest_samples(times: Sequence[float], timestep: float) -> dict[int, int]:
@@ -181,12 +220,68 @@ def _nearest_samples(times: Sequence[float], timestep: float) -> dict[int, int]:
     return {counts[n]: n for n in nearest_last if counts[n]}
 
 
-def _growth(sizes: list[tuple[int, float]]) -> float:
-    """The factor by which velocities grow in a step, from the middle of a run to its end."""
-    if len(sizes) < 2:
-        return math.nan
-    middle = next(n for n, (count, _) in enumerate(sizes) if 2 * count >= sizes[-1][0])
-    (before, small), (after, large) = sizes[min(middle, len(sizes) - 2)], sizes[-1]
-    if not 0 < small < math.inf or not 0 < large < math.inf:
-        return math.nan
-    return float((large / small) ** (1 / (after - before)))
+_COUNT, _RESOLUTION = 16, 1e-2
+"""The delays that are tried in a decade, and the relative width at which a bisection ends; from one
+half of a run to the other, what grows by less does not grow."""
+_LONGEST_DELAY = 0.25
+"""The longest delay that is tried, relative to the scenario."""
+
+
+def loop_note(model: Any, pilot: Pilot, reference: EngineStates) -> str:
+    """Up to which delay a controller does what it does at the scenario's own, in words.
+
+    At the model's own timestep and integrator; `reference`: the motion of small steps. A loop that
+    grows slowly is within its bounds for as long as a run lasts, so it is asked whether a run from
+    nearby goes away from it, unless one does without more delay.
+    """
+    scene = pilot.scene
+    loop = scene.scenario.loop
+    assert loop is not None
+    motion = kept_motion(model, pilot, reference)
+    variant = runnable(model)
+
+    def setup(delay: float) -> Setup:
+        late = replace(loop, delay=loop.delay + delay)
+        return replace(pilot.setup, scenario=replace(scene.scenario, loop=late))
+
+    @cache
+    def trial(delay: float) -> StabilityTrial:
+        return run_trial(setup(delay), variant, scene.scenario.duration, motion)
+
+    is_calm = not _grows(variant, setup(0.0))
+
+    def is_lost(delay: float) -> bool:
+        return not trial(delay).stable or (is_calm and _grows(variant, setup(delay)))
+
+    most = max(_LONGEST_DELAY * scene.scenario.duration, 2 * scene.timestep)
+    count = max(2, round(_COUNT * math.log10(most / scene.timestep)) + 1)
+    grid: list[float] = np.geomspace(scene.timestep, most, count).tolist()
+    bounds = []
+    for is_off in (is_lost, lambda delay: bool(trial(delay).astray)):
+        largest = bisect(is_off, grid, _RESOLUTION, math.inf)
+        delay = f"{loop.delay + min(largest, most):.3g} s"
+        bounds.append(
+            f"at every delay tried, up to {delay}"
+            if math.isinf(largest)
+            else f"up to a delay of {delay}"
+            if largest
+            else f"at no delay longer than {loop.delay:.3g} s"
+        )
+    span = f"for the {scene.scenario.duration:.3g} s of the scenario"
+    clause = "small differences do not grow"
+    if not is_calm:
+        clause = f"small differences do not fade at its own delay, and it stays bounded {span}"
+    return (
+        f"with {Path(loop.path).name} every {loop.period:.3g} s {clause} {bounds[0]}, and it stays "
+        f"near the motion of small steps {span if is_calm else 'for as long'} {bounds[1]}, at the "
+        "scene's own setting"
+    )
+
+
+def _grows(model: Any, setup: Setup) -> bool:
+    """Whether a run from nearby goes farther from the scenario's own in its second half."""
+    aside = nudged(setup.scenario, model, nudges(model, 2, NEARBY)[0])
+    states = simulate(replace(setup, scenario=aside), model).states
+    differences = states.qvel - simulate(setup, model).states.qvel
+    first, second = np.array_split(differences, 2)
+    return not np.linalg.norm(second) <= (1 + _RESOLUTION) * np.linalg.norm(first)

@@ -42,10 +42,10 @@ from mjbench.simulation import (
     EngineStates,
     advance,
     initial_data,
-    integrator_of,
+    nudged,
+    runnable,
     silent,
     simulate,
-    with_integrator,
 )
 
 _PARAMETER = re.compile(r"(?P<kind>[a-z]+)(:(?P<name>.+))?\.(?P<field>\w+)(\[(?P<at>\d+)\])?")
@@ -70,7 +70,7 @@ def measure_sweep(
 
     `clock`: as of `measure_scenario`. A `SceneError` where a value is none of the model.
     """
-    base = _runnable(spec.compile())
+    base = runnable(spec.compile())
     variants = [
         _variant(spec, scene.scenario, part, value)
         for part in sweep.variations
@@ -96,12 +96,8 @@ def measure_sweep(
 
 def _is_chaotic(scene: Scene, model: Any, states: EngineStates) -> bool:
     """Whether a run whose beginning is off by 1e-10 comes to be visibly elsewhere."""
-    data = initial_data(scene.scenario, model)
-    for position, velocity in nudges(model, 2, NUDGE):
-        qpos = data.qpos.copy()
-        mujoco.mj_integratePos(model, qpos, position, 1.0)
-        twin = replace(scene.scenario, qpos=tuple(qpos), qvel=tuple(data.qvel + velocity))
-        run = simulate(Setup(scenario=twin), model)
+    for change in nudges(model, 2, NUDGE):
+        run = simulate(Setup(scenario=nudged(scene.scenario, model, change)), model)
         if run.judgement.ok and visible_error(model, scene, run.states, states) >= 1:
             return True
     return False
@@ -115,7 +111,7 @@ def _variant(
     before, after = _change(changed_spec, part, value)
     text = _text(part, value)
     try:
-        model = _runnable(changed_spec.compile())
+        model = runnable(changed_spec.compile())
         scenario.steps(float(model.opt.timestep))
     except ValueError as error:
         message = f"`{part.parameter}` cannot be `{text}`: {' '.join(str(error).split())}"
@@ -212,11 +208,6 @@ def _value_text(value: SweepValue) -> str:
     return value if isinstance(value, str) else f"{value:g}"
 
 
-def _runnable(model: Any) -> Any:
-    """A copy of a model with automatic reset off."""
-    return with_integrator(model, integrator_of(model), float(model.opt.timestep))
-
-
 def _measure_variant(
     scene: Scene,
     base: Any,
@@ -274,7 +265,7 @@ class _Slide(Struct):
 
 def with_contacts(scenario: Scenario, model: Any, row: SweepRow) -> SweepRow:
     """Add what contacts and solver do, step by step."""
-    model_copy = _runnable(model)
+    model_copy = runnable(model)
     model_copy.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_FWDINV)
     step = float(model_copy.opt.timestep)
     steps = scenario.steps(step) * len(scenario.times)

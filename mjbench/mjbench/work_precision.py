@@ -20,13 +20,11 @@ from msgspec.structs import replace
 
 from mjbench import known_motion, measure, simulation
 from mjbench.columns import LOST, WHOLE, Column, row_ratios
-from mjbench.cones import find_references, least_known
 from mjbench.costs import Clock, costs
-from mjbench.delays import loop_note
 from mjbench.derive import derive_charts, derive_failures, derive_profile, derive_scenario
 from mjbench.detector import driving_force
 from mjbench.judge import compared_rows
-from mjbench.measured_setting import Basis, measure_setting
+from mjbench.measured_setting import Basis, find_references, least_known, measure_setting
 from mjbench.parts import Parts
 from mjbench.pilot import Pilot, horizon_error, nudges, run_pilot
 from mjbench.profile import profile_rows
@@ -39,6 +37,7 @@ from mjbench.reports.shown_errors import (
 from mjbench.scene import Scene, SceneError
 from mjbench.settings import own_setting, settings, with_setting
 from mjbench.stability import stable_rows
+from mjbench.stability_runs import loop_note
 from mjbench.sweep import DrawnModel
 from mjbench.theory_figures import measure_expected
 
@@ -63,7 +62,7 @@ def measure_scenario(
     `tell` gets a line about each stage; `profile`: whether to say where the time goes. A
     `SceneError` where the scenario does not fit the model, or diverges at every timestep.
     """
-    basis = _find_basis(model, scene, quick=quick, tell=tell)
+    basis = find_basis(model, scene, quick=quick, tell=tell)
     pilot, cones, baseline, reference = basis.pilot, basis.cones, basis.baseline, basis.reference
     parts = Parts(tell)
     # A mistake in what is expected is told before all the rest is measured.
@@ -105,7 +104,6 @@ def measure_scenario(
         agreement=reference.agreement,
         lyapunov=pilot.lyapunov,
         horizons=None if pilot.lyapunov is None else pilot.horizons,
-        smooth=pilot.smooth,
         notes=tuple(filter(None, notes)),
         overlaps=pilot.overlaps,
         figure=measure.quantity_name(model, scene),
@@ -152,7 +150,7 @@ def measure_scenario(
     return report
 
 
-def _find_basis(
+def find_basis(
     model: Any, scene: Scene, *, quick: bool, tell: Callable[[str], None] = lambda _: None
 ) -> Basis:
     """What settings are compared with; a `SceneError` where the scene has no motion."""
@@ -188,10 +186,8 @@ def _error_parts(basis: Basis) -> scene_report.ErrorParts | None:
     runs = [simulation.simulate(setup, own_model)]
     if pilot.constrained:
         runs.append(simulation.simulate(setup, simulation.with_converged_solver(own_model)))
-    data = simulation.initial_data(scene.scenario, model)
-    mujoco.mj_integratePos(model, data.qpos, nudges(model, 2, _LAST_DIGITS)[0][0], 1.0)
-    nudged = replace(setup, scenario=replace(setup.scenario, qpos=tuple(data.qpos)))
-    runs.append(simulation.simulate(nudged, own_model))
+    nudged = simulation.nudged(setup.scenario, model, nudges(model, 2, _LAST_DIGITS)[0])
+    runs.append(simulation.simulate(replace(setup, scenario=nudged), own_model))
     if not all(run.judgement.ok for run in runs):
         return None
     count = len(cone.reference.states.times)
@@ -299,8 +295,7 @@ def _nearby_ratios(
         motions = {}
         for name in {basis.baseline.cone, rival.cone}:
             base = with_setting(model, replace(basis.baseline, cone=name))
-            reference = basis.cones[name].reference
-            exact = known_motion.find_nearby(base, near, reference, quick=quick)
+            exact = known_motion.find_nearby(base, near, quick=quick)
             if exact is None:
                 return None
             motions[name] = exact
@@ -334,7 +329,7 @@ def _measure_draws(basis: Basis, variants: Sequence[DrawnModel], quick: bool) ->
     for part in variants:
         words = f"with {part.text} (drawn) the scene's own setting"
         try:
-            drawn_basis = _find_basis(part.model, scene, quick=quick)
+            drawn_basis = find_basis(part.model, scene, quick=quick)
         except SceneError as error:
             yield _Draw(None, None, f"{words} cannot be measured: {error.message}")
             continue

@@ -10,11 +10,10 @@ from typing import Any
 
 import pytest
 
-from mjbench.bench import compile_subject
+from mjbench.bench import compile_subject, read_subject
 from mjbench.cli import main
 from mjbench.host import LocalHost
 from mjbench.reports.records import DIET
-from mjbench.subjects import read_subject
 
 Capture = pytest.CaptureFixture[str]
 ARM = """\

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import decimal
+from decimal import Decimal
 from typing import Any
 
 import mujoco
@@ -9,8 +11,15 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from mjbench.cones import find_references
+from mjbench.integrate import (
+    NoConvergenceError,
+    State,
+    bulirsch_stoer,
+    cumulative_integral,
+    dop853,
+)
 from mjbench.known_motion import KnownMotion, find_reference, self_reference
+from mjbench.measured_setting import find_references
 from mjbench.pilot import run_pilot
 from mjbench.problem import Integrator
 from mjbench.scene import SceneError, scenes
@@ -161,43 +170,6 @@ def test_an_author_may_choose() -> None:
     assert caught.value.message == "no integration can be the reference: there is contact"
 
 
-SPRING = """\
-<mujoco>
-  <option timestep="0.001"/>
-  <worldbody>
-    <body>
-      <joint type="slide" axis="1 0 0" stiffness="{stiffness}" damping="2"/>
-      <geom size="0.1" mass="1" contype="0" conaffinity="0"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-
-
-def spring(stiffness: float) -> Any:
-    return mujoco.MjModel.from_xml_string(SPRING.format(stiffness=stiffness))
-
-
-def test_a_closed_form_comes_first_and_is_refused_where_it_is_of_something_else() -> None:
-    text = (
-        'name = "a"\nduration = 1\nqpos = [1]\nqvel = [5]\nreference = "closed:damped-spring-0.1"\n'
-    )
-    reference = reference_of(spring(100), text)
-    assert (reference.kind, reference.second) == ("closed", "Bulirsch–Stoer over mj_forward")
-    assert reference.agreement < 1e-11
-    message_of_form = "the closed form of `damped-spring-0.1` is not this scene's motion"
-    fast, coin = text.replace("[5]", "[5.1]"), text.replace("damped-spring-0.1", "coin")
-    for model, toml, message in (
-        (spring(101), text, message_of_form),
-        (spring(100), fast, "the scenario starts differently from"),
-        (pendulum(), coin, "the model has different joints"),
-    ):
-        with pytest.raises(SceneError) as caught:
-            reference_of(model, toml)
-        assert caught.value.message.startswith(message)
-        assert str(caught.value.place) == "models/a.toml: scenario.0.reference"
-
-
 SLIDING = """\
 <mujoco>
   <option timestep="0.002"/>
@@ -224,32 +196,40 @@ def test_errors_under_each_cone_count_over_the_same_time() -> None:
     assert find_reference(model, pilot, quick=True).horizon > times[-1], "known for longer alone"
 
 
-TWO_POINTS = """<body><joint axis="0 1 0"/>
-  <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
-  <body pos="0 0 -1"><joint axis="0 1 0"/>
-    <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/></body></body>"""
-LINK = '<body pos="0.1 0 0"><joint axis="0 1 0"/><geom type="capsule" size="0.02" '
-LINK += 'fromto="0 0 0 0.1 0 0"/>'
-CHAOTIC = '<mujoco><option><flag contact="disable"/></option><worldbody>{}</worldbody></mujoco>'
+TIMES = np.linspace(0.25, 20.0, 80)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("bodies", "table", "horizon"),
-    [
-        # Rounding in small steps grows to more than 1e-6, though the motion is the engine's.
-        (TWO_POINTS, "qpos = [2, 0.5]\nduration = 14\nsample = 0.02\ntimesteps = [62.5e-6]", 12.8),
-        # The twins, in the engine's steps, stay near for longer than the two integrations do.
-        (LINK * 10 + "</body>" * 10, "duration = 5\nsample = 0.05\ntimesteps = [0.000125]", 3.65),
-    ],
-    ids=["pendulums", "chain"],
-)
-def test_a_chaotic_motion_is_integrated_as_long_as_it_is_known(
-    bodies: str, table: str, horizon: float
-) -> None:
-    model = mujoco.MjModel.from_xml_string(CHAOTIC.format(bodies))
-    (scene,) = scenes(model, parse_declared(f'[[scenario]]\nname = "a"\n{table}\n'))
-    reference = find_reference(model, run_pilot(model, scene))
-    assert (reference.kind, reference.note) == ("ode", "")
-    assert reference.horizon == pytest.approx(horizon, abs=0.1)
-    assert reference.floor.position < 0.1 * 0.1
+def test_two_methods_agree_on_an_orbit_of_high_eccentricity() -> None:
+    def rate(y: State) -> State:
+        cube = (y[0] ** 2 + y[1] ** 2) ** 1.5
+        return np.array([y[2], y[3], -y[0] / cube, -y[1] / cube])
+
+    start = np.array([0.2, 0.0, 0.0, 3.0])  # e = 0.8
+    states = bulirsch_stoer(rate, start, TIMES)
+    # A relative error of 1e-13 in a step moves the phase by this after three turns.
+    assert np.max(np.abs(states - dop853(rate, start, TIMES))) < 1e-8
+    energy = (states[:, 2] ** 2 + states[:, 3] ** 2) / 2 - 1 / np.hypot(states[:, 0], states[:, 1])
+    assert np.max(np.abs(energy + 0.5)) < 1e-12
+
+
+def test_decimal_numbers_have_the_digits_that_were_asked_for() -> None:
+    with decimal.localcontext(decimal.Context(prec=40)):
+        start = np.array([Decimal(1)], dtype=object)
+        states = bulirsch_stoer(lambda y: -y, start, np.array([1.0, 2.0]), 1e-30, columns=12)
+        for row, time in zip(states, (1, 2), strict=True):
+            assert abs(row[0] - Decimal(-time).exp()) < Decimal("1e-29")
+
+
+def test_a_solution_that_ends_is_not_passed() -> None:
+    for method in (bulirsch_stoer, dop853):
+        states = method(lambda y: y * y, np.array([1.0]), np.array([0.0, 0.5, 0.9]))
+        assert np.max(np.abs(states[:, 0] / [1.0, 2.0, 10.0] - 1)) < 1e-11
+        with pytest.raises(NoConvergenceError, match="no step is small enough at 1 s"):
+            method(lambda y: y * y, np.array([1.0]), np.array([2.0]))
+
+
+def test_quadrature_to_each_time() -> None:
+    times = np.array([0.1, 0.5, 3.0, 3.5])
+    integral = cumulative_integral(lambda t: np.exp(-t) * np.sin(9 * t), times, 0.2)
+    exact = (9 - np.exp(-times) * (np.sin(9 * times) + 9 * np.cos(9 * times))) / 82
+    assert np.max(np.abs(integral - exact)) < 1e-15

@@ -10,19 +10,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjbench.bench import CompiledModel, compile_subject
+from mjbench.bench import CompiledModel, compile_subject, read_subject
 from mjbench.cli import main
-from mjbench.cones import find_references
-from mjbench.delays import loop_note
 from mjbench.host import LocalHost
 from mjbench.loop import Loop, read_loop
+from mjbench.measured_setting import find_references
 from mjbench.parts import Parts
 from mjbench.pilot import run_pilot
 from mjbench.problem import Array, Integrator, Scenario, Setup
 from mjbench.simulation import simulate, with_integrator
 from mjbench.stability import stable_rows
-from mjbench.stability_runs import KeptMotion, run_trial
-from mjbench.subjects import read_subject
+from mjbench.stability_runs import loop_note
 
 CART = """<mujoco>
   <option timestep="0.01" integrator="RK4" gravity="0 0 0"/>
@@ -93,17 +91,6 @@ def test_commands_come_at_their_own_rate_and_late_at_every_timestep(model: Path)
     fast = read_loop(file, 0.01, 0.0, 0.0)
     assert run(fast, 0.04) == pytest.approx(sampled(0.04, 0.0), abs=1e-9)
     assert run(fast, 0.01) == pytest.approx(sampled(0.01, 0.0), abs=1e-9)
-
-
-def test_a_controller_that_is_asked_late_is_told(model: Path) -> None:
-    """Every 0.04 s, which 0.03 s does not divide."""
-    loop = read_loop(model.with_name("policy.py"), None, 0.0, 0.0)
-    setup = Setup(scenario=Scenario(0.4, 0.08, qpos=(1.0,), loop=loop))
-    cart = mujoco.MjModel.from_xml_string(CART)
-    steps = {h: with_integrator(cart, Integrator.RK4, h) for h in (0.01, 0.02, 0.03)}
-    motion = KeptMotion(simulate(setup, steps[0.01]).states, np.array([1e-6]), "1e-6 m")
-    texts = [run_trial(setup, steps[h], 0.4, motion).astray for h in (0.02, 0.03)]
-    assert texts[0] == "" and texts[1].endswith(" s, with commands up to a step late")
 
 
 def test_noise_is_the_same_at_every_timestep(model: Path) -> None:

@@ -21,8 +21,8 @@ from mjbench.measure import (
     measure_slip,
 )
 from mjbench.problem import STANDARD, Integrator, Motion, Setup, Sizes
-from mjbench.problems import all_problems, extremes, impact, linked_bodies
-from mjbench.reports.case_report import ErrorLine
+from mjbench.problems import all_problems, extremes
+from mjbench.reports.model_report import ErrorLine
 from mjbench.scene import Scene, scenes
 from mjbench.simulation import EngineStates, simulate
 from samples.surveys import NO_DECLARATIONS, parse_declared
@@ -129,17 +129,7 @@ def test_energy_belongs_to_the_moment_it_is_given_for() -> None:
     assert abs(line.energy_drift) < 1e-11
 
 
-def test_energy_may_hold_where_attitude_does_not() -> None:
-    line = measure(all_problems()["tumbling-box"], Integrator.RK4, 0.01)
-    assert line.attitude is not None
-    assert line.energy_drift is not None
-    assert abs(line.energy_drift) < 1e-7
-    assert line.attitude[0] > 1e-5
-    assert line.momentum_drift is not None
-    assert line.momentum_drift > 1e-7
-
-
-EULER, IMPLICIT, RK4 = Integrator.EULER, Integrator.IMPLICITFAST, Integrator.RK4
+EULER, RK4 = Integrator.EULER, Integrator.RK4
 AS_THEORY_SAYS = (
     # The case, a part of its figure's name, the integrators, and how far off they may be.
     ("tumbling-box", "kinetic", (RK4,), 1e-8),
@@ -158,21 +148,10 @@ AS_THEORY_SAYS = (
     ("stack-1", "sinks", (EULER,), 1e-11),
     ("stack-1000", "sinks", (EULER,), 1e-9),
 )
-MEASURED_ORDERS = (
-    # What is measured instead.
-    ("tumbling-box", "kinetic", EULER, 6.641, 5e-4),
-    ("tumbling-box", "kinetic", IMPLICIT, -6.040, 5e-4),
-    ("sticking-block-elliptic", "creep", EULER, 1e-3, 5e-4),
-    ("sticking-block-pyramidal", "creep", EULER, 1e-3, 5e-4),
-    ("distant-body", "1e-05", EULER, 0.0, 0.0),  # less than half a number's distance
-    ("distant-body", "0.01", EULER, 1e-3, 5e-4),
-    ("millimetre-cube", "rests", EULER, 0.11, 0.01),
-    ("flat-plate", "axial", EULER, 0.1111, 1e-9),
-)
 
 
 @pytest.mark.long
-def test_figures_are_those_of_theory_or_known_to_be_others() -> None:
+def test_figures_are_those_of_theory() -> None:
     mismatches = []
     for name, part, integrators, room in AS_THEORY_SAYS:
         for check, integrator in itertools.product(all_problems()[name].checks, integrators):
@@ -180,34 +159,9 @@ def test_figures_are_those_of_theory_or_known_to_be_others() -> None:
                 value, exact = check.measure(integrator), check.expected(integrator)
                 if not abs(value - exact) <= room:
                     mismatches.append((name, check.name, integrator, value, exact))
-    for name, part, integrator, expected, room in MEASURED_ORDERS:
-        (check,) = (check for check in all_problems()[name].checks if part in check.name)
-        if not abs(check.measure(integrator) - expected) <= room:
-            mismatches.append((name, check.name, integrator, check.measure(integrator), expected))
     assert mismatches == []
     with pytest.raises(ValueError, match=r"A \+ B >= C"):
         mujoco.MjModel.from_xml_string(extremes.ROUNDED_PLATE)
-
-
-@pytest.mark.long
-def test_restitution_comes_to_one_with_more_steps_in_a_contact() -> None:
-    """In second order: by π²/8n² at most, to leading order, as lesson 4.3 derives for Euler."""
-    for steps in (5, 10, 20, 40, 80):
-        off = abs(impact.restitution(Integrator.EULER, steps) - 1)
-        assert 0.7 < off / (math.pi**2 / (8 * steps**2)) < 1
-        assert abs(impact.restitution(Integrator.RK4, steps) - 1) < off
-    assert impact.restitution(Integrator.DISCRETE, 80) < 0.95  # it damps
-
-
-@pytest.mark.slow
-def test_the_horizon_of_the_double_pendulum() -> None:
-    euler, rk4 = (
-        linked_bodies.horizons(integrator) for integrator in (Integrator.EULER, Integrator.RK4)
-    )
-    assert 2.0 < min(euler) <= max(euler) < 2.5
-    # From 1.5e-11 after a second to 0.1: growth by 1.4 to 2.4 per second, as of so short a time.
-    growth = math.log(0.1 / 1.5e-11)
-    assert 1 + growth / 2.5 < min(rk4) < max(rk4) < 1 + growth / 1.35
 
 
 BALL = """\

@@ -135,10 +135,9 @@ def test_what_does_not_fit_the_model_is_told(text: str, message: str) -> None:
 
 
 def test_a_controller_is_pushed_and_still_commands(tmp_path: Path) -> None:
-    from mjbench.bench import compile_subject
+    from mjbench.bench import compile_subject, read_subject
     from mjbench.host import LocalHost
     from mjbench.loop import read_loop
-    from mjbench.subjects import read_subject
 
     (tmp_path / "puck.xml").write_text(PUCK)
     (tmp_path / "puck.toml").write_text(BEGIN + PUSH)

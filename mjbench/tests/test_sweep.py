@@ -127,15 +127,6 @@ def test_a_solver_with_little_time_leaves_more() -> None:
     assert single.iterations == pytest.approx(1, abs=0.01) and single.slip is not None
 
 
-def test_a_block_without_friction_slides_as_far_as_it_goes() -> None:
-    floor = '<worldbody><geom type="plane" size="1 1 1" condim="1"/><body pos="0 0 0.1">'
-    box = '<freejoint/><geom type="box" size="0.1 0.1 0.1" condim="1"/></body></worldbody>'
-    toml = TOML.replace("[-1]", "[1, 0, 0, 0, 0, 0]").replace('measure = "body:ball"\n', "")
-    vary = 'vary = { "option.timestep" = [0.002] }'
-    (row,) = run_sweep(vary, f"<mujoco>{floor}{box}</mujoco>", toml=toml).rows
-    assert row.slip == pytest.approx(0.4, rel=0.02)
-
-
 def test_a_cylinder_that_hops_as_it_rolls_slides_all_the_way() -> None:
     """Down a slope of 0.5 rad, µ = 0.12 < tan(0.5)/3: it slides at g (sin a − 3 µ cos a) t²/2."""
     slope = '<worldbody><geom type="plane" size="9 9 1" friction="0.12" euler="0 0.5 0"/>'

@@ -18,12 +18,11 @@ from mjbench.reports.diet_report import (
     Saving,
     TextEdit,
 )
-from mjbench.reports.diet_text import diet_text
-from mjbench.reports.engine_report import BatchCost, EngineReport, EngineRow, EngineScenario
+from mjbench.reports.model_report import BatchCost, EngineReport, EngineRow, EngineScenario
 from mjbench.reports.page import scene_page
 from mjbench.reports.scene_report import SweepReport, SweepRow, WorkPrecisionRow
 from mjbench.reports.terminal import Style
-from mjbench.text import case_text, engines_text, scene_text
+from mjbench.text import case_text, diet_text, engines_text, scene_text
 from samples.cases import case
 from samples.reports import MACHINE, awkward, row, scenario, scene, setting, swing
 
@@ -82,7 +81,7 @@ def test_a_page_needs_nothing_else_and_escapes_names() -> None:
 
 def finding(kind: str, label: str, time: float | None, **fields: object) -> Finding:
     place = ModelPlace(kind, "mujoco", "arm.xml", 9, 5)
-    edit = TextEdit("arm.xml", 9, 1, 0, 9, "<gyro/>", "")
+    edit = TextEdit("arm.xml", 9, 1, "<gyro/>", "")
     values: dict[str, object] = {
         "kind": kind, "message": f"nothing reads the {kind}", "places": (place,), "label": label,
         "difference": 0.0, "scenarios": ("go",), "proof": "",
@@ -93,8 +92,8 @@ def finding(kind: str, label: str, time: float | None, **fields: object) -> Find
 
 
 def diet(*findings: Finding) -> DietReport:
-    go = DietScenario("go", 10, "ok", ())
-    return DietReport("arm", "0", False, MACHINE, (), (go,), findings, (), None, None, None, ())
+    go = DietScenario("go", "ok", ())
+    return DietReport("arm", "0", False, MACHINE, (go,), findings, (), ())
 
 
 def test_the_diet_names_what_shows_a_saving_and_folds_what_saves_little() -> None:

@@ -8,13 +8,11 @@ import math
 from typing import Any
 
 import mujoco
-import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from mjbench.problem import Array
 from mjbench.reports.scene_report import ScenarioReport
-from mjbench.scene import ExactMotion, SceneError, scenes
+from mjbench.scene import SceneError, scenes
 from mjbench.work_precision import measure_scenario
 from samples.runs import BOX, FLIP, measure, orders, row, with_search
 from samples.surveys import parse_declared
@@ -32,7 +30,7 @@ def of_box() -> ScenarioReport:
 def test_a_report_on_the_tumbling_box() -> None:
     """Its references agree, no error lies below ten floors, what it conserves is found out."""
     report = of_box()
-    assert report.reference == "closed"
+    assert report.reference == "ode"
     assert report.agreement is not None and report.agreement < 1e-10
     for line in report.rows:
         assert line.attitude is not None and line.velocity is not None
@@ -183,37 +181,6 @@ def test_chaos_has_a_horizon(line: str, error: float) -> None:
     assert f"chaotic: off by {error:g} rad at" in report.verdict.text
 
 
-TWO_POINTS = """\
-<mujoco>
-  <option timestep="0.0005"><flag contact="disable"/></option>
-  <worldbody><body><joint axis="0 1 0"/>
-    <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/>
-    <body pos="0 0 -1"><joint axis="0 1 0"/>
-      <inertial pos="0 0 -1" mass="1" diaginertia="1e-9 1e-9 1e-9"/></body></body></worldbody>
-  <keyframe><key qpos="2 0.5"/></keyframe>
-</mujoco>
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("error", "euler", "rk4"), [(0.1, 2.42, 13.56), (0.01, 1.78, 12.4)])
-def test_chaotic_settings_have_the_horizons_that_extended_precision_gives(
-    error: float, euler: float, rk4: float
-) -> None:
-    """When the angles are so far from Lagrange's equations with 40 digits, by MuJoCo alone, s."""
-    toml = '[[scenario]]\nname = "a"\nkeyframe = 0\nduration = 16\nsample = 0.02\n'
-    toml += f"timesteps = [0.0005]\nhorizon_error = {{ rad = {error} }}\n"
-    (report,) = measure(mujoco.MjModel.from_xml_string(TWO_POINTS), toml, quick=True)
-    horizons = {row.setting.integrator: row.parted for row in report.rows}
-    assert horizons["Euler"] == pytest.approx(euler, abs=0.005)
-    for name in ("implicit", "implicitfast", "discrete"):
-        assert horizons[name] == pytest.approx(euler, abs=0.05)
-    assert horizons["RK4"] == pytest.approx(rk4, abs=0.3)
-    assert all(row.seen is None and row.position is None for row in report.rows)
-    text = f"off by {error:g} rad at {euler:g} s, under RK4 at 500 µs at "
-    assert text in report.verdict.text
-
-
 BLOCK = """\
 <mujoco>
   <option timestep="0.002" gravity="2 0 -9.6"/>
@@ -234,7 +201,7 @@ def test_a_block_that_sticks_creeps_alike_in_each_measurement() -> None:
     opt = model.opt
     assert (opt.timestep, opt.integrator, opt.cone, opt.disableflags) == before
     assert repeated == (report,)
-    assert (report.reference, report.smooth, report.orders) == ("self", False, ())
+    assert (report.reference, report.orders) == ("self", ())
     assert report.notes == (
         "the same motion to the bit, and no time saved, with 4 iterations",
         "no orders are given, as accelerations may jump: contact",
@@ -328,47 +295,6 @@ def test_refsafe_is_not_told_of_what_never_touches() -> None:
     (report,) = measure(model, text + "search = [0.02, 0.03]\n", quick=True)
     assert not any(line.refsafe for line in report.rows)
     assert not any("refsafe" in note for note in report.notes)
-
-
-TURNTABLE = """<mujoco><option timestep="0.004" integrator="{}"/><worldbody><body>
-  <joint axis="0 0 1"/><joint axis="0 1 0"/><geom size=".05" pos="0 0 -1" mass="1"/>
-</body></worldbody></mujoco>"""
-
-
-def test_an_exact_motion_of_one_start_says_nothing_of_starts_nearby(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A conical pendulum goes round evenly, so every timestep is exact; beside it none is."""
-    model = mujoco.MjModel.from_xml_string(TURNTABLE.format("implicitfast"))
-    tilt = 0.7
-    rate = math.sqrt(9.81 / math.cos(tilt))
-    text = f"""[[scenario]]
-name = "a"
-qpos = [0, {tilt}]
-qvel = [{rate!r}, 0]
-duration = 0.8
-sample = 0.08
-"""
-    (scene,) = scenes(model, parse_declared(text), quick=True)
-
-    def states(times: Array, qpos: Array, qvel: Array) -> tuple[Array, Array]:
-        turns = np.column_stack([qpos[0] + qvel[0] * times, np.full_like(times, qpos[1])])
-        return turns, np.tile(qvel, (len(times), 1))
-
-    scene = replace(scene, exact=ExactMotion("a.exact.py", states))
-    advance, now = mujoco.mj_step, [0]
-
-    def step(model: mujoco.MjModel, data: mujoco.MjData, nstep: int = 1) -> None:
-        now[0] += 10_000 * nstep
-        advance(model, data, nstep)
-
-    monkeypatch.setattr(mujoco, "mj_step", step)
-    report = measure_scenario(model, scene, quick=True, clock=lambda: now[0])
-    costs = [line.cost.value for line in report.rows if line.cost]
-    assert min(costs) < 0.9 * max(costs), "longer steps cost less"
-    assert report.reference == "closed"
-    assert all(line.seen is not None and line.seen < 1e-9 for line in report.rows)
-    assert report.verdict.better is None, report.verdict.text
 
 
 def test_a_reference_does_not_sleep() -> None:

@@ -12,8 +12,7 @@ from coursebuild.core.model import measurements
 from coursebuild.core.model.report_files import VERSION, ReportKind
 from coursebuild.core.model.results import Machine
 from mjbench.derive import derive_case, derive_charts, derive_scenario
-from mjbench.reports.case_report import CaseReport
-from mjbench.reports.model_report import SceneReport
+from mjbench.reports.model_report import CaseReport, SceneReport
 from mjbench.reports.scene_report import ScenarioReport
 from samples import cases, reports
 

@@ -45,14 +45,12 @@ class Fake(Mjbench):
 
     def facts(self) -> Facts:
         """Say what is here."""
-        facts = jobs.answer(jobs.About(), LocalHost(Path("/"), print))
-        return msgspec.convert(msgspec.to_builtins(facts), Facts)
+        return msgspec.json.decode(self.do("about"), type=Facts)
 
     def do(self, job: str, scene: CourseScene | None = None, **values: Any) -> bytes:
         if scene is None:
             request = msgspec.json.encode({"job": job, **values})
-            todo = msgspec.json.decode(request, type=jobs.Job)
-            return msgspec.json.encode(jobs.answer(todo, LocalHost(Path("/"), print)))
+            return msgspec.json.encode(jobs.answer(request, LocalHost(Path("/"), print)))
         if job == "join":
             parts = {"model": scene.name, "digest": scene.digest, "machine": self.facts().pinned}
             values.pop("card")

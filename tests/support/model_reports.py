@@ -57,8 +57,6 @@ def diet(*findings: Finding) -> DietReport:
         scenarios=(DietScenario("swing", "ok", ()),),
         findings=findings,
         tried=(),
-        fixed=None,
-        slim=None,
         stale=(),
     )
 

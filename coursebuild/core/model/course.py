@@ -57,20 +57,6 @@ class Words(Struct, frozen=True):
 
 ENGLISH = Words()
 
-CLOSED_FORMS: tuple[str, ...] = tuple(
-    """
-    tumbling-box pendulum-hinge-90 pendulum-hinge-179 pendulum-ball-90 pendulum-ball-179
-    pendulum-connect-90 pendulum-connect-179 free-top thin-rod coin heavy-top projectile
-    damped-spring-0 damped-spring-0.1 damped-spring-1 damped-spring-10 stiff-servo-0.1
-    stiff-servo-1 stiff-servo-10 sliding-block-elliptic-along sliding-block-elliptic-across
-    sliding-block-pyramidal-along sliding-block-pyramidal-across rolling-ball-elliptic
-    rolling-ball-pyramidal sticking-block-elliptic sticking-block-pyramidal elastic-impact
-    newtons-cradle stack-1 stack-10 stack-100 stack-1000 stack-10000 soft-equality-0.1
-    soft-equality-1 millimetre-cube distant-body flat-plate
-    """.split()
-)
-"""The hard cases whose exact motion is a formula: a scenario may name one as its reference."""
-
 MJCF_KEYWORDS = frozenset("true false auto enable disable degree radian local global".split())
 """Keywords of MJCF that have no name in MuJoCo's enumerations."""
 

@@ -100,8 +100,6 @@ class DietReport(Struct, frozen=True):
     scenarios: tuple[DietScenario, ...]
     findings: tuple[Finding, ...]
     tried: tuple[RejectedTrial, ...]
-    fixed: Saving | None
-    slim: Saving | None
     stale: tuple[StaleKeep, ...]
 
     @property

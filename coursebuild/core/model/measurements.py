@@ -296,14 +296,6 @@ class SceneCard(Struct, frozen=True):
     browser: float | None
 
 
-class BoundaryLine(StableRow, frozen=True):
-    """The largest stable timestep of an integrator, compared with theory."""
-
-    difference: float | None = None
-    beyond: str = ""
-    growth: float | None = None
-
-
 class ErrorLine(MeasuredRun, frozen=True):
     """An integrator at a timestep."""
 
@@ -331,7 +323,7 @@ class CaseReport(Struct, frozen=True):
     machine: Machine
     note: str
     reference: ReferenceLine
-    boundaries: tuple[BoundaryLine, ...]
+    boundaries: tuple[StableRow, ...]
     figures: tuple[FigureLine, ...]
     orders: tuple[OrderRow, ...]
     errors: tuple[ErrorLine, ...]

@@ -140,8 +140,7 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
         describe("what is compared beside coordinates, as in `site:tip`"),
     ] = None
     reference: Annotated[
-        Annotated[str, matching(r"^(ode|self|closed:\S.*)$", "`ode`, `self` or `closed:CASE`")]
-        | None,
+        Literal["ode", "self"] | None,
         describe("what errors are measured against, where not whichever fits"),
     ] = None
     conserved: Annotated[
@@ -196,12 +195,6 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
                 return Measured(kind, name)
             case _:
                 return None
-
-    @property
-    def closed_form(self) -> str:
-        """The hard case whose closed form is the reference; empty if none is."""
-        kind, _, name = (self.reference or "").partition(":")
-        return name if kind == "closed" else ""
 
 
 class DeclaredScenario(ScenarioTable, frozen=True, kw_only=True):

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from msgspec import Struct
 from msgspec.structs import asdict
 
-from coursebuild.core.model.course import CLOSED_FORMS
 from coursebuild.core.model.scenarios import (
     BenchTable,
     Declarations,
@@ -25,7 +24,7 @@ from coursebuild.core.model.scenarios import (
     is_multiple,
 )
 from coursebuild.core.syntax.decode import Decoding, check_unique, decode
-from coursebuild.core.syntax.nodes import TOML, shorten
+from coursebuild.core.syntax.nodes import TOML
 from coursebuild.core.syntax.toml_text import parse_toml
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
@@ -172,7 +171,3 @@ def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
                 )
                 help = "make `duration` longer, or leave the others out"
                 yield diagnose("field-value", node.place("controls"), message, help=help)
-        if table.closed_form and table.closed_form not in CLOSED_FORMS:
-            message = f"no hard case with a closed form is called `{shorten(table.closed_form)}`"
-            help = did_you_mean(table.closed_form, CLOSED_FORMS)
-            yield diagnose("field-value", node.place("reference"), message, help=help)

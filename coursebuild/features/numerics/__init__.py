@@ -20,14 +20,11 @@ from coursebuild.core.model.report_files import STABILITY
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids, scenario_view
 from coursebuild.features.bench.chart import PAIR_SIZE, chart_svg
-from coursebuild.features.bench.shown_errors import INTEGRATORS, seconds_text, status_text
+from coursebuild.features.bench.shown_errors import INTEGRATORS, seconds_text
 
 _DIGITS = 3
 _BOUNDARY = (
     *scenario_view.STABLE,
-    "measured.difference",
-    "measured.beyond",
-    "measured.growth",
     "measured.remark",
 )
 _FIGURE = ("numerics.measured", "numerics.spread", "numerics.exact", "measured.difference")
@@ -191,9 +188,6 @@ def case_view(words: Strings, report: CaseReport) -> CaseView:
             line.integrator,
             (
                 *scenario_view.stable_cells(words, line),
-                grids.percent(line.difference),
-                status_text(line.beyond) if line.beyond else "",
-                grids.power(line.growth),
                 scenario_view.stable_again(words, line),
             ),
         )

@@ -25,17 +25,21 @@ from mjbench.bench import (
     report_errors,
 )
 from mjbench.engines import MODULES
-from mjbench.engines.child import EngineChild, Reply, Request
 from mjbench.engines.engine_trial import (
     Engine,
-    EngineBasis,
+    EngineChild,
     EngineTrial,
+    Reply,
+    Request,
     engine_basis,
+    engine_scenario,
     judge_motion,
 )
 from mjbench.host import Host
 from mjbench.machine import package_version, this_machine
-from mjbench.reports.engine_report import WORLDS, BatchCost, EngineReport, EngineRow
+from mjbench.measured_setting import Basis
+from mjbench.reports.model_report import WORLDS, BatchCost, EngineReport, EngineRow
+from mjbench.simulation import EngineStates
 
 SECONDS = 900.0
 """Of the wall, for one answer of an engine; what it compiles is among it."""
@@ -118,18 +122,19 @@ def measure_engines(
         mujoco.mj_saveModel(compiled_model.model, path, None)
         for scene in compiled_model.scenarios:
             host.tell(f"{scene.name}: the reference")
-            basis = engine_basis(compiled_model.model, scene, quick=quick)
+            basis, states = engine_basis(compiled_model.model, scene, quick=quick)
             trial = EngineTrial(path, scene.scenario, len(scene.scenario.times))
-            run = _ScenarioRun(basis, trial, host, quick, seconds)
+            run = _ScenarioRun(basis, states, trial, host, quick, seconds)
             rows = tuple(row for choice in engines for row in run.rows(choice))
-            scenarios.append(replace(basis.report, rows=rows))
+            scenarios.append(engine_scenario(basis, rows))
     return EngineReport(subject.name, subject.digest, quick, this_machine(), load, tuple(scenarios))
 
 
 class _ScenarioRun(Struct, frozen=True, eq=False):
     """A scenario that engines compute."""
 
-    basis: EngineBasis
+    basis: Basis
+    baseline: EngineStates
     trial: EngineTrial
     host: Host
     quick: bool
@@ -161,7 +166,7 @@ class _ScenarioRun(Struct, frozen=True, eq=False):
                 if reply.motion is None:
                     yield _refuse(named_row, reply)
                     continue
-                named_row = judge_motion(self.basis, named_row, reply.motion)
+                named_row = judge_motion(self.basis, self.baseline, named_row, reply.motion)
                 costs = [_batch_cost(1, reply)]
                 if choice.engine.batched:
                     costs += self._batch_costs(child, replace(request, moves=False))

@@ -11,38 +11,46 @@ It is asked for one motion, and for what a step of many worlds costs.
 
 from __future__ import annotations
 
+import contextlib
+import importlib
+import multiprocessing
+import os
+import resource
+import signal
+import tempfile
+import time
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Literal, Protocol, TypeAlias
+from multiprocessing.connection import Connection
+from typing import Any, Literal, Protocol, Self, TypeAlias
 
 import mujoco
 import numpy as np
 from msgspec import Struct
 from msgspec.structs import asdict, replace
 
-from mjbench.cones import find_references
 from mjbench.costs import Clock, time_jobs
-from mjbench.known_motion import KnownMotion
+from mjbench.detector import Peaks, judge
+from mjbench.machine import this_machine
 from mjbench.measure import energy_drift, errors
-from mjbench.pilot import Pilot, nudges, position_distances, run_pilot
+from mjbench.measured_setting import Basis
+from mjbench.pilot import nudges, position_distances
 from mjbench.problem import Array, Scenario
 from mjbench.reports import Interval
-from mjbench.reports.engine_report import EngineRow, EngineScenario
+from mjbench.reports.model_report import EngineRow, EngineScenario
 from mjbench.scene import Scene
-from mjbench.settings import own_setting
 from mjbench.simulation import (
     STATE,
     EngineStates,
     full_state,
     initial_data,
-    integrator_of,
     invariants,
     motion_of,
+    runnable,
     silent,
     simulate,
-    with_integrator,
 )
-from mjbench.work_precision import find_conserved
+from mjbench.work_precision import find_basis
 
 
 class Variant(Struct, frozen=True):
@@ -220,71 +228,183 @@ def _time(work: Callable[[], None], clock: Clock) -> float:
     return (clock() - before) * 1e-9
 
 
-class EngineBasis(Struct, frozen=True, eq=False):
-    """What is known of a scene before any engine is asked."""
-
-    model: Any
-    pilot: Pilot
-    reference: KnownMotion
-    energy: float | None
-    """The scale for changes of energy, J; `None` where energy is not conserved."""
-    baseline: EngineStates
-    """The motion in MuJoCo itself, at the model's own setting."""
-
-    @property
-    def report(self) -> EngineScenario:
-        """The report, without rows."""
-        scene, reference = self.pilot.scene, self.reference
-        return EngineScenario(
-            name=scene.name,
-            title=scene.title,
-            duration=scene.scenario.duration,
-            horizon=reference.horizon,
-            reference=reference.kind,
-            source=reference.source,
-            floor=reference.floor.place,
-            velocity_floor=reference.floor.velocity,
-            setting=own_setting(self.model, self.pilot),
-            rows=(),
-        )
+def engine_basis(model: Any, scene: Scene, *, quick: bool = False) -> tuple[Basis, EngineStates]:
+    """What motions are compared with, and how MuJoCo itself moves at the model's own setting."""
+    basis = find_basis(model, scene, quick=quick)
+    return basis, simulate(basis.pilot.setup, runnable(model)).states
 
 
-def engine_basis(model: Any, scene: Scene, *, quick: bool = False) -> EngineBasis:
-    """Find the reference of a scene, and how MuJoCo itself moves."""
-    pilot = run_pilot(model, scene)
-    setting = own_setting(model, pilot)
-    reference = find_references(model, pilot, quick=quick)[setting.cone].reference
-    energy, _ = find_conserved(model, pilot, reference)
-    own_model = with_integrator(model, integrator_of(model), scene.timestep)
-    return EngineBasis(model, pilot, reference, energy, simulate(pilot.setup, own_model).states)
+def engine_scenario(basis: Basis, rows: tuple[EngineRow, ...]) -> EngineScenario:
+    """The report on a scenario."""
+    scene, reference = basis.pilot.scene, basis.reference
+    return EngineScenario(
+        name=scene.name,
+        title=scene.title,
+        duration=scene.scenario.duration,
+        horizon=reference.horizon,
+        reference=reference.kind,
+        source=reference.source,
+        floor=reference.floor.place,
+        velocity_floor=reference.floor.velocity,
+        setting=basis.baseline,
+        rows=rows,
+    )
 
 
-def judge_motion(basis: EngineBasis, row: EngineRow, motion: EngineMotion) -> EngineRow:
+def judge_motion(
+    basis: Basis, baseline: EngineStates, row: EngineRow, motion: EngineMotion
+) -> EngineRow:
     """Add to a row how far a motion is from the reference, and what it does to energy."""
     model, scenario, reference = basis.model, basis.pilot.scene.scenario, basis.reference
     row = replace(row, compile_seconds=motion.compile_seconds)
     times = scenario.times[: len(motion.qpos)]
     qpos, qvel = motion.qpos, motion.qvel
     states = EngineStates(times, qpos, qvel, np.zeros((len(times), int(model.na))))
-    if not (np.isfinite(qpos).all() and np.isfinite(qvel).all()):
-        lost = int(np.argmin(np.isfinite(np.hstack([qpos, qvel])).all(axis=1)))
-        message = f"the state is not finite at {times[lost]:.6g} s"
-        return replace(row, status="diverged", message=message)
     beginning, scratch = initial_data(scenario, model), initial_data(scenario, model)
     moments = [(beginning.qpos, beginning.qvel), *zip(qpos, qvel, strict=True)]
-    table = np.array([invariants(model, scratch, *moment) for moment in moments])
-    energies, setup = table[:, :2], basis.pilot.setup
-    bounds = (
-        ("position", np.abs(qpos).max(), setup.position_bound),
-        ("velocity", np.abs(qvel).max(), setup.velocity_bound),
-        ("energy", energies.sum(axis=1).max(), setup.energy_bound),
-    )
-    for name, size, bound in bounds:
-        if size > bound:
-            message = f"its {name} reaches {size:.3g}, over {bound:.3g}"
-            return replace(row, status="diverged", message=message)
+    with silent():  # of states that are no numbers
+        energies = np.array([invariants(model, scratch, *moment)[:2] for moment in moments])
+    energy = float(energies.sum(axis=1).max())
+    peaks = Peaks(float(np.abs(qpos).max()), float(np.abs(qvel).max()), energy=energy)
+    beginning.energy[:] = energies[0]
+    judgement = judge(beginning, peaks, basis.pilot.setup)
+    if not judgement.ok:
+        return replace(row, status="diverged", message="; ".join(judgement.reasons))
     exact, count = motion_of(model, reference.states), len(reference.states.times)
     near = errors(motion_of(model, states.head(count)), exact, reference.floor)
-    apart = position_distances(model, states.qpos[:count], basis.baseline.qpos[:count])
+    apart = position_distances(model, states.qpos[:count], baseline.qpos[:count])
     drift = None if basis.energy is None else energy_drift(energies, basis.energy)
     return replace(row, **asdict(near), apart=float(apart.max()), energy_drift=drift)
+
+
+_MEMORY = 16 << 30
+"""Bytes that an engine may take: 4,096 worlds need more than most programs do."""
+_LONGEST = 300
+"""Characters of a refusal."""
+
+
+class Request(Struct, frozen=True):
+    """What an engine is asked: without a variant, which of these there are."""
+
+    variant: Variant | None = None
+    trial: EngineTrial | None = None
+    worlds: int = 1
+    moves: bool = False
+    """Whether for a motion too, which comes with the costs: it is compiled only once."""
+
+
+class Reply(Struct, frozen=True):
+    """What it says: what was asked for, or why there is none."""
+
+    variants: tuple[Variant, ...] = ()
+    motion: EngineMotion | None = None
+    cost: EngineCost | None = None
+    refusal: str = ""
+    """In the engine's own words."""
+    unsupported: bool = False
+    """Whether it says that it does not have a feature."""
+
+
+class EngineChild:
+    """An engine in a process of its own, in a temporary folder where it leaves what it compiles."""
+
+    def __init__(self, module: str, name: str, seconds: float) -> None:
+        """`seconds`: how long, by the wall, one answer may take."""
+        self._engine, self._seconds = (module, name), seconds
+        self._folder = tempfile.TemporaryDirectory()
+        self._process: multiprocessing.context.SpawnProcess | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop()
+        self._folder.cleanup()
+
+    def reply(self, request: Request) -> Reply:
+        """What the engine says; a refusal where its process crashed or took too long."""
+        if self._process is None:
+            self._start()
+        with contextlib.suppress(EOFError, OSError):  # it died
+            self._connection.send(request)
+            if self._connection.poll(self._seconds):
+                reply: Reply = self._connection.recv()
+                return reply
+        return Reply(refusal=f"its process {self._death()}")
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._connection, other_end = context.Pipe()
+        arguments = other_end, *self._engine, self._folder.name
+        self._process = context.Process(target=_serve, args=arguments, daemon=True)
+        self._process.start()
+        other_end.close()
+
+    def _stop(self) -> None:
+        process, self._process = self._process, None
+        if process is None:
+            return
+        with contextlib.suppress(OSError):
+            os.killpg(process.pid or 0, signal.SIGKILL)
+        process.kill()
+        process.join()
+        self._connection.close()
+
+    def _death(self) -> str:
+        """What ended the child, after it gave no answer."""
+        assert self._process is not None
+        self._process.join(1.0)
+        status = self._process.exitcode
+        self._stop()
+        if status is None:
+            return f"took longer than {self._seconds:g} s"
+        if status < 0:
+            return f"crashed ({signal.Signals(-status).name})"
+        return f"ended with status {status}"
+
+
+def _serve(connection: Connection, module: str, name: str, folder: str) -> None:
+    """Answer requests, in the child, until the parent goes."""
+    os.setsid()
+    os.chdir(folder)
+    null = os.open(os.devnull, os.O_WRONLY)
+    for output in (1, 2):
+        os.dup2(null, output)  # engines print what they compile
+    # The threads of JAX's pool on the processor, by default one for each core. Two wait for each
+    # other: 4,096 worlds of a model with contacts stopped for ever within some hundred steps
+    # (jaxlib 0.10.2, two cores), and ran through with eight.
+    os.environ.setdefault("NPROC", str(max(8, 2 * (os.cpu_count() or 1))))
+    os.environ["TMPDIR"] = folder
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with contextlib.suppress(OSError, ValueError):  # only Linux counts data so
+        resource.setrlimit(resource.RLIMIT_DATA, (_MEMORY, _MEMORY))
+    with contextlib.suppress(EOFError):
+        while True:
+            request: Request = connection.recv()
+            try:
+                reply = _answer(module, name, request)
+            except MemoryError:
+                reply = Reply(refusal="there is not enough memory")
+            except Exception as error:  # whatever it raises is its answer
+                is_missing = isinstance(error, NotImplementedError)
+                reply = Reply(refusal=_words(error), unsupported=is_missing)
+            connection.send(reply)
+
+
+def _answer(module: str, name: str, request: Request) -> Reply:
+    engine: Engine = importlib.import_module(module).ENGINES[name]
+    variant, trial, clock = request.variant, request.trial, time.perf_counter_ns
+    if variant is None or trial is None:
+        return Reply(tuple(engine.variants(this_machine().processors)))
+    batch = begin(engine, variant, trial, request.worlds, clock)
+    motion = run_motion(batch, trial) if request.moves else None
+    return Reply(motion=motion, cost=run_costs(batch, trial, clock))
+
+
+def _words(error: Exception) -> str:
+    """An exception in one line, cut where it gets long."""
+    text = " ".join(str(error).split())
+    if isinstance(error, RefusalError):
+        return text
+    text = f"{type(error).__name__}: {text}" if text else type(error).__name__
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"

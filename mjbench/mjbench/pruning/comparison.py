@@ -30,10 +30,11 @@ from mjbench.scene import Scene, SceneError, scenes
 from mjbench.simulation import (
     STATE,
     advance,
-    advance_watching,
     full_state,
     initial_data,
     integrator_of,
+    nudged,
+    simulate,
     with_integrator,
     without_sleep,
 )
@@ -196,10 +197,8 @@ class WatchedRun(Struct, frozen=True, eq=False):
 def watch(model: Any, scene: Scene) -> WatchedRun:
     """Run the whole model in a scenario, and beside it a twin."""
     without_reset(model)
-    data, twin = initial_data(scene.scenario, model), initial_data(scene.scenario, model)
-    position, velocity = nudges(model, 2, NUDGE)[0] if model.nv else (twin.qvel, twin.qvel)
-    mujoco.mj_integratePos(model, twin.qpos, position, 1.0)
-    twin.qvel[:] += velocity
+    data = initial_data(scene.scenario, model)
+    twin = initial_data(nudged(scene.scenario, model, nudges(model, 2, NUDGE)[0]), model)
     start, change = data.qpos.copy(), np.zeros(model.nv)
     displacements, speeds = np.zeros(model.nv), np.zeros(model.nv)
     horizon = math.inf
@@ -225,42 +224,25 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
             gauge.look(data, twin)
             horizon = float(data.time) if gauge.seen > ALIKE else horizon
     setup = Setup(scenario=scene.scenario)
-    if peaks.sunk > 1:  # small steps say what goes through what, and how fast things are after it
-        passing, fastest = _small_steps(model, scene)
-        setup = replace(setup, passing=passing, velocity_bound=_FASTER * fastest)
+    if peaks.sunk > 1:  # small steps say what goes through what there too
+        step = scene.timestep / _FINER
+        fine = without_sleep(with_integrator(model, integrator_of(model), step))
+        setup = replace(setup, passing=simulate(setup, fine).passing)
         passages.setup = setup
     judgement = judge(data, peaks, setup, passages.texts())
-    observations = frozenset(touching), displacements, speeds, horizon
-    return WatchedRun(scene, judgement, *observations)
+    return WatchedRun(scene, judgement, frozenset(touching), displacements, speeds, horizon)
 
 
 _FINER = 8
 """How many times shorter the steps are that tell a soft contact from a lost run."""
-_FASTER = 2.0
-"""How many times faster than in small steps what went deep may come out again."""
-
-
-def _small_steps(model: Any, scene: Scene) -> tuple[frozenset[tuple[int, int]], float]:
-    """The pairs of geoms that go through each other in small steps, and the largest velocity."""
-    step = scene.timestep / _FINER
-    fine = without_sleep(with_integrator(model, integrator_of(model), step))
-    data, peaks, passages = initial_data(scene.scenario, fine), Peaks(), Passages(fine)
-    for inputs in scene.scenario.inputs(scene.timestep):
-        inputs.give(data)
-        peaks = advance_watching(fine, data, _FINER, peaks, passages)
-        if not peaks.finite:
-            return frozenset(), math.inf
-    return passages.pairs(), peaks.velocity
 
 
 def nearby_scenes(model: Any, run: WatchedRun, count: int) -> Iterator[Scene]:
     """The scenario of a run from random starts nearby, always the same ones."""
     scenario, random = run.scene.scenario, np.random.default_rng(2)
     for number in range(count if np.any(run.displacements) or np.any(run.speeds) else 0):
-        data = initial_data(scenario, model)
-        far, fast = random.normal(size=(2, model.nv)) * NEARBY * (run.displacements, run.speeds)
-        mujoco.mj_integratePos(model, data.qpos, far, 1.0)
-        nearby = replace(scenario, qpos=tuple(data.qpos), qvel=tuple(data.qvel + fast))
+        change = random.normal(size=(2, model.nv)) * NEARBY * (run.displacements, run.speeds)
+        nearby = nudged(scenario, model, change)
         yield replace(run.scene, name=f"{run.scene.name}, nearby {number + 1}", scenario=nearby)
 
 

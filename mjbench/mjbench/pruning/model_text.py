@@ -1,8 +1,7 @@
 """A model as its files and as what MuJoCo compiles from them.
 
 1. Files that the model includes are found where MuJoCo finds them, and read as markup.
-2. To compile a change, all files are joined to one text. That this gives the same model is checked
-   byte by byte on the unchanged files.
+2. A change is compiled from the bytes that the files would have.
 3. The bodies, geoms, … of an element are found by name: elements without a name get one, and the
    model is compiled once more. An element that is repeated becomes several things.
 """
@@ -12,7 +11,7 @@ from __future__ import annotations
 import posixpath
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import mujoco
@@ -34,8 +33,8 @@ _DEEPEST = 32
 
 Read = Callable[[str], bytes | None]
 """A path from the course's root → the bytes of the file; `None` where there is none."""
-Compile = Callable[[bytes], Any]
-"""A text in place of the model's file → its `mjModel`; ValueError if it does not compile."""
+Compile = Callable[[Mapping[str, bytes]], Any]
+"""The bytes of files, by path → the `mjModel`; ValueError if it does not compile."""
 
 
 class ModelTextError(Exception):
@@ -62,13 +61,13 @@ _SECTIONS = frozenset(("sensor", "actuator", "tendon", "equality"))
 class ModelText:
     """A model and its files."""
 
-    def __init__(self, main: Markup, compile: Compile, *, check: bool) -> None:
+    def __init__(self, main: Markup, compile: Compile) -> None:
         self.main = main
         self.documents = tuple(_with_included(main))
         self.elements: tuple[Element, ...] = tuple(main.root.walk())
         """All of them, in the order in which MuJoCo meets them."""
         self._compile = compile
-        self.model: Any = self._compile_checked() if check else self.compile()
+        self.model: Any = self.compile()
         self._ids = self._find_ids()
 
     def compile(self, edits: Iterable[ModelEdit] = ()) -> Any:
@@ -77,15 +76,16 @@ class ModelText:
         Raises:
             ValueError: MuJoCo does not take it, or the changes contradict each other.
         """
-        return self._compile(_join_files(self.main, _group_by_path(edits)))
+        files = {document.path: document.data for document in self.documents}
+        return self._compile(files | self.files(edits))
 
     def files(self, edits: Iterable[ModelEdit]) -> dict[str, bytes]:
         """The new bytes of each file that these edits change."""
         data = {document.path: document.data for document in self.documents}
-        return {
-            path: apply_edits(data[path], file_edits)
-            for path, file_edits in _group_by_path(edits).items()
-        }
+        edits_by_path: dict[str, list[ModelEdit]] = {}
+        for edit in edits:
+            edits_by_path.setdefault(edit.path, []).append(edit)
+        return {path: apply_edits(data[path], part) for path, part in edits_by_path.items()}
 
     def describe(self, edits: Iterable[ModelEdit]) -> tuple[TextEdit, ...]:
         """These changes with their places and what stood there."""
@@ -95,7 +95,7 @@ class ModelText:
             line, column = document.position(edit.start)
             old = document.data[edit.start : edit.end].decode("utf-8", "replace")
             new = edit.new.decode("utf-8", "replace")
-            text_edits.append(TextEdit(edit.path, line, column, edit.start, edit.end, old, new))
+            text_edits.append(TextEdit(edit.path, line, column, old, new))
         return tuple(text_edits)
 
     def ids(self, element: Element) -> tuple[int, ...]:
@@ -111,17 +111,6 @@ class ModelText:
     def ids_of(self, elements: Iterable[Element], kind: str) -> frozenset[int]:
         """The numbers of the things of one kind that elements become."""
         return frozenset(i for e in elements if thing_kind(e) == kind for i in self.ids(e))
-
-    def _compile_checked(self) -> Any:
-        model = self._compile(self.main.data)
-        if self.main.included:
-            try:
-                is_same = model_bytes(self.compile()) == model_bytes(model)
-            except ValueError:
-                is_same = False
-            if not is_same:
-                raise ModelTextError("its includes cannot be merged into one text")
-        return model
 
     def _find_ids(self) -> dict[Element, tuple[int, ...]]:
         """The things that each element becomes; empty where names cannot be given."""
@@ -165,15 +154,13 @@ class ModelText:
         }
 
 
-def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -> ModelText:
+def open_model(path: str, read: Read, compile: Compile) -> ModelText:
     """Read a model and what it includes.
 
     Args:
         path: the model's file, POSIX, from the course's root.
         read: gives the bytes of such a file.
-        compile: gives the `mjModel` of a text that would stand there.
-        check: whether to verify that the joined files give the same model; not possible where
-            MuJoCo would include other files.
+        compile: gives the `mjModel` of files with other bytes.
 
     Raises:
         MarkupError: one of the files is no XML.
@@ -187,7 +174,7 @@ def open_model(path: str, read: Read, compile: Compile, *, check: bool = True) -
     if main.root.tag != "mujoco":
         raise ModelTextError(f"its root is <{main.root.tag}>: it is not a whole model")
     _splice_includes(main, posixpath.dirname(path), read, 0)
-    return ModelText(main, compile, check=check)
+    return ModelText(main, compile)
 
 
 def _splice_includes(document: Markup, folder: str, read: Read, depth: int) -> None:
@@ -212,25 +199,6 @@ def _with_included(document: Markup) -> Iterator[Markup]:
     yield document
     for inner in document.included:
         yield from _with_included(inner)
-
-
-def _group_by_path(edits: Iterable[ModelEdit]) -> dict[str, list[ModelEdit]]:
-    edits_by_path: dict[str, list[ModelEdit]] = {}
-    for edit in edits:
-        edits_by_path.setdefault(edit.path, []).append(edit)
-    return edits_by_path
-
-
-def _join_files(document: Markup, edits: Mapping[str, Sequence[ModelEdit]]) -> bytes:
-    """The bytes of a file with edits, its includes replaced by their content."""
-    file_edits = list(edits.get(document.path, ()))
-    for inner in document.included:
-        include = inner.include
-        assert include is not None
-        root = parse_markup(inner.path, text := _join_files(inner, edits)).root
-        content = text[root.head : root.tail]
-        file_edits.append(ModelEdit(document.path, include.start, include.end, content))
-    return apply_edits(document.data, file_edits)
 
 
 def model_bytes(model: Any) -> bytes:

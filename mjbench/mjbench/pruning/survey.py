@@ -9,7 +9,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cached_property
 
@@ -44,7 +43,6 @@ from mjbench.pruning.trials import (
     PrunedGroup,
     PrunedModel,
     PruningTrials,
-    is_to_go,
     largest_subset,
     views_of,
 )
@@ -124,11 +122,9 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             digest=self.digest,
             quick=self.quick,
             machine=self.machine,
-            readers=tuple(dict.fromkeys(reader.path.partition(":")[0] for reader in self.readers)),
             scenarios=tuple(
                 DietScenario(
                     run.scene.name,
-                    round(run.scene.scenario.duration / run.scene.timestep),
                     run.judgement.status.value,
                     run.judgement.reasons,
                 )
@@ -136,9 +132,6 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             ),
             findings=(),
             tried=(),
-            fixed=None,
-            slim=None,
-            slim_difference=None,
             stale=(),
         )
         return self._try_all(report) if self.good_runs else Survey(report, self.text)
@@ -169,10 +162,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         if not any(group.finding.kind in ("contact-off", "contact-idle") for group in groups):
             groups += self._try_by_running([contact_of_rest(text, removed_items)])
         groups = self._confirm(groups)
-        self.tell("all together")
         fixable = [item for group in groups if group.finding.fixable for item in group.items]
         fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None
-        slim, slim_difference = self.trials.save_most([g for g in groups if is_to_go(g.finding)])
         used_keys = {group.finding.kind for group in groups}
         used_keys |= {f"{item.kind} {item.name}" for group in groups for item in group.items}
         stale = {key: keep for key, keep in self.keeps.items() if key not in used_keys}
@@ -182,11 +173,6 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
                 sorted((group.finding for group in groups), key=lambda f: -(f.saving.time or 0.0))
             ),
             tried=tuple(self.rejected),
-            fixed=None
-            if fixed is None
-            else self.trials.measure_saving(fixed.edits, fixed, self.trials.whole),
-            slim=slim,
-            slim_difference=slim_difference,
             stale=tuple(StaleKeep(k, at.path, at.line, at.column) for k, at in stale.items()),
         )
         return Survey(report, self.text, () if fixed is None else fixed.edits)
@@ -194,7 +180,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     def _settle(self, groups: Sequence[PrunedGroup]) -> list[PrunedGroup]:
         """Confirm groups, and try the rest without them, but for what is kept."""
         groups = self._confirm(groups) if groups else []
-        unkept = [group for group in groups if is_to_go(group.finding)]
+        unkept = [g for g in groups if not g.finding.kept and g.finding.label != INTERFACE_LABEL]
         self.trials.absences += tuple(item for group in unkept for item in group.items)
         return groups
 
@@ -211,7 +197,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             if group not in confirmed:
                 path = self._find_changed_output([*confirmed, group])
                 reason = f"{path} prints something else then" if path else "something needs it"
-                self._reject(group.items, group.finding.difference, reason)
+                self._reject(group.items, reason)
         return [group for group in groups if group.finding.kept or group in confirmed]
 
     def _prove(self) -> list[PrunedGroup]:
@@ -235,7 +221,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         ]
         for item in unkept:
             if item not in removable and item not in offered:
-                self._reject([item], None, "something needs it, or code may")
+                self._reject([item], "something needs it, or code may")
         elements = {item.element for item in (*removable, *offered)}
         outer = [
             item
@@ -261,7 +247,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         names = {item.name} | {node.get("class") or "" for e in item.removals for node in e.walk()}
         reader = self._find_noticing_reader(names - {""}, views_of([item]), ())
         if reader is not None:
-            self._reject([item], None, reader.doubt)
+            self._reject([item], reader.doubt)
         return reader is None
 
     def _find_noticing_reader(
@@ -339,13 +325,13 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             reason_text = (
                 "it cannot be removed alone" if least is None else f"without it {least.shown}"
             )
-            self._reject(items, None if least is None else least.difference, reason_text)
+            self._reject(items, reason_text)
             return None
         group = self._make_group(removable, reason, MEASURED_LABEL, alike[-1])
         saving = group.finding.saving
         is_slow = saving.time is None or not (saving.certain and saving.time >= MIN_SPEEDUP)
         if self.clock is not None and is_slow and not reason:
-            self._reject(removable, alike[-1].difference, "it saves no time")
+            self._reject(removable, "it saves no time")
             return None
         return group
 
@@ -409,10 +395,9 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         locked = (self.locked.get(edit.path, "") for edit in edits)
         return next(filter(None, locked), "")
 
-    def _reject(self, items: Sequence[Item], difference: float | None, reason: str) -> None:
-        finite = difference if difference is not None and math.isfinite(difference) else None
+    def _reject(self, items: Sequence[Item], reason: str) -> None:
         names = tuple(item.name for item in items)
-        self.rejected.append(RejectedTrial(items[0].kind, message_of(items), names, finite, reason))
+        self.rejected.append(RejectedTrial(items[0].kind, names, reason))
 
     def _prune(self, groups: Sequence[PrunedGroup]) -> PrunedModel | None:
         return self.trials.prune([item for group in groups for item in group.items])

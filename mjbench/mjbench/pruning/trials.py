@@ -13,7 +13,6 @@ from msgspec import Struct
 from mjbench.costs import Clock, Job, Timing, scenario_job, time_jobs
 from mjbench.pruning.candidates import KINDS, Item
 from mjbench.pruning.comparison import (
-    ALIKE,
     KEY_SIZES,
     IndexMap,
     MotionComparison,
@@ -34,7 +33,7 @@ from mjbench.pruning.xml_edits import (
     merge_edits,
     remove_elements,
 )
-from mjbench.reports.diet_report import INTERFACE_LABEL, Finding, Saving
+from mjbench.reports.diet_report import Finding, Saving
 from mjbench.scene import Scene
 from mjbench.simulation import STATE, advance, full_state, initial_data, silent
 
@@ -81,11 +80,6 @@ class PrunedGroup(Struct, frozen=True, eq=False):
 
     items: tuple[Item, ...]
     finding: Finding
-
-
-def is_to_go(finding: Finding) -> bool:
-    """Whether a finding is about something that is to go."""
-    return not finding.kept and finding.label != INTERFACE_LABEL
 
 
 def views_of(items: Iterable[Item]) -> frozenset[str]:
@@ -209,27 +203,6 @@ class PruningTrials(Struct, eq=False, dict=True):
         states = [full_state(part.model, self._part(start, part)) for start in starts]
         actuators, timestep = part.index["nu"].tolist(), self.scenes[0].timestep
         return scenario_job(part.model, scenarios, timestep, states=states, actuators=actuators)
-
-    def save_most(self, groups: Sequence[PrunedGroup]) -> tuple[Saving | None, float | None]:
-        """The saving and difference of all groups that go together, or of the best one alone."""
-
-        def moves_alike(groups: Sequence[PrunedGroup]) -> bool:
-            trial = self._prune_groups(groups)
-            result = None if trial is None else self.compare(trial, self.whole)
-            return result is not None and result.difference < ALIKE
-
-        groups = [group for group in groups if group.finding.difference < ALIKE]
-        by_time = sorted(groups, key=lambda group: -(group.finding.saving.time or 0.0))
-        best = largest_subset(by_time, moves_alike)
-        trial = self._prune_groups(best)
-        result = self.compare(trial, self.whole) if best and trial else None
-        if trial is None or result is None:
-            return None, None
-        saving = self.measure_saving(trial.edits, trial, self.whole)
-        return saving, result.difference
-
-    def _prune_groups(self, groups: Sequence[PrunedGroup]) -> PrunedModel | None:
-        return self.prune([item for group in groups for item in group.items])
 
 
 def _changes(text: ModelText, items: Sequence[Item]) -> tuple[tuple[ModelEdit, ...], IndexMap]:

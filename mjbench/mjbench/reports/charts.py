@@ -1,6 +1,9 @@
-"""Charts of lines between two logarithmic axes, as values that any program can draw."""
+"""Charts of lines between two logarithmic axes, as values for any program, and in letters."""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Iterator
 
 from mjbench.reports import Interval, Record
 
@@ -67,3 +70,71 @@ class Chart(Record, frozen=True):
     levels: tuple[ChartLevel, ...] = ()
     marks: tuple[ChartMark, ...] = ()
     """Without them there is no key."""
+
+
+_LETTERS = "EIFRDABCGHJKLMNOPQSTUVWXYZ"
+"""Of lines, by their number: Euler, implicit, implicitfast, RK4, discrete, and others."""
+_WIDTH, _HEIGHT = 60, 14
+_OWN, _LOST = "@", "x"
+
+
+def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
+    """The chart: work across, error up, both logarithmic; nothing where no run has an error."""
+    places = [(line.number, point) for line in chart.lines for point in line.points if point.x > 0]
+    errors = [math.log10(point.y) for _, point in places if point.y]
+    if not errors:
+        return
+    levels = [level for level in chart.levels if level.y > 0]
+    heights = [math.log10(level.y) for level in levels]
+    near = [y for y in heights if min(errors) - 1 <= y <= max(errors) + 1]
+    x = _Axis([math.log10(point.x) for _, point in places], min(_WIDTH, width - 12))
+    y = _Axis([*errors, *near], _HEIGHT)
+    rows = [[" "] * x.cells for _ in range(y.cells)]
+    for level in near:
+        rows[y.cell(level)] = ["·"] * x.cells
+    for number, point in sorted(places, key=_order):
+        row = y.cells - 1 if not point.y else y.cell(math.log10(point.y))
+        letter = _LETTERS[number % len(_LETTERS)]
+        mark = _LOST if point.y is None else letter if point.full else letter.lower()
+        rows[row][x.cell(math.log10(point.x))] = _OWN if point.ringed else mark
+    yield f"{chart.axes[1]}"
+    ticks = y.ticks()
+    for number in reversed(range(y.cells)):
+        yield f"{ticks.get(number, ''):>9} │{''.join(rows[number])}".rstrip()
+    yield f"{'':>9} └{'─' * x.cells}"
+    axis = [" "] * (x.cells + 8)
+    for number, text in x.ticks().items():
+        axis[number : number + len(text)] = text
+    yield f"{'':>11}{''.join(axis)}".rstrip()
+    yield f"{'':>11}{chart.axes[0]}"
+    names = [f"{_LETTERS[line.number % len(_LETTERS)]} {line.name}" for line in chart.lines]
+    keys = [f"{_OWN} the model's own", f"{_LOST} lost", "capital: nothing is better"]
+    yield "  ".join([*names, *keys])
+    texts = [level.text for level, at in zip(levels, heights, strict=True) if at in near]
+    if texts:
+        yield f"dotted: {', '.join(texts)}"
+
+
+def _order(place: tuple[int, ChartPoint]) -> tuple[bool, bool]:
+    return place[1].ringed, place[1].full
+
+
+class _Axis:
+    """Places of logarithms in cells."""
+
+    def __init__(self, values: list[float], cells: int) -> None:
+        self.low, high = min(values), max(values)
+        self.span = max(high - self.low, 0.3)
+        self.cells = cells
+
+    def cell(self, value: float) -> int:
+        return round((value - self.low) / self.span * (self.cells - 1))
+
+    def ticks(self) -> dict[int, str]:
+        """Texts of powers of ten, or where there are none, of both ends."""
+        first, last = math.ceil(self.low - 1e-9), math.floor(self.low + self.span + 1e-9)
+        if last - first >= 1:
+            powers = range(first, last + 1, 1 + (last - first) // 6)
+            return {self.cell(float(n)): f"{10.0**n:g}" for n in powers}
+        ends = (self.low, self.low + self.span)
+        return {self.cell(end): f"{10.0**end:.2g}" for end in ends}

@@ -46,9 +46,6 @@ class TextEdit(Record, frozen=True):
     path: str
     line: int
     column: int
-    start: int
-    """Bytes from the beginning of the file."""
-    end: int
     old: str
     new: str
 
@@ -113,10 +110,7 @@ class RejectedTrial(Record, frozen=True):
     """A candidate that is no finding: it is needed, or saves no time."""
 
     kind: str
-    message: str
     places: tuple[str, ...]
-    difference: float | None
-    """As of a finding; `None` where the run without it was lost, or there was none."""
     reason: str
     """Why it was rejected."""
 
@@ -125,7 +119,6 @@ class DietScenario(Record, frozen=True):
     """A scenario that the model was tried in."""
 
     name: str
-    steps: int
     status: str
     """`ok`, or how the run of the unchanged model was lost: then nothing is concluded from it."""
     reasons: tuple[str, ...]
@@ -159,17 +152,9 @@ class DietReport(Record, frozen=True):
     """The digest of all that it depends on in the course: the model's files and its readers."""
     quick: bool
     machine: Machine
-    readers: tuple[str, ...]
-    """The files of the course that use the model."""
     scenarios: tuple[DietScenario, ...]
     findings: tuple[Finding, ...]
     tried: tuple[RejectedTrial, ...]
-    fixed: Saving | None
-    """The saving of all changes by `--fix` together; `None` where it changes nothing."""
-    slim: Saving | None
-    """The saving of all findings that are not kept, together."""
-    slim_difference: float | None
-    """The largest difference of the model without all of them."""
     stale: tuple[StaleKeep, ...]
 
     @property

@@ -22,9 +22,8 @@ from msgspec import Struct
 
 from mjbench.declarations import BenchTable
 from mjbench.reports import model_report, scene_report
-from mjbench.reports.case_report import CaseReport
 from mjbench.reports.diet_report import DietReport
-from mjbench.reports.engine_report import EngineReport
+from mjbench.reports.model_report import CaseReport, EngineReport
 from mjbench.reports.shown_errors import seconds_text, setting_text, status_text
 
 VERSION = 5
@@ -152,13 +151,6 @@ class _Figure(Struct, frozen=True):
     least: float = 0.0
     """The absolute difference that it may have in any case."""
 
-    @property
-    def band(self) -> str:
-        """In words."""
-        if self.share is None:
-            return "the same"
-        return f"± {100 * self.share:g} %" if self.share else f"± {self.least:g}"
-
 
 _Figures: TypeAlias = dict[str, _Figure]
 _Table: TypeAlias = dict[tuple[str, str], _Figures]
@@ -220,32 +212,29 @@ def _departures(record: _Report, measurement: _Report) -> Iterator[Departure]:
 
 def _compare(a: _Figure, b: _Figure) -> tuple[str, str, str] | None:
     """What was recorded and measured, and the band, in words; `None` where they agree."""
-    wider = a if (a.share or 0, a.least) >= (b.share or 0, b.least) else b
-    band, differs = wider.band, a.value != b.value
-    if isinstance(a.value, float | int) and isinstance(b.value, float | int):
-        room = max(a.least, b.least) + (wider.share or 0.0) * abs(a.value)
-        differs = differs if wider.share is None else not abs(b.value - a.value) <= room
-    elif isinstance(a.value, str) or isinstance(b.value, str):
-        band = "the same"
+    if a.share is None or isinstance(a.value, str | None) or isinstance(b.value, str | None):
+        is_step = isinstance(a.value, str) or isinstance(b.value, str)  # beside `all` or `none`
+        before, now = (_text_of(value, is_step=is_step) for value in (a.value, b.value))
+        return None if a.value == b.value else (before, now, "the same")
+    share, least = max(a.share, b.share or 0.0), max(a.least, b.least)
+    if abs(b.value - a.value) <= least + share * abs(a.value):
+        return None
+    band = f"± {100 * share:g} %" if share else f"± {least:g}"
+    return f"{a.value:.6g}", f"{b.value:.6g}", band
 
-    def text(value: float | str | bool | None) -> str:
-        if isinstance(value, bool):
-            return "yes" if value else "no"
-        if isinstance(value, float | int):
-            return seconds_text(value) if band == "the same" else f"{value:.6g}"
-        return value or "nothing"
 
-    return (text(a.value), text(b.value), band) if differs else None
+def _text_of(value: float | str | bool | None, *, is_step: bool) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float | int):
+        return seconds_text(value) if is_step else f"{value:.6g}"
+    return value or "nothing"
 
 
 def _error(name: str, error: tuple[float, float] | None, share: float, least: float) -> _Figures:
     """An error, at its largest and at the end; none is known better than to `least`."""
-    if error is None:
-        return {f"error of {name}": _Figure(None, share, least)}
-    return {
-        f"error of {name}": _Figure(error[0], share, least),
-        f"error of {name} at the end": _Figure(error[1], share, least),
-    }
+    values = {"": None} if error is None else {"": error[0], " at the end": error[1]}
+    return {f"error of {name}{moment}": _Figure(v, share, least) for moment, v in values.items()}
 
 
 def _run(
@@ -319,10 +308,7 @@ def _case(case: CaseReport) -> _Table:
     )
     table: _Table = {("", "case"): {}}
     for line in case.boundaries:
-        figures = _largest(line) | {"beyond": _Figure(status_text(line.beyond))}
-        if line.monotone:
-            figures["growth"] = _Figure(line.growth, share)
-        table[line.integrator, "stable timestep"] = figures
+        table[line.integrator, "stable timestep"] = _largest(line)
     for figure in case.figures:
         exact, value = figure.exact, figure.measured
         figures = {f"exact {figure.name}": _Figure(exact, _TIGHT_BAND)}

@@ -288,8 +288,6 @@ class PhaseProfile(Record, frozen=True):
     name: str
     """The setting in words."""
     steps: int
-    evaluations: int
-    """Of the forward dynamics, over the scenario."""
     step: float
     """Wall time of a step, s: of each stretch of steps the quickest of all rounds."""
     phases: Mapping[str, float]
@@ -313,8 +311,6 @@ class RowVerdict(Record, frozen=True):
     """The row that is better in no column worse, from starts nearby too; `None` where none is."""
     text: str
     """The same in a sentence or two."""
-    worse: tuple[str, ...] = ()
-    """In which errors, and when, the setting is worse that would else be better."""
     lines: tuple[str, ...] = ()
     """The whole in at most five lines: speed, error, what is better, stability, what is not
     known."""
@@ -376,8 +372,6 @@ class ScenarioReport(Record, frozen=True):
     verdict: RowVerdict
     velocity_floor: float = 0.0
     """As `floor`, for velocities: around an impact they are known far worse than places."""
-    smooth: bool = True
-    """Whether accelerations are a smooth function of the state; else there are no orders."""
     notes: tuple[str, ...] = ()
     """Remarks for reading the figures."""
     overlaps: str = ""

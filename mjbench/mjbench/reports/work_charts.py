@@ -9,11 +9,11 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from mjbench.reports import Interval
-from mjbench.reports.case_report import CaseReport, ErrorLine
 from mjbench.reports.charts import Chart, ChartLevel, ChartLine, ChartMark, ChartPoint, chart_point
+from mjbench.reports.model_report import CaseReport, ErrorLine
 from mjbench.reports.scene_report import FLOORS, ErrorQuantity, ScenarioReport, WorkPrecisionRow
 from mjbench.reports.shown_errors import (
     INTEGRATORS,
@@ -46,11 +46,7 @@ def _chart(report: ScenarioReport, quantity: ErrorQuantity, work: str) -> Chart:
         if report.cost_of is not None:
             base = setting_text(report.cost_of, report.own_setting)
         axis = f"cost, relative to {base}"
-    lines = tuple(
-        ChartLine(name, INTEGRATORS.index(name), points)
-        for name in INTEGRATORS
-        if (points := tuple(_points(report, quantity, works, name)))
-    )
+    lines = _lines(lambda name: _points(report, quantity, works, name))
     visible = [point for line in lines for point in line.points if point.y is not None]
     marks = [ChartMark("front", "nothing is better")] if any(p.full for p in visible) else []
     if not all(point.full for point in visible):
@@ -71,6 +67,12 @@ def _chart(report: ScenarioReport, quantity: ErrorQuantity, work: str) -> Chart:
         levels=tuple(_levels(report, quantity)),
         marks=tuple(marks),
     )
+
+
+def _lines(points: Callable[[str], Iterable[ChartPoint]]) -> tuple[ChartLine, ...]:
+    """The lines of integrators that have points."""
+    lines = (ChartLine(name, n, tuple(points(name))) for n, name in enumerate(INTEGRATORS))
+    return tuple(line for line in lines if line.points)
 
 
 def _levels(report: ScenarioReport, quantity: ErrorQuantity) -> Iterator[ChartLevel]:
@@ -136,12 +138,7 @@ def _parted(report: ScenarioReport) -> list[str]:
 def _describe(
     report: ScenarioReport, quantity: ErrorQuantity, lines: Sequence[ChartLine], work: str
 ) -> Iterator[str]:
-    for line in lines:
-        if visible := [point for point in line.points if point.y is not None]:
-            errors = _range([point.y or 0.0 for point in visible], 2, "{1} to {0}")
-            costs = _range([point.x for point in visible], 3, "{0} to {1}")
-            amount = f"at costs of {costs}" if work == _COST else f"with {costs}"
-            yield f"{line.name}: errors {errors} {amount}."
+    yield from _describe_lines(lines, "at costs of {}" if work == _COST else "with {}")
     if lost := _lost(report):
         yield f"Runs were lost under {', '.join(lost)}."
     if parted := _parted(report):
@@ -151,6 +148,15 @@ def _describe(
         yield f"The scene’s own setting is {setting_text(baseline)}."
     if quantity.least > 0:
         yield f"No error below {quantity.least:.1e} is given."
+
+
+def _describe_lines(lines: Sequence[ChartLine], amount: str) -> Iterator[str]:
+    """What each line is from end to end; `amount` tells the work in its place of `{}`."""
+    for line in lines:
+        if visible := [point for point in line.points if point.y is not None]:
+            errors = _range([point.y or 0.0 for point in visible], 2, "{1} to {0}")
+            costs = _range([point.x for point in visible], 3, "{0} to {1}")
+            yield f"{line.name}: errors {errors} {amount.format(costs)}."
 
 
 def _range(values: Sequence[float], digits: int, words: str) -> str:
@@ -219,29 +225,22 @@ def step_cost(report: CaseReport, line: ErrorLine) -> Interval | None:
 
 
 def _case_chart(report: CaseReport, quantity: ErrorQuantity) -> Chart:
-    lines = []
-    for number, integrator in enumerate(INTEGRATORS):
-        points = []
+    def points(integrator: str) -> Iterator[ChartPoint]:
         for run in report.errors:
             x = step_cost(report, run)
-            if run.integrator != integrator or x is None:
-                continue
-            setting = f"{integrator} at {seconds_text(run.timestep)}"
-            if run.status != "ok":
-                points.append(chart_point(x, None, f"{setting}: {status_text(run.status)}"))
-            elif error := quantity.value_of(run):
-                title = f"{setting}: {error:.3g}, {seconds_text(x.value, 3)}"
-                points.append(chart_point(x, error, title))
-        lines += [ChartLine(integrator, number, tuple(points))] if points else []
-    texts = []
-    for line in lines:
-        if visible := [point for point in line.points if point.y is not None]:
-            ends = (f"{p.y:.2g} at {seconds_text(p.x, 2)}" for p in (visible[0], visible[-1]))
-            texts.append(f"{line.name}: {', '.join(ends)}.")
+            error = quantity.value_of(run) if run.status == "ok" else None
+            if run.integrator == integrator and x is not None and error != 0:
+                outcome = status_text(run.status)
+                if error is not None:
+                    outcome = f"{error:.3g}, {seconds_text(x.value, 3)}"
+                title = f"{integrator} at {seconds_text(run.timestep)}: {outcome}"
+                yield chart_point(x, error, title)
+
+    lines = _lines(points)
     return Chart(
         title=f"{report.title}: {quantity.label} against processor time",
-        text=" ".join(texts),
+        text=" ".join(_describe_lines(lines, "at {} s")),
         axes=("processor time for a simulated second (s)", quantity.label),
-        lines=tuple(lines),
+        lines=lines,
         least=quantity.least,
     )

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import mujoco
-import numpy as np
 import pytest
 
 from mjbench.pruning.model_text import ModelTextError
 from mjbench.pruning.survey import Survey
-from mjbench.reports.diet_report import PROVED_LABEL
 from samples.surveys import PATH, findings_by_kind, fixed_text, names, open_files, run_survey
 
 pytestmark = pytest.mark.long
@@ -235,66 +233,3 @@ def test_nothing_is_proved_where_delays_keep_states_from_being_brought_over() ->
     text = f"<mujoco><worldbody>{world}</worldbody>{motor}<sensor><clock/></sensor></mujoco>"
     findings = findings_by_kind(run_survey(text))
     assert not any(f.is_fault for f in findings.values())
-
-
-SHAPES = ("sphere", "box", "capsule", "ellipsoid", "cylinder")
-
-
-def random_model(random: np.random.Generator) -> str:
-    """A model of random parts, of which some are in vain."""
-    count = 0
-
-    def numbers(scale: float, size: int = 3) -> str:
-        return " ".join(f"{x:.3f}" for x in random.normal(0, scale, size))
-
-    def chance(text: str, share: float = 0.5) -> str:
-        return text if random.random() < share else ""
-
-    def body(depth: int, away: float) -> str:
-        nonlocal count
-        count += 1
-        number = count
-        place = f'pos="{away + random.normal(0, 0.5):.3f} {random.normal(0, 0.5):.3f} 1"'
-        kind = random.choice(["hinge", "slide", "ball"])
-        joint = f'<joint name="j{number}" type="{kind}" axis="{numbers(1)}" damping=".1"/>'
-        name = f'name="b{number}"' if random.random() < 0.7 else ""
-        geom = f'<geom type="{random.choice(SHAPES)}" size=".05 .06 .07" pos="{numbers(0.2)}"'
-        geom += chance(' material="m0"') + chance(' class="c0"') + "/>"
-        inner = body(depth - 1, 0) if depth else ""
-        site = chance(f'<site name="s{number}"/>')
-        return f"<body {name} {place}>{joint}{geom}{site}{inner}</body>\n"
-
-    trees = "".join(body(int(random.integers(0, 3)), 0) for _ in range(int(random.integers(1, 4))))
-    tree_joint_count = count
-    trees += "".join(body(0, 200) for _ in range(int(random.integers(0, 3))))
-    sensors = "".join(
-        chance(f'<jointpos joint="j{i}" name="p{i}"/>' if "ball" not in trees else "<clock/>")
-        for i in range(1, tree_joint_count + 1)
-    )
-    motor = chance('<motor name="drive" joint="j1"/>') + chance('<motor joint="j1" gear="2"/>', 0.3)
-    solver = random.choice(["Newton", "CG", "PGS"])
-    integrator = random.choice(["Euler", "implicit", "implicitfast", "RK4"])
-    flag = chance('<flag energy="enable"/>')
-    floor = chance('<geom type="plane" size="9 9 1" pos="0 0 -1"/>')
-    return f"""<mujoco>
-  <option solver="{solver}" integrator="{integrator}" {chance('wind="1 2 3"')}>{flag}</option>
-  <default><default class="c0"><geom density="500"/></default><default class="c1"/></default>
-  <asset><material name="m0"/><material name="m1"/></asset>
-  <worldbody>{floor}{chance('<geom size="1" pos="0 90 0"/>')}
-{trees}</worldbody>
-  <actuator>{motor}</actuator>
-  <sensor>{sensors}</sensor>
-</mujoco>
-"""
-
-
-def test_random_models_move_as_before() -> None:
-    for seed in range(4):
-        text = random_model(np.random.default_rng(seed))
-        survey, left = whole(text, lesson='data.actuator("drive")' if seed % 2 else "")
-        if survey.report.scenarios[0].status == "ok":
-            assert "c1" not in left and "m1" not in left, seed
-        else:
-            assert left == text, seed
-        for finding in survey.report.findings:
-            assert finding.label == PROVED_LABEL or not finding.fixable, seed

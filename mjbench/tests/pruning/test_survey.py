@@ -4,19 +4,13 @@ from __future__ import annotations
 
 import itertools
 import struct
-import time
 
-import mujoco
 import pytest
 
-from mjbench.costs import scenario_job, time_jobs
-from mjbench.pruning.comparison import pruning_scenes
 from mjbench.reports.diet_report import INTERFACE_LABEL, PROVED_LABEL
 from samples.surveys import (
-    NO_DECLARATIONS,
     PATH,
     PENDULUM,
-    field,
     findings_by_kind,
     fixed_text,
     names,
@@ -199,20 +193,3 @@ def test_what_only_runs_speak_for_is_told_for_the_time_that_it_saves() -> None:
     assert set(findings_by_kind(survey)) == {"contact-off"}, "which is proved"
     slow = {finding.kind for finding in survey.report.tried if "no time" in finding.reason}
     assert "coupling-idle" in slow
-
-
-@pytest.mark.slow
-def test_an_arm_and_a_field_of_rubble_become_as_fast_as_by_hand() -> None:
-    """Sensors stay, as they are an interface; contacts and the rubble do not."""
-    small = field(6, 0).replace("  \n", '<option><flag contact="disable"/></option>\n', 1)
-    for pieces in (0, 24):
-        survey = run_survey(field(6, pieces), quick=False, clock=time.thread_time_ns)
-        models = [mujoco.MjModel.from_xml_string(text) for text in (small, field(6, pieces))]
-        jobs = [
-            scenario_job(model, [scene.scenario], scene.timestep)
-            for model in models
-            for scene in pruning_scenes(model, NO_DECLARATIONS, quick=False)
-        ]
-        by_hand = time_jobs(jobs, 0, time.thread_time_ns)[1].ratio.value
-        assert survey.report.slim is not None and survey.report.slim.time is not None
-        assert survey.report.slim.time > 0.9 * by_hand > 0.9, (pieces, survey.report.slim)

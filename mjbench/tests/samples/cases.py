@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from mjbench.reports import Interval
-from mjbench.reports.case_report import (
-    BoundaryLine,
+from mjbench.reports.model_report import (
     CaseReport,
     ErrorLine,
     ReferenceLine,
     StepCost,
 )
-from mjbench.reports.scene_report import FigureLine, OrderRow
+from mjbench.reports.scene_report import FigureLine, OrderRow, StableRow
 from samples.reports import FIRST, MACHINE
 
 
@@ -40,26 +39,22 @@ def case(name: str = "spring", number: int = 5, **overrides: object) -> CaseRepo
             "closed", "the oscillator", "Bulirsch–Stoer", 1e-13, 0.0, 3.9e-13
         ),
         "boundaries": (
-            BoundaryLine(
+            StableRow(
                 "Euler",
                 0.2,
                 *search,
                 bracket=(0.2, 0.2),
                 theory=0.2001,
                 formula="2/ω",
-                difference=-5e-4,
-                beyond="diverged",
-                growth=1.5,
             ),
-            BoundaryLine(
+            StableRow(
                 "RK4",
                 0.28,
                 *search,
-                beyond="slow-growth",
                 bracket=(0.25, 0.29),
             ),
-            BoundaryLine("implicit", "all", *search),
-            BoundaryLine("discrete", "all", *search),
+            StableRow("implicit", "all", *search),
+            StableRow("discrete", "all", *search),
         ),
         "figures": (
             FigureLine("period", "s", "Euler", 6.283, 6.2831853, "2π√(m/k)"),

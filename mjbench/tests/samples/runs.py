@@ -33,7 +33,6 @@ keyframe = "intermediate"
 qvel = [0, 0, 0, 0.1, 6, 0]
 duration = 2
 sample = 0.1
-reference = "closed:tumbling-box"
 """
 
 

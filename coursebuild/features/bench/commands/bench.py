@@ -155,7 +155,7 @@ def check(
         path = BENCH.path(report.model)
         bands = by_name[report.model].declarations.bench
         old_value = recorded_value(options.root, BENCH, report.model)
-        data = mjbench.do("compare", recorded=old_value, measured=value, bands=bands)
+        data = mjbench.do("compare", recorded=old_value, measurement=value, bands=bands)
         departures = msgspec.json.decode(data, type=tuple[Departure, ...])
         checks.append(RecordCheck(report.model, path, departures, tuple(remarks)))
     return replace(measurement, checked=tuple(checks))
