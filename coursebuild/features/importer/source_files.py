@@ -7,6 +7,7 @@ folder downwards, one part of its real path after the other, and none may be a l
 
 from __future__ import annotations
 
+import json
 import os
 import posixpath
 import re
@@ -16,6 +17,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, ValuesView
 from functools import cached_property
 from pathlib import Path
+from textwrap import shorten
 from typing import Any, Literal
 
 import yaml
@@ -169,6 +171,17 @@ def value_at(settings: object, *path: str) -> object:
     return settings
 
 
+def find_group(pattern: str | re.Pattern[str], text: str) -> str:
+    """Return the last group of the first match of a pattern; empty where there is none."""
+    match = re.search(pattern, text)
+    return match[match.lastindex or 0] if match else ""
+
+
+def shorten_value(value: object) -> str:
+    """Return the beginning of a value of settings or metadata."""
+    return shorten(value if isinstance(value, str) else json.dumps(value, default=str), 100)
+
+
 def stem_of(path: str) -> str:
     """A file's path without its extension."""
     return posixpath.splitext(path)[0]
@@ -240,23 +253,30 @@ class SourceFiles:
         return path in self._real_paths
 
     @cached_property
-    def has_dollars(self) -> bool:
-        """Whether a dollar begins a formula: in GitBook two do, in Docusaurus an extension says.
+    def dollars(self) -> str:
+        """What begins a formula: two dollars in GitBook; nothing where no extension is named.
 
-        Else it is a dollar, and `\\(` a bracket.
+        Else a dollar is one, and `\\(` a bracket.
         """
-        has_none = self.docusaurus and "math" not in self.read_text(self.docusaurus)
-        return not has_none and not (self.folder / ".gitbook.yaml").is_file()
+        if (self.folder / ".gitbook.yaml").is_file():
+            return "$$"
+        names = map(self.find_settings, ("mkdocs.yml", "book.toml", self.docusaurus))
+        path = next(filter(None, names), "")
+        is_math = re.search(
+            "[Mm]ath|arithmatex|[Kk]a[Tt]e[Xx]|INHERIT", path and self.read_text(path)
+        )
+        return "$" if is_math or not path else "\n"  # no formula begins with the end of a line
 
     @cached_property
     def docusaurus(self) -> str:
         """The path of the settings of Docusaurus; empty where it is no site of it."""
-        paths = (p for p in self if re.fullmatch(r"(?:\w+/)?docusaurus\.config\.[cm]?[jt]s", p))
-        return min(paths, key=len, default="")
+        pattern = r"(?:[\w-]+/){0,2}docusaurus\.config\.[cm]?[jt]s"
+        return min((p for p in self if re.fullmatch(pattern, p)), key=len, default="")
 
     def find_settings(self, name: str) -> str:
-        """Return the path of settings in YAML, which have two extensions; empty for none."""
-        return next((path for path in (name, name.replace(".yml", ".yaml")) if path in self), "")
+        """Return the path of settings, whose extension or tool has two names; empty for none."""
+        names = (name, name.replace(".yml", ".yaml"), name.replace("mkdocs", "properdocs"))
+        return next((path for path in names if path in self), "")
 
     def settings(self, name: str) -> Mapping[str, Any]:
         """Return the settings in a file; none where it is not there, or cannot be read."""
