@@ -20,6 +20,7 @@ from coursebuild.api import UsageError, model
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
+from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.bookdown import read_bookdown
 from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
 from coursebuild.features.importer.pandoc_tables import number_examples
@@ -30,7 +31,6 @@ from coursebuild.features.importer.source_files import (
     ImportedLevel,
     ImportedText,
     SourceFiles,
-    shorten_value,
     stem_of,
     title_of_file,
 )
@@ -146,8 +146,8 @@ class _Reader:
             path for path in paths if file and (path == exact or f"/{path}".endswith(suffix))
         ]
         pattern = re.compile(rf"(?:lesson[-_ ]?)?{re.escape(id)}(?![\w.])|{re.escape(slug)}$")
-        named = (path for path in paths if pattern.match(posixpath.basename(stem_of(path))))
-        return next(itertools.chain(matches, named if id else ()), "")
+        own_paths = (path for path in paths if pattern.match(posixpath.basename(stem_of(path))))
+        return next(itertools.chain(matches, own_paths if id else ()), "")
 
 
 def _read_texts(fields: dict[str, Any], name: str) -> tuple[str, ...]:

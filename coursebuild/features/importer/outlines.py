@@ -16,6 +16,7 @@ from urllib.parse import unquote
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.segments import read_front_matter
 from coursebuild.features.importer.source_files import (
     TEXTS,
@@ -24,7 +25,6 @@ from coursebuild.features.importer.source_files import (
     SourceFiles,
     find_group,
     read_yaml,
-    shorten_value,
     stem_of,
     title_of_file,
     value_at,
@@ -78,11 +78,11 @@ def read_outline(files: SourceFiles) -> Outline | None:
     docs = posixpath.join(folder, "docs")
     docs = docs if any(path.startswith(f"{docs}/") for path in files) else "docs"
     pattern = re.escape(posixpath.join(folder, "sidebars.")) + r"[cm]?[jt]s(?:on)?"
-    found = [path for path in files if re.fullmatch(pattern, path)][:1]
-    named = re.findall(r"sidebarPath:[^\n]*?([\w./-]+\.[cm]?[jt]s)\b", files.read_text(config))
-    paths = (posixpath.normpath(posixpath.join(folder, path)) for path in named)
+    usual_paths = [path for path in files if re.fullmatch(pattern, path)][:1]
+    names = re.findall(r"sidebarPath:[^\n]*?([\w./-]+\.[cm]?[jt]s)\b", files.read_text(config))
+    paths = (posixpath.normpath(posixpath.join(folder, path)) for path in names)
     parts: list[ImportedText | ImportedLevel] = []
-    for name in found or [path for path in paths if path in files]:
+    for name in usual_paths or [path for path in paths if path in files]:
         files.change("map", "content/course.toml")
         sidebars = _read_literal(files.read_text(name))
         if sidebars is None:

@@ -7,7 +7,6 @@ folder downwards, one part of its real path after the other, and none may be a l
 
 from __future__ import annotations
 
-import json
 import os
 import posixpath
 import re
@@ -17,7 +16,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence, ValuesView
 from functools import cached_property
 from pathlib import Path
-from textwrap import shorten
 from typing import Any, Literal
 
 import yaml
@@ -177,11 +175,6 @@ def find_group(pattern: str | re.Pattern[str], text: str) -> str:
     return match[match.lastindex or 0] if match else ""
 
 
-def shorten_value(value: object) -> str:
-    """Return the beginning of a value of settings or metadata."""
-    return shorten(value if isinstance(value, str) else json.dumps(value, default=str), 100)
-
-
 def stem_of(path: str) -> str:
     """A file's path without its extension."""
     return posixpath.splitext(path)[0]
@@ -254,17 +247,13 @@ class SourceFiles:
 
     @cached_property
     def dollars(self) -> str:
-        """What begins a formula: two dollars in GitBook; nothing where no extension is named.
-
-        Else a dollar is one, and `\\(` a bracket.
-        """
+        """What begins a formula: two dollars in GitBook, none where settings name no extension."""
         if (self.folder / ".gitbook.yaml").is_file():
             return "$$"
         names = map(self.find_settings, ("mkdocs.yml", "book.toml", self.docusaurus))
         path = next(filter(None, names), "")
-        is_math = re.search(
-            "[Mm]ath|arithmatex|[Kk]a[Tt]e[Xx]|INHERIT", path and self.read_text(path)
-        )
+        pattern = "[Mm]ath|arithmatex|[Kk]a[Tt]e[Xx]|INHERIT"
+        is_math = re.search(pattern, path and self.read_text(path))
         return "$" if is_math or not path else "\n"  # no formula begins with the end of a line
 
     @cached_property
@@ -309,12 +298,8 @@ class SourceFiles:
     @cached_property
     def macro_marks(self) -> Sequence[tuple[str, str]]:
         """The marks that stand for braces, as settings of MkDocs name them, each with these."""
-        names = {
-            "variable_start": "{{",
-            "variable_end": "}}",
-            "block_start": "{%",
-            "block_end": "%}",
-        }
+        names = {"variable_start": "{{", "variable_end": "}}"}
+        names |= {"block_start": "{%", "block_end": "%}"}
         pattern = rf"\bj2_({'|'.join(names)})_string:[ \t]*[\"']?([^\s\"']+)"
         return [(mark, names[name]) for name, mark in re.findall(pattern, self.mkdocs)]
 
