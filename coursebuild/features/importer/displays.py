@@ -116,13 +116,13 @@ def _label_formula(match: re.Match[str]) -> str:
     tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
     tex = _align(tex)
     opening, closing = "", match["behind"] or ""
+    line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]
     if lead := _LEAD.search(match["tex"]):  # a mark beside a text could be that of another formula
-        line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]
         opening = lead[0] if _WORDS_BEFORE.match(line) else ""
         closing = lead[0] if match["behind"] is not None else ""
-        if mark := _MARGIN.match(line):  # which the lines that go on may lack
-            margin = "[ \t]*>" if ">" in mark[0] else mark[0]
-            tex = re.sub(rf"\n(?!{margin})", f"\n{mark[0]}", tex)
+    if mark := _MARGIN.match(line):  # which the lines that go on may lack
+        margin = "[ \t]*>" if ">" in mark[0] else mark[0]
+        tex = re.sub(rf"\n(?!{margin})", f"\n{mark[0]}", tex)
     braces = f" {{#eq:{formula_anchor(label)}}}" if label else ""
     return f"{opening}$${tex}$${braces}{closing}"
 
