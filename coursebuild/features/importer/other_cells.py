@@ -24,7 +24,6 @@ from coursebuild.features.importer.cells import (
 )
 from coursebuild.features.importer.context import JoinedCells, LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.segments import read_markdown
 from coursebuild.features.importer.source_files import Segment, find_group
 
 _EXTENSIONS = {
@@ -41,6 +40,8 @@ _HEAD = re.compile(
 _OWN_LABEL = re.compile(r"\A\{r[ \t]+([\w.-]+)[ \t]*(?:,.*)?\}\Z", re.DOTALL)
 """The label of a cell as knitr has it, the word behind the language."""
 _MAGIC = re.compile(r"\A\s*%%(\w+)[^\n]*\n")
+_NESTED = re.compile(r"^[ \t>]*(?:`{3,}|~{3,})\{(?:code-cell\}[ ]+)?(\w+)", re.MULTILINE)
+"""The language of a cell in the text of a block."""
 _SETTINGS = re.compile(r"(?:library\(knitr\)\s*)?(?:knitr::)?opts_chunk\$set\([^()]*\)\s*")
 _PICTURE = re.compile(
     r"\s*(?:knitr::)?include_graphics\(\s*([\"'])(?P<path>[^\"'\n]+)\1[^()]*\)\s*"
@@ -63,20 +64,17 @@ def language_of(segment: Segment) -> str:
 
 def languages_of_single_cells(segments: Iterable[Segment]) -> frozenset[str]:
     """Return the languages of which a text has one cell that is run, also within blocks."""
-    languages = [
-        language_of(segment)
-        for segment in _with_nested(segments)
-        if _options_of(segment).get("eval", "").lower() != "false"
-        and not _PICTURE.fullmatch(code_for_readers(segment.text))
-    ]
+    languages = []
+    for segment in segments:
+        if segment.mark[0] not in "`~":
+            languages += _NESTED.findall(segment.text)
+        elif not (_is_shown_only(segment) or _PICTURE.fullmatch(code_for_readers(segment.text))):
+            languages.append(language_of(segment))
     return frozenset(language for language in languages if languages.count(language) == 1)
 
 
-def _with_nested(segments: Iterable[Segment]) -> Iterator[Segment]:
-    for segment in segments:
-        yield segment
-        if segment.mark[0] not in "`~":
-            yield from _with_nested(read_markdown(segment.text))
+def _is_shown_only(segment: Segment) -> bool:
+    return _options_of(segment).get("eval", "").lower() == "false"
 
 
 def _options_of(segment: Segment) -> dict[str, str]:
@@ -110,7 +108,7 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
         code = ""
     if not code:
         return "\n\n".join(head)
-    if options.get("eval", "").lower() == "false":
+    if _is_shown_only(cell):
         context.leave(kind, f"a {kind}, which its tool does not run, is shown")
         return "\n\n".join((*head, marks.fence(language, code), *write_outputs(cell, context)))
     is_script = language in _SHELLS or language in context.single_languages
