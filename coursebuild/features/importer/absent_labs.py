@@ -46,20 +46,24 @@ def lab_files(labs: Mapping[str, Mapping[str, object]]) -> Iterator[tuple[str, s
             continue  # no fence can name it
         texts = ((name, json.dumps(value, ensure_ascii=False)) for name, value in fields.items())
         lines = (
-            f"// The lab `{kind}`, which another tool draws. Its fences have these fields:",
-            "//",
-            *(
-                f"//   {' '.join(name.split())}: {shorten(text, _MOST_VALUE, placeholder=' …')}"
-                for name, text in texts
-            ),
-            "//",
-            "// Write it below. Then make each card of it a fence again, with the JSON in it:",
-            f"// `lab {kind}`",
-            "",
-            "export function mount(element, config, api) {",
-            f"  element.append(api.h('p', {{}}, config.title ?? '{kind}'))",
-            "  if (config.note) element.append(api.h('p', {}, config.note))",
-            "  element.append(api.h('pre', {}, JSON.stringify(config, null, 2)))",
-            "}",
+            f"//   {' '.join(name.split())}: {shorten(text, _MOST_VALUE, placeholder=' …')}\n"
+            for name, text in texts
         )
-        yield f"content/labs/{kind}.js", "".join(f"{line}\n" for line in lines)
+        start, end = _MODULE.replace("KIND", kind).split("FIELDS\n")
+        yield f"content/labs/{kind}.js", start + "".join(lines) + end
+
+
+_MODULE = """\
+// The lab `KIND`, which another tool draws. Its fences have these fields:
+//
+FIELDS
+//
+// Write it below. Then make each card of it a fence again, with the JSON in it:
+// `lab KIND`
+
+export function mount(element, config, api) {
+  element.append(api.h('p', {}, config.title ?? 'KIND'))
+  if (config.note) element.append(api.h('p', {}, config.note))
+  element.append(api.h('pre', {}, JSON.stringify(config, null, 2)))
+}
+"""

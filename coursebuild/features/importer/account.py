@@ -6,6 +6,7 @@ way, and as left where something of it is missing in the new course, with what c
 
 from __future__ import annotations
 
+import json
 import re
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
@@ -47,6 +48,11 @@ _MOST_ALIKE = 3
 """Leftovers with the same words that it names one by one; else the first, and some places."""
 _NAMES = re.compile(r"`[^`]*`|\(.*\)")
 """What differs in the messages on the same sort of thing."""
+
+
+def shorten_value(value: object) -> str:
+    """Return the beginning of a value of settings or metadata."""
+    return shorten(value if isinstance(value, str) else json.dumps(value, default=str), 100)
 
 
 class Account:

@@ -31,7 +31,7 @@ from coursebuild.features.importer.other_cells import language_of, write_other_c
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.roles import fill_shortcodes
 from coursebuild.features.importer.segments import change_prose, lower_titles, read_markdown
-from coursebuild.features.importer.source_files import Segment
+from coursebuild.features.importer.source_files import Segment, find_group
 from coursebuild.features.lab.model import BUILT_IN_KINDS
 
 _MAX_DEPTH = 20
@@ -105,8 +105,8 @@ def _convert(segment: Segment, context: LessonContext) -> str:
 def _write_tabs(text: str, context: LessonContext) -> str:
     """Return a set of tabs of Quarto with their titles, which are headings, in bold."""
     context.change(*_TAB)
-    first = re.search(r"^#{1,6}(?=[ \t])", text, re.MULTILINE)
-    pattern = rf"^{first[0] if first else '#'}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
+    first = find_group(r"(?m)^#{1,6}(?=[ \t])", text)
+    pattern = rf"^{first or '#'}[ \t]+(.*?)[ \t]*(?:\{{[^{{}}]*\}})?$"
     return _convert_nested(text, context, re.compile(pattern, re.MULTILINE))
 
 
@@ -120,7 +120,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     callout = re.search(r"callout-(\w+)", head)
     plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)  # as in Docusaurus
     label = re.search(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", head)
-    title = _title_of(head)
+    title = find_group(_TITLE, head)
     classes = re.findall(r"\.([\w-]+)", head)
     kind = PROOF_LABELS[label[1]] if label else ""
     kind = kind or next((name for name in classes if name in _PROOF_CLASSES), "")
@@ -151,12 +151,6 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     return _convert_nested(text, context)
 
 
-def _title_of(head: str) -> str:
-    """The title that the head of a block has by a name; may be empty."""
-    title = _TITLE.search(head)
-    return (title[1] or title[2] or "") if title else ""
-
-
 _PROOF_CLASSES = ("theorem", "lemma", "definition", "proof", "remark", "solution", "exercise")
 
 
@@ -179,10 +173,10 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         context.leave("block that is raw", f"a block of raw {raw[1]}, shown as text")
         return marks.fence("text", text)
     if kind == "admonish":
-        title = re.search(r"[\s=]\"([^\"]*)\"", head.replace('type="', ""))
+        title = find_group(r"[\s=]\"([^\"]*)\"", head.replace('type="', ""))
         name = next(iter(re.findall(r"\b(?:type=[\"'])?([a-z]+)\b", head)[1:]), "note")
         is_folded = "collapsible=true" in head
-        return _write_callout(name, title[1] if title else "", text, context, is_folded)
+        return _write_callout(name, title, text, context, is_folded)
     if listing := re.search(r"\bfile=((?!examples/)\S+)", head) if kind == "python" else None:
         context.change("listing of a file", "its name, and its code, not run")
         return f"**`{listing[1]}`**\n\n{marks.fence('python', text)}"
@@ -218,7 +212,7 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         head += f' title="{caption}"' if caption else ""
     change = "dropped: its tool colours the lines beside it"
     text = context.files.account.replace(text, _HIGHLIGHT, "", "comment in code", change)
-    words = re.sub(r"(\$[^$]+\$)|(?<!\\)([][_*`{}<])", _escape, _title_of(head))
+    words = re.sub(r"(\$[^$]+\$)|(?<!\\)([][_*`{}<])", _escape, find_group(_TITLE, head))
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
     kind = f"block of `{language}`" if language else "block without a kind"

@@ -10,11 +10,12 @@ import re
 from collections.abc import Iterator, Mapping
 
 from coursebuild.features.importer.context import PROOF_LABELS
-from coursebuild.features.importer.outlines import leave_entry
+from coursebuild.features.importer.outlines import group, leave_entry
 from coursebuild.features.importer.source_files import (
     ImportedLevel,
     ImportedText,
     SourceFiles,
+    find_group,
     value_at,
 )
 
@@ -36,7 +37,7 @@ _FENCE = re.compile(
 _DIVISION = re.compile(
     r"^(:{3,}[ \t]*)\{\.(?P<kind>[a-z]+)[ ]+#(?P<label>[\w-]+)(?P<rest>[^{}\n]*)\}", re.M
 )
-_LABEL = re.compile(r"[ ,]*(?:label\s*=\s*)?[\"']?([A-Za-z][\w-]*)[\"']?\s*(?:,|\Z)")
+_LABEL = re.compile(r"\A[ ,]*(?:label\s*=\s*)?[\"']?([A-Za-z][\w-]*)[\"']?\s*(?:,|\Z)")
 
 
 def read_bookdown(text: str) -> str:
@@ -66,15 +67,13 @@ def _label_division(match: re.Match[str]) -> str:
 
 def _write_fence(match: re.Match[str]) -> str:
     kind, options, body = match["kind"], match["options"], match["body"]
-    name = _LABEL.match(options)
-    label = name[1] if name else ""
+    label = find_group(_LABEL, options)
     if kind in _LABELS or kind in ("proof", "remark", "solution", "block", "block2"):
-        title = re.search(r"\bname\s*=\s*(?:\"([^\"]*)\"|'([^']*)')", options)
-        style = re.search(r"\btype\s*=\s*[\"']([\w-]+)", options)
-        head = f".{style[1] if style else kind}"
+        title = find_group(r"\bname\s*=\s*(?:\"([^\"]*)\"|'([^']*)')", options)
+        head = "." + (find_group(r"\btype\s*=\s*[\"']([\w-]+)", options) or kind)
         if kind in _LABELS and label:
             head = f"#{_LABELS[kind]}-{label}"
-        words = f"## {title[1] or title[2]}\n\n" if title else ""
+        words = f"## {title}\n\n" if title else ""
         new = f"::: {{{head}}}\n{words}{body}:::"
     else:
         return match[0]
@@ -102,14 +101,7 @@ def read_book(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
     title, lessons = "", list[ImportedText]()
     for path in paths:
         if part := PART.search(files.read_text(path)):
-            yield from _group(title, lessons)
+            yield from group(title, lessons)
             title, lessons = part[1], []
         lessons.append(ImportedText(file=path))
-    yield from _group(title, lessons)
-
-
-def _group(title: str, lessons: list[ImportedText]) -> Iterator[ImportedText | ImportedLevel]:
-    if title and lessons:
-        yield ImportedLevel(title=title, lessons=tuple(lessons))
-    else:
-        yield from lessons
+    yield from group(title, lessons)

@@ -73,7 +73,8 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     options = read_options(cell.text)[0]
     title = caption_of_code(options, context, ("lst-cap", "tbl-cap"))
     label = re.sub("^lst-", "", options.get("lst-label", ""))
-    word += how_shown(options, cell.head) + (f" {{#lst:{to_anchor(label)}}}" if label else "")
+    word += how_shown(options, cell.head, begins=not word)
+    word += f" {{#lst:{to_anchor(label)}}}" if label else ""
     head, end = f"python file={context.script_path}{word}", f"\n{_END} {len(context.parts)}"
     blocks = [*title, marks.fence(head, code + end)]
     blocks += write_recorded(recorded_output(cell, code), context.script_path, context)
@@ -176,7 +177,8 @@ def _without_window(code: str) -> str:
 def _caption_of(cell: Segment, code: str, context: LessonContext) -> str:
     options, title = read_options(cell.text)[0], _DRAWN_TITLE.search(code)
     words = "" if title is None else title[3]
-    words = words if title is None or title[1] == "r" else re.sub(r"\\([\\'\"])", r"\1", words)
+    if title and title[1] != "r":
+        words = re.sub(r"\\(n|[\\'\"])", lambda sign: " " if sign[1] == "n" else sign[1], words)
     caption = options.get("fig-cap") or options.get("caption") or words
     caption = " ".join(caption.strip("\"' ").split())
     return rewrite_prose(caption or context.title, context).rstrip()
@@ -191,8 +193,9 @@ def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = T
 
 
 _DRAWN_TITLE = re.compile(
-    r"\.(?:set_)?(?:sup)?title\(\s*(r|f(?!.*\{))?([\"'])((?:(?!\2).)+)\2"  # none is computed
+    r"\.(?:set_)?(?:sup)?title\(\s*(r|f(?!.*\{))?([\"'])((?:\\.|(?!\2)[^\\])+)\2\s*[,)]"
 )
+"""A title that is not computed."""
 
 
 def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) -> tuple[str, str]:
@@ -350,12 +353,15 @@ def caption_of_code(
     return [f"**{rewrite_prose(words, context)}**"] if words else []
 
 
-def how_shown(options: Mapping[str, str], tags: str = "") -> str:
-    """Return the word for a cell whose code its tool folds or hides, after a blank."""
+def how_shown(options: Mapping[str, str], tags: str, *, begins: bool) -> str:
+    """Return the word for a cell whose code its tool folds or hides, after a blank.
+
+    The frame in which a script begins is shown anyway: code that is hidden there is folded.
+    """
     tags += options.get("tags", "")
     is_hidden = "false" in (options.get("echo"), options.get("include"))
     if is_hidden or re.search("remove-(?:input|cell)", tags):
-        return " hidden"
+        return " folded" if begins else " hidden"
     is_folded = re.search("hide-(?:input|cell)", tags) or options.get("code-fold") == "true"
     return " folded" if is_folded else ""
 

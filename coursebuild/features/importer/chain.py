@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from textwrap import shorten
@@ -100,12 +99,11 @@ class Chain:
                 reasons[number] = f"it needs {words}"
             elif errors:
                 reasons[number] = f"`{shorten(errors[0], 200, placeholder='…')}`"
+                message = f": {reasons[number]}, so the cell is not run"
+                self.findings.append((Rank.FAILED, message, self.parts[number].span))
             else:
                 names -= _bound_names(ast.parse(code))
                 continue
-            if reasons[number].startswith("`"):
-                message = f": `{shorten(errors[0], 200, placeholder='…')}`, so the cell is not run"
-                self.findings.append((Rank.FAILED, message, self.parts[number].span))
             names |= _bound_names(ast.parse(code))
         rest = (imports.get(n, c) for n, c in enumerate(self.codes) if n not in reasons)
         if self.modules and not any(rest):
@@ -144,7 +142,6 @@ class Chain:
             for name in figures
             if re.search(rf'\.(?:savefig|imsave)\(\s*"{re.escape(name)}"', self.codes[number])
         ]
-        cells = [number for number in reasons if number not in imports or reasons[number]]
         numbers = (n for n in range(len(self.parts)) if n not in reasons)
         first = next((n for n in numbers if imports.get(n, self.codes[n])), None)
         for number, part in enumerate(self.parts):
@@ -158,7 +155,7 @@ class Chain:
                 head = re.sub(r"\s+figure=\S+", f" figure={names}" if names else "", head)
                 head, brace, label = head.partition(" {#")
                 head = " ".join((head, *keys, *([word[0]] if word else []))) + brace + label
-            if number in cells:
+            if number in reasons:
                 for name in figure_names:
                     lines = rf'^[\w.]+\.savefig\("{re.escape(name)}"\)\n[\w.]+\.close\("all"\)$'
                     code = re.sub(lines, "", code, flags=re.MULTILINE).strip("\n")
@@ -178,8 +175,7 @@ class Chain:
                 new = marks.fence(head, code)
             else:
                 continue
-            indented = textwrap.indent(new, part.prefix, lambda line: True)
-            yield Edit(part.span, indented.removeprefix(part.prefix))
+            yield Edit(part.span, new.replace("\n", f"\n{part.prefix}"))
         for recording in self.recordings:
             if recording.script == self.script.path and recording.part in reasons:
                 line = recording.span.first_line()

@@ -21,8 +21,9 @@ from coursebuild.features.importer.outlines import (
     Outline,
     find_text,
     flatten,
+    group,
     leave_entry,
-    left_setting,
+    leave_setting,
     make_level,
     read_folder,
     read_nav,
@@ -75,14 +76,14 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
     if not title and "_bookdown.yml" in files and "index.Rmd" in files:
         front_matter, _ = read_front_matter(files.read_text("index.Rmd"))
         title = str(front_matter.get("title") or "")
-    parts = [
-        *_read_parts(_read_settings("_toc.yml", files), files),
-        *_read_parts(value_at(myst, "project"), files),
-        *_read_parts(value_at(quarto, "book", "chapters"), files),
-        *_read_parts(value_at(quarto, "website", "sidebar"), files),
-        *_read_parts(value_at(quarto, "book", "appendices"), files),
-        *read_book(files),
+    maps = [
+        _read_settings("_toc.yml", files),
+        value_at(myst, "project"),
+        value_at(quarto, "book", "chapters"),
+        value_at(quarto, "website", "sidebar"),
+        value_at(quarto, "book", "appendices"),
     ]
+    parts = [*_read_parts(maps, files), *read_book(files)]
     if files.mkdocs:
         folder = posixpath.normpath(str(value_at(mkdocs, "docs_dir") or "docs"))
         nav = value_at(mkdocs, "nav")
@@ -97,7 +98,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         raise UsageError(message, help="; ".join(left))
     for name, mapping in zip(names, settings, strict=True):
         for key in _lost_keys(mapping):
-            files.leave(name, left_setting(key, value_at(mapping, *key.split("."))), "setting")
+            leave_setting(name, key, value_at(mapping, *key.split(".")), files)
     texts = [] if files.is_single else [part for part in parts if isinstance(part, ImportedText)]
     pages = [text for text in texts if _base_name(text.file) in _PAGES]
     if len(pages) == len(parts):  # a course has a lesson
@@ -154,13 +155,22 @@ def _read_settings(name: str, files: SourceFiles) -> Mapping[str, Any]:
     files.change("map", "content/course.toml")
     if value is None:
         raise UsageError(f"{path} is not YAML, or too large")
+    names = value_at(value, "metadata-files")
+    for further in names if isinstance(names, list) else ():
+        value = _join(value, files.settings(str(further)))
     return value if isinstance(value, dict) else {"chapters": value}
 
 
+def _join(first: Any, second: Any) -> Any:
+    """Return settings of two files as Quarto does: a list goes on, another value stays."""
+    if isinstance(first, dict) and isinstance(second, dict):
+        return {**second, **{key: _join(value, second.get(key)) for key, value in first.items()}}
+    return first + second if isinstance(first, list) and isinstance(second, list) else first
+
+
 _SETTINGS = frozenset(
-    "appendices bibliography bibtex_bibfiles chapters description docs_dir nav root sidebar "
-    "site_description site_name subtitle title "
-    "toc".split()
+    "appendices bibliography bibtex_bibfiles chapters description docs_dir metadata-files nav "
+    "root sidebar site_description site_name subtitle title toc".split()
 )
 """Keys of settings that are read."""
 
@@ -202,9 +212,8 @@ def _read_parts(value: object, files: SourceFiles) -> Iterator[ImportedText | Im
 
 
 def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLevel]:
-    def natural_order(path: str) -> list[tuple[int, int | str]]:
-        parts = re.split(r"(\d+)", path)
-        return [(0, int(part)) if part.isdigit() else (1, part.lower()) for part in parts if part]
+    def natural_order(path: str) -> list[int | str]:  # every second is a number
+        return [int(p) if p.isdecimal() else p.lower() for p in re.split(r"(\d+)", path)]
 
     def is_pair(path: str) -> bool:
         """Whether a text is a notebook once more, as Jupytext has it."""
@@ -223,10 +232,7 @@ def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLeve
             for path in paths
             if files.is_single or _base_name(path) not in _NOT_LESSONS
         ]
-        if folder and lessons:
-            yield ImportedLevel(title=title_of_file(folder), lessons=tuple(lessons))
-        else:
-            yield from lessons
+        yield from group(folder and title_of_file(folder), lessons)
 
 
 def _base_name(path: str) -> str:

@@ -403,8 +403,8 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
     code = "\n".join(segment.text for text in texts for segment in text.segments)
     imported = set(re.findall(r"^[ \t]*(?:from|import)[ \t]+(\w+)", code, re.MULTILINE))
     roots = [posixpath.dirname(path) for path in files if path.endswith("/__init__.py")]
-    packages = [r for r in roots if posixpath.basename(r) in imported]
-    packages = [root for root in packages if posixpath.dirname(root) not in roots]
+    tops = (root for root in roots if posixpath.dirname(root) not in roots)
+    packages = [root for root in tops if posixpath.basename(root) in imported]
     for path in files:
         root = next((root for root in packages if path.startswith(f"{root}/")), "")
         module, _, end = posixpath.basename(path).rpartition(".")

@@ -11,7 +11,6 @@ import json
 import posixpath
 import re
 from collections.abc import Iterator, Mapping
-from textwrap import shorten
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -21,6 +20,7 @@ from coursebuild.api import UsageError, model
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
+from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.bookdown import read_bookdown
 from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
 from coursebuild.features.importer.pandoc_tables import number_examples
@@ -53,9 +53,8 @@ _COURSE_FIELDS = ("id", "title", "summary", "levels", "pages", "language")
 _GROUPS = ("levels", "lessons", "pages")
 """Fields that hold further objects."""
 _LEVEL_FIELDS = ("id", "title", "summary", "lessons", "checkpoint")
-_LESSON_FIELDS = (
-    *("id", "slug", "title", "summary", "file", "objectives", "prerequisites", "minutes"),
-    *("status", "checkpoint"),
+_LESSON_FIELDS = tuple(
+    "id slug title summary file objectives prerequisites minutes status checkpoint".split()
 )
 
 
@@ -147,10 +146,8 @@ class _Reader:
             path for path in paths if file and (path == exact or f"/{path}".endswith(suffix))
         ]
         pattern = re.compile(rf"(?:lesson[-_ ]?)?{re.escape(id)}(?![\w.])|{re.escape(slug)}$")
-        for path in paths:
-            if id and pattern.match(posixpath.basename(stem_of(path))):
-                matches.append(path)
-        return matches[0] if matches else ""
+        own_paths = (path for path in paths if pattern.match(posixpath.basename(stem_of(path))))
+        return next(itertools.chain(matches, own_paths if id else ()), "")
 
 
 def _read_texts(fields: dict[str, Any], name: str) -> tuple[str, ...]:
@@ -272,9 +269,8 @@ def _read_file(
         raise UsageError(f"{text.file} is nested too deeply") from None
     lost = {**read.lost, **({} if id or not read.summary else {"description": read.summary})}
     for name, value in lost.items():
-        words = shorten(value if isinstance(value, str) else json.dumps(value, default=str), 100)
         kind = "lesson" if id else "page"
-        message = f"`{name}` of its metadata ({words}), which a {kind} does not have"
+        message = f"`{name}` of its metadata ({shorten_value(value)}), which a {kind} does not have"
         files.leave(text.file, message, "metadata of a text")
     files.change("text", "a lesson" if id else "a page")
     if course.has_own_titles and title and read.title and title.casefold() != read.title.casefold():
@@ -295,7 +291,7 @@ def _read_file(
         slug=slug,
         title=title,
         path=path,
-        summary=text.summary or read.summary,
+        summary=text.summary or _plain_text(read.summary),
         segments=read.segments,
         pictures=read.pictures,
         substitutions={"page.title": title, **read.substitutions},

@@ -18,7 +18,7 @@ from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.roles import convert_role, words_of_link, write_link
-from coursebuild.features.importer.source_files import TOO_MUCH
+from coursebuild.features.importer.source_files import TOO_MUCH, find_group
 
 CALLOUTS = {
     **{name: name for name in model.CALLOUTS},
@@ -109,8 +109,7 @@ def _write(directive: Directive, context: LessonContext) -> str:
         case "figure-md":  # its argument is its label, its first paragraph the picture
             picture, _, caption = text.strip("\n").partition("\n\n")
             patterns = (r"\]\(([^()\s]+)|src=[\"']([^\"']+)", r"!\[([^\]]*)\]|alt=[\"']([^\"']*)")
-            matches = (re.search(pattern, picture) for pattern in patterns)
-            source, alt = ((match[1] or match[2] or "") if match else "" for match in matches)
+            source, alt = (find_group(pattern, picture) for pattern in patterns)
             new = {**options, "alt": alt, "name": argument}
             figure = replace(directive, name="figure", argument=source, options=new, text=caption)
             return _write_figure(figure, context)

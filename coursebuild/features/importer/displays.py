@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from coursebuild.features.importer.context import formula_anchor
-from coursebuild.features.importer.source_files import value_at
+from coursebuild.features.importer.source_files import find_group, value_at
 
 WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
 """Words in a formula that hold a formula themselves."""
@@ -63,6 +63,7 @@ _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 
 def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
+    text = re.sub(r"(?<!\\)\\[ \t]*(?=\n[ \t>]*\$\$)", "", text)  # a blank, at its end
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
     text = define_operators(_DISPLAY.sub(_drop_empty, text))
     return _DISPLAY.sub(_label_formula, _ENVIRONMENT.sub(_write_environment, text))
@@ -110,19 +111,18 @@ def _drop_empty(match: re.Match[str]) -> str:
 def _label_formula(match: re.Match[str]) -> str:
     if match["tex"] is None:
         return match[0]
-    inside = _LABEL.search(match["tex"])
-    label = match["myst"] or match["quarto"] or (inside[1] if inside else "")
+    label = match["myst"] or match["quarto"] or find_group(_LABEL, match["tex"])
     tex = _LABEL.sub("", match["tex"])
     tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
     tex = _align(tex)
     opening, closing = "", match["behind"] or ""
+    line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]
     if lead := _LEAD.search(match["tex"]):  # a mark beside a text could be that of another formula
-        line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]
         opening = lead[0] if _WORDS_BEFORE.match(line) else ""
         closing = lead[0] if match["behind"] is not None else ""
-        if mark := _MARGIN.match(line):  # which the lines that go on may lack
-            margin = "[ \t]*>" if ">" in mark[0] else mark[0]
-            tex = re.sub(rf"\n(?!{margin})", f"\n{mark[0]}", tex)
+    if mark := _MARGIN.match(line):  # which the lines that go on may lack
+        margin = "[ \t]*>" if ">" in mark[0] else mark[0]
+        tex = re.sub(rf"\n(?!{margin})", f"\n{mark[0]}", tex)
     braces = f" {{#eq:{formula_anchor(label)}}}" if label else ""
     return f"{opening}$${tex}$${braces}{closing}"
 

@@ -13,8 +13,9 @@ import posixpath
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
 
-from coursebuild.features.importer.source_files import TEXTS, TOO_MUCH, SourceFiles
+from coursebuild.features.importer.source_files import TEXTS, TOO_MUCH, SourceFiles, find_group
 
 _MAX_DEPTH = 10
 """Files that may include each other in a row."""
@@ -49,13 +50,14 @@ _IMPORT = re.compile(
 
 def _place_imports(text: str) -> str:
     """Return a text of MDX that names texts and pictures where it uses what it imports."""
-    for name, file in _IMPORT.findall(text):
+    for name, address in _IMPORT.findall(text):
+        file = re.sub(r"\\(.)", r"\1", address)
         if file.startswith("!!"):
             block = rf"^[ \t]*<CodeBlock\b([^<>]*)>[ \t\n]*\{{{name}\}}[ \t\n]*</CodeBlock>[ \t]*$"
             for code in re.finditer(block, text, re.MULTILINE):
-                language = re.search(r"language=[\"']([\w+-]+)", code[1])
-                title = re.search(r"title=\"[^\"]*\"", code[1])
-                head = f"{language[1] if language else 'text'} {title[0] if title else ''}".rstrip()
+                language = find_group(r"language=[\"']([\w+-]+)", code[1])
+                title = find_group(r"title=\"[^\"]*\"", code[1])
+                head = f"{language or 'text'} {title}".rstrip()
                 inclusion = f"{{!{file.rpartition('!')[2]}!}}"
                 text = text.replace(code[0], f"```{head}\n{inclusion}\n```")
         elif file.endswith((".md", ".mdx")):
@@ -118,10 +120,7 @@ def expand_includes(
 
 def _find(name: str, path: str, files: SourceFiles) -> str:
     """Return the path of a file that a text names, from its own folder or another that may be."""
-    folders = [posixpath.dirname(path)]
-    while folders[-1]:
-        folders.append(posixpath.dirname(folders[-1]))
-    for folder in (*folders, *files.included_folders):
+    for folder in (*map(str, PurePosixPath(path).parents), *files.included_folders):
         path = posixpath.normpath(posixpath.join(folder, name.lstrip("/")))
         if place := files.find(path, is_hidden=path.endswith(TEXTS)):
             return place

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 
 from coursebuild.features.importer.context import LessonContext
+from coursebuild.features.importer.source_files import find_group
 
 _BRACES = r"\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
 _STATEMENT = (
@@ -56,9 +57,7 @@ def without_jsx(text: str, context: LessonContext) -> str:
 def write_component(name: str, attributes: str, context: LessonContext) -> str:
     """Return what the beginning of a component has readers see: a picture, or its label."""
     context.leave("component", f"the component `<{name}>`; what it holds is shown")
-    labels = (pattern.search(attributes) for pattern in _LABELS)
-    label = next(filter(None, labels), None)
-    words = (label[1] or label[2] or "") if label else ""
+    words = find_group(_LABELS[0], attributes) or find_group(_LABELS[1], attributes)
     if picture := _ADDRESS.search(attributes):
         return f"![{words}]({picture[1]})"
     if number := re.search(r"\snumber=\"([^\"]+)", attributes):

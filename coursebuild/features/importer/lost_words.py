@@ -7,7 +7,6 @@ found by its words. Most of what is found are names by which another tool is tol
 from __future__ import annotations
 
 import json
-import posixpath
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -59,7 +58,7 @@ def _words(text: str) -> Iterator[str]:
 
 def _places(path: str, text: str) -> Iterable[tuple[str, str]]:
     """Yield the lines of a text, or what the cells of a notebook hold, each with its place."""
-    if posixpath.splitext(path)[1] != ".ipynb":
+    if not path.endswith(".ipynb"):
         yield from ((f"line {number}", line) for number, line in enumerate(text.split("\n"), 1))
         return
     try:

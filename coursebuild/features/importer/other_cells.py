@@ -24,7 +24,7 @@ from coursebuild.features.importer.cells import (
 )
 from coursebuild.features.importer.context import JoinedCells, LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.source_files import Segment
+from coursebuild.features.importer.source_files import Segment, find_group
 
 _EXTENSIONS = {
     **dict.fromkeys(("bash", "sh", "zsh"), "sh"),
@@ -37,7 +37,11 @@ _PRINTING = ("r", *_SHELLS)
 _HEAD = re.compile(
     r"\{code-cell\}[ \t]+(?P<myst>\w+).*|\{(?P<name>\w+)(?:[\s,]+(?P<options>[^{}]*))?\}", re.DOTALL
 )
-_MAGIC = re.compile(r"\s*%%(\w+)[^\n]*\n")
+_OWN_LABEL = re.compile(r"\A\{r[ \t]+([\w.-]+)[ \t]*(?:,.*)?\}\Z", re.DOTALL)
+"""The label of a cell as knitr has it, the word behind the language."""
+_MAGIC = re.compile(r"\A\s*%%(\w+)[^\n]*\n")
+_NESTED = re.compile(r"^[ \t>]*(?:`{3,}|~{3,})\{(?:code-cell\}[ ]+)?(\w+)", re.MULTILINE)
+"""The language of a cell in the text of a block."""
 _SETTINGS = re.compile(r"(?:library\(knitr\)\s*)?(?:knitr::)?opts_chunk\$set\([^()]*\)\s*")
 _PICTURE = re.compile(
     r"\s*(?:knitr::)?include_graphics\(\s*([\"'])(?P<path>[^\"'\n]+)\1[^()]*\)\s*"
@@ -50,8 +54,7 @@ def language_of(segment: Segment) -> str:
     """Return the language of a cell that is not Python; empty for anything else."""
     language = ""
     if segment.kind == "cell":
-        magic = _MAGIC.match(segment.text)
-        language = magic[1] if magic else ""
+        language = find_group(_MAGIC, segment.text)
         language = "" if language.startswith("j") else language  # it changes the page
     elif segment.mark[0] in "`~" and (head := _HEAD.fullmatch(segment.head)):
         language = head["myst"] or head["name"]
@@ -60,14 +63,18 @@ def language_of(segment: Segment) -> str:
 
 
 def languages_of_single_cells(segments: Iterable[Segment]) -> frozenset[str]:
-    """Return the languages of which a text has one cell that is run."""
-    languages = [
-        language_of(segment)
-        for segment in segments
-        if _options_of(segment).get("eval", "").lower() != "false"
-        and not _PICTURE.fullmatch(code_for_readers(segment.text))
-    ]
+    """Return the languages of which a text has one cell that is run, also within blocks."""
+    languages = []
+    for segment in segments:
+        if segment.mark[0] not in "`~":
+            languages += _NESTED.findall(segment.text)
+        elif not (_is_shown_only(segment) or _PICTURE.fullmatch(code_for_readers(segment.text))):
+            languages.append(language_of(segment))
     return frozenset(language for language in languages if languages.count(language) == 1)
+
+
+def _is_shown_only(segment: Segment) -> bool:
+    return _options_of(segment).get("eval", "").lower() == "false"
 
 
 def _options_of(segment: Segment) -> dict[str, str]:
@@ -85,7 +92,9 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     options, kind = _options_of(cell), f"cell of `{language}`"
     code = code_for_readers(_MAGIC.sub("", cell.text, count=1))
     label = options.get("label", "")
-    if own_label := _own_label(cell.head):  # of which only figures and tables are referred to
+    if own_label := find_group(
+        _OWN_LABEL, cell.head
+    ):  # of which only figures and tables are referred to
         label = f"fig-{own_label}" if "fig-cap" in options else ""
         label = label or (f"tbl-{own_label}" if "caption" in code else "")
     head = [f'<a id="{to_anchor(label)}"></a>'] if label else []
@@ -99,11 +108,12 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
         code = ""
     if not code:
         return "\n\n".join(head)
-    if options.get("eval", "").lower() == "false":
+    if _is_shown_only(cell):
         context.leave(kind, f"a {kind}, which its tool does not run, is shown")
         return "\n\n".join((*head, marks.fence(language, code), *write_outputs(cell, context)))
-    word = how_shown(options, cell.head)
-    if not (language in _SHELLS or language in context.single_languages):
+    is_script = language in _SHELLS or language in context.single_languages
+    word = how_shown(options, cell.head, begins=is_script)
+    if not is_script:
         context.change(kind, "lines of one script, which ends the text")
         cells = context.joined.setdefault(language, JoinedCells(_new_path(language, context)))
         lines = cells.add(code, cell.printed + (cell.value if language in _PRINTING else ""))
@@ -130,12 +140,6 @@ def _new_path(language: str, context: LessonContext) -> str:
     stem = context.script_path.removesuffix(".py")
     number = f"_{len(context.scripts) + 1}" if context.scripts else ""
     return f"{stem}{number}.{_EXTENSIONS[language]}"
-
-
-def _own_label(head: str) -> str:
-    """The label of a cell as knitr has it, the word behind the language."""
-    label = re.fullmatch(r"\{r[ \t]+([\w.-]+)[ \t]*(?:,.*)?\}", head, re.DOTALL)
-    return label[1] if label else ""
 
 
 def _outputs(cell: Segment, language: str, context: LessonContext) -> Iterator[str]:

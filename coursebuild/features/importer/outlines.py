@@ -7,23 +7,23 @@ literal; where it is computed, or says so, the order is that of `sidebar_positio
 
 from __future__ import annotations
 
-import json
 import posixpath
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
-from textwrap import shorten
 from urllib.parse import unquote
 
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.segments import read_front_matter
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedLevel,
     ImportedText,
     SourceFiles,
+    find_group,
     read_yaml,
     stem_of,
     title_of_file,
@@ -59,15 +59,13 @@ def read_outline(files: SourceFiles) -> Outline | None:
             return outline
         for key, value in (settings if isinstance(settings, Mapping) else {}).items():
             if key not in ("title", "src", "language", "description", "multilingual"):
-                files.leave("book.toml", left_setting(key, value), "setting")
-        words = (str(value_at(settings, key) or "") for key in ("description", "language"))
-        return replace(outline, **dict(zip(("summary", "language"), words, strict=True)))
+                leave_setting("book.toml", key, value, files)
+        keys = ("description", "language")
+        summary, language = (str(value_at(settings, key) or "") for key in keys)
+        return replace(outline, summary=summary, language=language)
     if "conf.py" in files and "index.md" in files:
-        title = re.search(
-            r"^project\s*=\s*([\"'])(.+?)\1", files.read_text("conf.py"), re.MULTILINE
-        )
         return Outline(
-            title=title[2] if title else "",
+            title=find_group(r"(?m)^project\s*=\s*([\"'])(.+?)\1", files.read_text("conf.py")),
             parts=tuple(_read_toctrees("index.md", files, {"index.md"})),
             pages=(ImportedText(file="index.md"),),
         )
@@ -80,9 +78,11 @@ def read_outline(files: SourceFiles) -> Outline | None:
     docs = posixpath.join(folder, "docs")
     docs = docs if any(path.startswith(f"{docs}/") for path in files) else "docs"
     pattern = re.escape(posixpath.join(folder, "sidebars.")) + r"[cm]?[jt]s(?:on)?"
-    name = next((path for path in files if re.fullmatch(pattern, path)), "")
+    usual_paths = [path for path in files if re.fullmatch(pattern, path)][:1]
+    names = re.findall(r"sidebarPath:[^\n]*?([\w./-]+\.[cm]?[jt]s)\b", files.read_text(config))
+    paths = (posixpath.normpath(posixpath.join(folder, path)) for path in names)
     parts: list[ImportedText | ImportedLevel] = []
-    if name:
+    for name in usual_paths or [path for path in paths if path in files]:
         files.change("map", "content/course.toml")
         sidebars = _read_literal(files.read_text(name))
         if sidebars is None:
@@ -105,16 +105,24 @@ def find_text(name: object, files: SourceFiles) -> str:
     return next((path for end in TEXTS if (path := files.find(name + end))), "")
 
 
-def left_setting(key: str, value: object) -> str:
-    """The message that a setting of a course is left."""
-    words = value if isinstance(value, str | int | float) else json.dumps(value, default=str)
-    return f"the setting `{key}` ({shorten(str(words), 100)}), which a course does not have"
+def leave_setting(path: str, key: str, value: object, files: SourceFiles) -> None:
+    """Note that a setting of a course is left."""
+    message = f"the setting `{key}` ({shorten_value(value)}), which a course does not have"
+    files.leave(path, message, "setting")
 
 
 def leave_entry(path: str, name: str, files: SourceFiles, place: str = "") -> None:
     """Note that a map names what is no text of the folder."""
     message = f"the map names `{name}`, which is not in the folder or no text"
     files.leave(path, message, "entry of the map", place)
+
+
+def group(title: str, lessons: Sequence[ImportedText]) -> Iterator[ImportedText | ImportedLevel]:
+    """Yield lessons as a level with a title; one by one where there is no title."""
+    if title and lessons:
+        yield ImportedLevel(title=title, lessons=tuple(lessons))
+    else:
+        yield from lessons
 
 
 # --- mdBook, GitBook
@@ -126,10 +134,8 @@ _ENTRY = re.compile(
 _PART = re.compile(r"#{1,3}[ \t]+(.*?)[ \t]*#*[ \t]*")
 
 
-class _Entry(Struct, frozen=True):
-    depth: int
-    """Blanks before it; -1 outside of the list."""
-    text: ImportedText
+_Entry = tuple[int, ImportedText]
+"""The blanks before it, -1 outside of the list; and the chapter."""
 
 
 def _read_summary(path: str, title: str, files: SourceFiles) -> Outline:
@@ -150,34 +156,28 @@ def _read_summary(path: str, title: str, files: SourceFiles) -> Outline:
                 leave_entry(path, address, files, f"line {number}")
             words = re.sub(r"\\(.)", r"\1", entry["title"]).replace("`", "")
             depth = len(entry["indent"].expandtabs(4)) if entry["item"] else -1
-            groups[-1][1].append(_Entry(depth, ImportedText(file=file, title=words)))
+            groups[-1][1].append((depth, ImportedText(file=file, title=words)))
         elif line.strip() and not re.fullmatch(r"[ \t]*-{3,}[ \t]*", line):
             files.leave(
                 path, f"`{line.strip()}`, which is no entry", "entry of the map", f"line {number}"
             )
-    pages = [e.text for _, entries in groups for e in entries if e.depth < 0 and e.text.file]
+    pages = [text for _, entries in groups for depth, text in entries if depth < 0 and text.file]
     parts: list[ImportedText | ImportedLevel] = []
     for name, entries in groups:
-        lessons = [entry for entry in entries if entry.depth >= 0]
-        if name and lessons:
-            parts.append(ImportedLevel(title=name, lessons=tuple(e.text for e in lessons)))
-        else:
-            parts += _group_by_depth(lessons)
+        lessons = [entry for entry in entries if entry[0] >= 0]
+        parts += group(name, [text for _, text in lessons]) if name else _group_by_depth(lessons)
     return Outline(title=title, parts=tuple(parts), pages=tuple(pages))
 
 
 def _group_by_depth(entries: Iterable[_Entry]) -> Iterator[ImportedText | ImportedLevel]:
     """Yield chapters, one that has others below it as a level with them."""
     groups: list[list[ImportedText]] = []
-    for entry in entries:
-        if entry.depth == 0 or not groups:
+    for depth, text in entries:
+        if depth == 0 or not groups:
             groups.append([])
-        groups[-1].append(entry.text)
-    for first, *sections in groups:
-        if sections:
-            yield ImportedLevel(title=first.title, lessons=(first, *sections))
-        else:
-            yield first
+        groups[-1].append(text)
+    for texts in groups:
+        yield from group(texts[0].title if texts[1:] else "", texts)
 
 
 # --- Sphinx
@@ -213,8 +213,8 @@ def _read_toctrees(
                     paths.add(child)
                     parts.append(ImportedText(file=child, title=entry["title"] or ""))
                     parts += _read_toctrees(child, files, paths)
-        caption = _CAPTION.search(tree["body"])
-        yield from make_level(caption[1], parts, path, files) if caption else parts
+        caption = find_group(_CAPTION, tree["body"])
+        yield from make_level(caption, parts, path, files) if caption else parts
 
 
 # --- Docusaurus
@@ -289,8 +289,9 @@ def make_level(
             words = f"“{part.title}”{part.summary and f' ({part.summary})'}"
             message = f"the part {words} within a part: its lessons are in that one"
             files.leave(path, message, "entry of the map")
-    if lessons := tuple(flatten(parts)):
-        yield ImportedLevel(title=title, summary=summary, lessons=lessons)
+    # A sidebar may name a text once as a category, and again within it
+    if lessons := {lesson.file or lesson.title: lesson for lesson in flatten(parts)}:
+        yield ImportedLevel(title=title, summary=summary, lessons=tuple(lessons.values()))
 
 
 def flatten(parts: Iterable[ImportedText | ImportedLevel]) -> Iterator[ImportedText]:
@@ -382,4 +383,5 @@ def _category(folder: str, files: SourceFiles) -> Mapping[str, object]:
 
 def _front_matter(path: str, files: SourceFiles) -> Mapping[str, object]:
     text = files.read(path).decode("utf-8-sig", "replace").replace("\r\n", "\n")
+    files.read_paths.discard(path)  # it is not taken by that
     return read_front_matter(text)[0] if path.endswith((".md", ".mdx")) else {}

@@ -197,8 +197,11 @@ def _read_ruled(lines: Sequence[str]) -> _Table | None:
         (
             n
             for n in range(rule + 1, len(lines))
-            if (_LINE.fullmatch(lines[n]) or _RULE.fullmatch(lines[n]) if has_end else False)
-            or not (has_end or lines[n].strip())
+            if (
+                _LINE.fullmatch(lines[n]) or _RULE.fullmatch(lines[n])
+                if has_end
+                else not lines[n].strip()
+            )
         ),
         None if has_end else len(lines),
     )

@@ -89,7 +89,7 @@ _LINE = re.compile(
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
     r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source|iframe)>)?)"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
-    r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z])-{2,3}(?=[a-z]))"
+    r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z\d])-{2,3}(?=[A-Za-z\d]))"
     rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
 GONE = "gone:"
@@ -112,6 +112,7 @@ _COMMENT = re.compile(
     re.MULTILINE,
 )
 """A comment of MyST or Obsidian, or the break of MyST between two cells."""
+_QUOTED_TITLE = re.compile(r"^[ ]{0,3}>[ \t>]*#(?=[ \t])", re.MULTILINE)
 _COMMENT_AS_HEADING = re.compile(
     r"^(#{1,6}[ \t]+)?<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$(?(1)|(?=\n+:[ \t]))", re.MULTILINE
 )
@@ -203,7 +204,9 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = account.replace(text, *rule)
     if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
         text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
-    text = _OVER_LINES.sub(_join_lines, normalize_formulas(text))
+    if context.files.dollars != "\n":
+        text = normalize_formulas(text)
+    text = _OVER_LINES.sub(_join_lines, text)
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
     for abbreviation in _ABBREVIATION.finditer(text):
         message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
@@ -236,6 +239,7 @@ def _write_comment(match: re.Match[str]) -> str:
 _BLOCKS: Rules = (
     (MARKDOWN_FIGURE, write_captioned, "figure", "a picture with its caption"),
     (_CONTENTS, "", "table of contents", "dropped: the site has its own"),
+    (_QUOTED_TITLE, r"\g<0>#", "heading in a quotation", "a level lower"),
     (_COMMENT_AS_HEADING, r"\1`\2`", "comment", "words of a heading or term that has no others"),
     (_COMMENT, _write_comment, "comment of MyST", "a comment of HTML"),
 )
@@ -328,9 +332,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called
             )
             return _rewrite_line(called, context) if is_path else whole
-        case "math" | "digits" if not context.files.has_dollars and whole[:2] != "$$":
+        case "math" | "digits" if not whole.startswith(context.files.dollars):
             return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
-        case "paren" if not context.files.has_dollars:
+        case "paren" if context.files.dollars != "$":
             return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":
             return f"${match['inner'].strip()}$"
@@ -363,7 +367,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 return re.sub(",(?=[ ]*@)", ";", whole.replace("-@", "@"))
             message = f"`{whole}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave("citation", message)
-            return f"`{whole}`"
+            return f"(<{keys[0]}>)" if whole.startswith("[@http") else f"`{whole}`"
         case "told":
             if match["work"] in context.sources:
                 return context.cite_in_words(match["work"], match["cited"] or "")
@@ -377,10 +381,11 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "substitution":
             return convert_substitution(whole, context, bool(_STATEMENTS.fullmatch(match.string)))
         case "marked":
-            is_marked = whole[:2] == "==" or context.has_marks
-            tag = _MARKS[whole[:2] if whole[:2] in _MARKS else whole[0]]
-            words = whole[2:-2] if whole[:2] in _MARKS else whole[1:-1]
-            return f"<{tag}>{_rewrite_line(words, context)}</{tag}>" if is_marked else whole
+            mark = whole[:2] if whole[:2] in _MARKS else whole[0]
+            if mark != "==" and not context.has_marks:
+                return whole
+            words = _rewrite_line(whole.removeprefix(mark).removesuffix(mark), context)
+            return f"<{_MARKS[mark]}>{words}</{_MARKS[mark]}>"
         case "change":
             words, mark = whole[3:-3], whole[1:3]
             if not context.has_marks:
@@ -393,9 +398,11 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             address = context.resolve_link(whole[1:-1])
             return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
         case "latex":
-            if "{" in whole and context.has_marks:
+            if not context.has_marks:
+                return whole
+            if "{" in whole:
                 context.leave("command of LaTeX", f"`{whole}`, which no page here shows")
-            return "" if context.has_marks else whole
+            return ""
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"

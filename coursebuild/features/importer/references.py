@@ -21,7 +21,7 @@ from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.features.importer.displays import DEFINITION
 from coursebuild.features.importer.prose import GONE
-from coursebuild.features.importer.source_files import title_of_file
+from coursebuild.features.importer.source_files import find_group, title_of_file
 
 _GONE = re.compile(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
 _REFERENCE = re.compile(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
@@ -66,7 +66,7 @@ def complete_texts(
 
 _PASSES = 3
 """How often HTML is dropped: an end whose beginning was dropped is seen the next time."""
-_ANCHOR = re.compile(r'<a id="[^"<>]*">|[ ]?\{#[^{}\n]*\}')
+_ANCHOR = re.compile(r'<a id="[^"<>]*">|[ ]id="[^"<>]*"|[ ]?\{#[^{}\n]*\}')
 _MEDIA = re.compile(
     r"<(?:(?:img|source)\b[^<>]*>(?:</img>)?"
     r"|(?P<name>video|audio)\b[^<>]*(?:/>|>(?:.*?</(?P=name)\s*>)?))",
@@ -142,8 +142,8 @@ def _link_to_picture(
     end, tag = element.end(), element[0]
     kind = "recording" if element["name"] else "picture"
     leave(link, "tag of HTML", _ELSEWHERE_NOTE.format(kind, address.text))
-    alt = re.search(r"\salt=[\"']([^\"']+)", tag)
-    words = alt[1] if alt else urlsplit(address.text).path.rpartition("/")[2]
+    alt = find_group(r"\salt=[\"']([^\"']+)", tag)
+    words = alt or urlsplit(address.text).path.rpartition("/")[2]
     before = source.text[:start].lower()
     is_in_link = before.rfind("<a ") > before.rfind("</a")
     new = words if is_in_link else f'<a href="{address.text}">{words}</a>'

@@ -18,7 +18,7 @@ from coursebuild.features.importer.context import (
     to_anchor,
 )
 from coursebuild.features.importer.jsx import write_component
-from coursebuild.features.importer.source_files import title_of_file
+from coursebuild.features.importer.source_files import find_group, title_of_file
 
 
 def write_link(text: str, address: str, title: str = "") -> str:
@@ -53,17 +53,18 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case "eq":
             return write_link(words, context.resolve_formula(target))
         case "doc":
-            return write_link(words or title_of_file(target), context.resolve_link(f"{target}.md"))
+            # A name before a colon is that of another project
+            address = context.resolve_link(f"inv:{target}" if ":" in target else f"{target}.md")
+            return write_link(words or words_of_link(address, target), address)
         case "ref" | "numref" | "prf:ref" | "any" | "embed":
             address = address_of_label(target, context)
             if not address:
                 message = f"a link to `{target}`, which no text sets"
                 context.leave(f"role `{{{name}}}`", message)
             if ":" in address.rpartition("#")[2]:  # what has a number is called by it
-                rest = words.partition("%s")[2] if "%s" in words else ""
-                return write_link("" if "%s" in words else words, address) + rest
-            lesson = re.match(r"lesson:([\w.]+)", address)
-            words = words.replace("%s", lesson[1] if lesson else "").strip()
+                words, mark, rest = words.partition("%s")
+                return write_link("" if mark else words, address) + rest
+            words = words.replace("%s", find_group(r"^lesson:([\w.]+)", address)).strip()
             return write_link(words if address else words or title_of_file(target), address)
         case _ if name.partition(":")[0] in ("cite", "citep", "citet"):
             keys = [key.strip() for key in body.split(",")]
@@ -174,7 +175,7 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
 
     A statement shows nothing itself, and of a call of a macro its texts are shown.
     """
-    title = re.search(r"(?:title|caption)=\"([^\"]*)\"", whole)
+    title = find_group(r"(?:title|caption)=\"([^\"]*)\"", whole)
     if number := re.fullmatch(r"\{\{(?:eq|t)?ref:[ ]*([^{}\s]+)[ ]*\}\}", whole):
         if address := context.resolve_formula(number[1]):
             return write_link("", address)
@@ -183,10 +184,10 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     name, *arguments = whole.strip("{}<> %").split() or [""]
     address = "".join(arguments[:1])
     if name in ("tab", "code") and title:
-        return f"**{title[1]}**"
+        return f"**{title}**"
     if name in ("video", "embed"):
         address = re.sub(r"(?<=\.ipynb)#.*", "", address.removeprefix("url=").strip('"'))
-        return write_link(title[1] if title else address, context.resolve_link(address))
+        return write_link(title or address, context.resolve_link(address))
     if name.removeprefix("end") in _FRAMES and name != "embed":
         return ""
     if name == "kbd" and arguments:
@@ -249,9 +250,9 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     kind = _WITH_FILE.match(tag)
     attribute = _ATTRIBUTE.search(tag) if kind else None
     if attribute and kind and kind["frame"]:
-        title = re.search(r"\stitle=[\"']([^\"']+)", tag)
         address = context.resolve_link(attribute[3])
-        words = title[1] if title else words_of_link(address, attribute[3])
+        title = find_group(r"\stitle=[\"']([^\"']+)", tag)
+        words = title or words_of_link(address, attribute[3])
         context.leave("tag of HTML", f"a frame that shows `{attribute[3]}`; it is a link now")
         return f'<a href="{address}">{words}</a>' if address else words
     if attribute is None or re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
@@ -262,8 +263,7 @@ def convert_tag(tag: str, context: LessonContext) -> str:
         return before + new_address + after
     context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
     if re.match("<img", tag, re.IGNORECASE):
-        alt = re.search(r"\s(?i:alt)=[\"']([^\"']*)", tag)
-        return alt[1] if alt else ""
+        return find_group(r"\s(?i:alt)=[\"']([^\"']*)", tag)
     return tag[: attribute.start()].rstrip() + after[1:]
 
 

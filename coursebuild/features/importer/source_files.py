@@ -169,6 +169,12 @@ def value_at(settings: object, *path: str) -> object:
     return settings
 
 
+def find_group(pattern: str | re.Pattern[str], text: str) -> str:
+    """Return the last group of the first match of a pattern; empty where there is none."""
+    match = re.search(pattern, text)
+    return match[match.lastindex or 0] if match else ""
+
+
 def stem_of(path: str) -> str:
     """A file's path without its extension."""
     return posixpath.splitext(path)[0]
@@ -240,23 +246,26 @@ class SourceFiles:
         return path in self._real_paths
 
     @cached_property
-    def has_dollars(self) -> bool:
-        """Whether a dollar begins a formula: in GitBook two do, in Docusaurus an extension says.
-
-        Else it is a dollar, and `\\(` a bracket.
-        """
-        has_none = self.docusaurus and "math" not in self.read_text(self.docusaurus)
-        return not has_none and not (self.folder / ".gitbook.yaml").is_file()
+    def dollars(self) -> str:
+        """What begins a formula: two dollars in GitBook, none where settings name no extension."""
+        if (self.folder / ".gitbook.yaml").is_file():
+            return "$$"
+        names = map(self.find_settings, ("mkdocs.yml", "book.toml", self.docusaurus))
+        path = next(filter(None, names), "")
+        pattern = "[Mm]ath|arithmatex|[Kk]a[Tt]e[Xx]|INHERIT"
+        is_math = re.search(pattern, path and self.read_text(path))
+        return "$" if is_math or not path else "\n"  # no formula begins with the end of a line
 
     @cached_property
     def docusaurus(self) -> str:
         """The path of the settings of Docusaurus; empty where it is no site of it."""
-        paths = (p for p in self if re.fullmatch(r"(?:\w+/)?docusaurus\.config\.[cm]?[jt]s", p))
-        return min(paths, key=len, default="")
+        pattern = r"(?:[\w-]+/){0,2}docusaurus\.config\.[cm]?[jt]s"
+        return min((p for p in self if re.fullmatch(pattern, p)), key=len, default="")
 
     def find_settings(self, name: str) -> str:
-        """Return the path of settings in YAML, which have two extensions; empty for none."""
-        return next((path for path in (name, name.replace(".yml", ".yaml")) if path in self), "")
+        """Return the path of settings, whose extension or tool has two names; empty for none."""
+        names = (name, name.replace(".yml", ".yaml"), name.replace("mkdocs", "properdocs"))
+        return next((path for path in names if path in self), "")
 
     def settings(self, name: str) -> Mapping[str, Any]:
         """Return the settings in a file; none where it is not there, or cannot be read."""
@@ -289,12 +298,8 @@ class SourceFiles:
     @cached_property
     def macro_marks(self) -> Sequence[tuple[str, str]]:
         """The marks that stand for braces, as settings of MkDocs name them, each with these."""
-        names = {
-            "variable_start": "{{",
-            "variable_end": "}}",
-            "block_start": "{%",
-            "block_end": "%}",
-        }
+        names = {"variable_start": "{{", "variable_end": "}}"}
+        names |= {"block_start": "{%", "block_end": "%}"}
         pattern = rf"\bj2_({'|'.join(names)})_string:[ \t]*[\"']?([^\s\"']+)"
         return [(mark, names[name]) for name, mark in re.findall(pattern, self.mkdocs)]
 

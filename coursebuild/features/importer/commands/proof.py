@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 import posixpath
 import re
-import textwrap
 from collections import defaultdict
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from textwrap import shorten
@@ -292,13 +291,13 @@ def _record_outputs(
                 findings.add(Rank.RECORDED, message, recording.body_span)
                 for place, message in _find_old_numbers(recording, changes, printed):
                     findings.add(Rank.SAID, message, place)
+    recorded_parts = {recording.part for recording in recordings}
     for part, block in enumerate(script.parts or (script,)):
         printed = script_run.output_of(part)
-        is_recorded = any(recording.part == part for recording in recordings)
-        if printed.strip() and not is_recorded and part not in failing_parts:
+        if printed.strip() and part not in recorded_parts and part not in failing_parts:
             end, text = block.span.end, marks.fence("output", printed.rstrip("\n"))
-            below = textwrap.indent(f"\n\n{text}", block.prefix, lambda line: True)
-            yield Edit(Span(block.span.source, end, end), below.removeprefix(block.prefix))
+            below = f"\n\n{text}".replace("\n", f"\n{block.prefix}")
+            yield Edit(Span(block.span.source, end, end), below)
             keep_notebook_outputs([(script.path, printed)], options.store)
 
 
