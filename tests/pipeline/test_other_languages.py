@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 
 import pytest
 
@@ -13,15 +12,7 @@ from support.scratch_course import Folder, Make, block
 pytestmark = pytest.mark.site
 
 COPY = "import shutil, sys; shutil.copy(*sys.argv[1:])"
-RUNNERS = f"""
-[runners]
-sh = [["sh", "-e", "{{file}}"]]
-made = [
-  ["{sys.executable}", "-c", "{COPY}", "{{file}}", "{{folder}}/made.sh"],
-  ["sh", "{{folder}}/made.sh"],
-]
-lisp = [["no-such-lisp", "{{file}}"]]
-"""
+RUNNERS = fixture_text("documents/runners.toml")
 SUM = fixture_text("documents/shell.md")
 
 

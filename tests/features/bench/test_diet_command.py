@@ -11,20 +11,13 @@ import pytest
 
 from coursebuild.cli import main
 from coursebuild.core.model.report_files import DIET
+from support.fixture_cases import fixture_text
 from support.scratch_course import ROOT, course_map
 
 Capture = pytest.CaptureFixture[str]
 pytestmark = pytest.mark.site
 
-MODEL = """<mujoco>
-  <worldbody>
-    <body name="bob" pos="0 0 1"><joint axis="0 1 0"/><geom size=".05" pos=".3 0 0"/></body>
-  </worldbody>
-  <option timestep="0.02">
-    <flag energy="enable"/> <!-- for the plot -->
-  </option>
-</mujoco>
-"""
+MODEL = fixture_text("documents/diet_model.xml")
 LESSON = """## A
 
 ```python file=examples/a.py

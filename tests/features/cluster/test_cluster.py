@@ -15,6 +15,7 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob
+from support.fixture_cases import fixture_text
 from support.local_cluster import install_plugin, local_cluster
 from support.sandboxes import require_sandbox
 from support.scratch_course import (
@@ -33,28 +34,8 @@ from support.waiting import wait_for_file, wait_until
 
 pytestmark = pytest.mark.long
 
-PENDULUM = """\
-<mujoco>
-  <asset><material name="unused"/></asset>
-  <worldbody>
-    <body name="arm">
-      <joint name="hinge" axis="0 1 0" damping="0.01"/>
-      <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-SCENARIO = """\
-[[scenario]]
-name = "swings"
-duration = 0.1
-timesteps = [0.002]
-search = [0.002, 0.004]
-
-[[sweep]]
-name = "damping"
-vary = {{ "joint:hinge.damping" = {} }}
-"""
+PENDULUM = fixture_text("documents/cluster_pendulum.xml")
+SCENARIO = fixture_text("documents/cluster_scenario.toml")
 WRITES = """\
 import os
 os.makedirs("runs", exist_ok=True)

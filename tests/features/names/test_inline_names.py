@@ -14,25 +14,7 @@ from support.scratch_course import Folder, block
 
 MakeCourse = Callable[..., Folder]
 
-SCRIPT = block(
-    "spin.py",
-    """import json
-import time
-
-import mujoco
-import numpy as np
-
-
-def measure(height):
-    ball_speed = np.sqrt(2 * 9.81 * height)
-    return ball_speed
-
-
-model = mujoco.MjModel.from_xml_string("<mujoco/>")
-data = mujoco.MjData(model)
-print(json.dumps({"fall_time": 1}))""",
-    '{"fall_time": 1}',
-)
+SCRIPT = fixture_text("scripts/names.py.txt")
 KNOWN = fixture_text("documents/known_names.md")
 NO_CLAIMS = """
 `damping`, `page.blocks`, `reader.add("x_y")`, `pip install --user x`, `x = 1`, `a.b.c`,
