@@ -282,18 +282,6 @@ def test_a_script_that_lacks_a_package_proves_nothing(make: Make) -> None:
         assert f'<span class="bound unverified" title="{doubt}">{number}</span>' in page
 
 
-def test_several_scripts_that_were_not_run_are_counted_with_their_reasons(make: Make) -> None:
-    again = TORCH.replace("two.py", "again.py")
-    folder = make(FIRST, TORCH, again)
-    result = folder.main("check")
-    assert last_line(result.out).endswith(": holds, but for 2 scripts that were not run (no_torch)")
-    folder.write(folder.lesson(3), NORUN + SKIP)
-    result = folder.main("check")
-    assert last_line(result.out).endswith(
-        ": 1 warning, and 2 scripts that were not run (no_torch, norun)"
-    )
-
-
 def test_the_map_lets_scripts_pass_by_name(make: Make) -> None:
     folder = make(FIRST, TORCH, NORUN)
     verify(folder, 'strict = true\nunproven = ["examples/three.py"]\n')

@@ -143,14 +143,6 @@ def test_explain_says_where_words_and_settings_are_printed(make: Make) -> None:
     )
 
 
-def test_a_lesson_takes_its_addresses_along_when_it_is_renamed(make: Make) -> None:
-    folder = make_cups(make)
-    before = folder.text(RECORD)
-    assert folder.main("rename", "1.1", "1.7").status == 0
-    assert folder.text(RECORD.replace("1.1", "1.7")) == before
-    assert not (folder.root / RECORD).exists()
-
-
 def test_a_lesson_with_an_error_keeps_what_is_remembered(make: Make) -> None:
     folder = make_cups(make)
     before = folder.text(RECORD)
@@ -167,12 +159,6 @@ def test_a_table_is_filled_below_its_header(make: Make) -> None:
     assert folder.main("update").status == 0
     assert f"{rows}| glass | 86.9 | 0.0131 | 73.5 |\n" in cups(folder)
     assert folder.main("check").status == 0
-
-
-def test_what_is_remembered_is_not_published(make: Make) -> None:
-    folder = make_cups(make)
-    assert folder.main("build").status == 0
-    assert [path for path in folder.tree("public") if "recorded" in path] == []
 
 
 EVERYWHERE = fixture_text("documents/bound_everywhere.md")
