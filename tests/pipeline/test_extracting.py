@@ -20,7 +20,7 @@ from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from support.built_sites import BuiltCourses
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.scratch_course import GOOD, Folder, Make, block
 
 TWO_SCRIPTS = "## Two\n\n" + block("a.py", "print('a')", "a") + block("sub/b.py", "print('b')", "b")
@@ -222,18 +222,7 @@ from pkg.part import word
 
 print(OWN, word())
 """
-FILES = {
-    "src/pkg/part.py": """import pathlib, period
-
-def word() -> str:
-    return (pathlib.Path(__file__).parent / "word.txt").read_text() + period.END
-""",
-    "src/pkg/word.txt": "swing",
-    "lib/period.py": 'END = "."\n',
-    "lib/pkg/part.py": "never found",
-    "src/mjcourse.py": "OWN = True\n",
-    "src/other.py": "never imported",
-}
+FILES = fixture_tables("extracted_files")["files"]
 
 
 @pytest.mark.site

@@ -70,13 +70,7 @@ RUNNERS = """
 [runners]
 sh = [["sh", "{file}"]]
 """
-BOX = """<mujoco>
-  <worldbody>
-    <light pos="0 0 3"/>
-    <body pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" density="1000"/></body>
-  </worldbody>
-</mujoco>
-"""
+BOX = fixture_text("documents/trapped_model.xml")
 SCENARIO = """[[scenario]]
 name = "fall"
 title = "It falls"

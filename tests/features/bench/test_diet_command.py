@@ -18,13 +18,7 @@ Capture = pytest.CaptureFixture[str]
 pytestmark = pytest.mark.site
 
 MODEL = fixture_text("documents/diet_model.xml")
-LESSON = """## A
-
-```python file=examples/a.py
-from mjcourse import model_path
-SCRIPT
-```
-"""
+LESSON = fixture_text("documents/diet_lesson.md")
 CLEAN = MODEL.replace('    <flag energy="enable"/> <!-- for the plot -->\n', "")
 
 
@@ -219,13 +213,7 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_interface(
         assert {finding["kind"] for finding in findings if finding["fixable"]} == kinds
 
 
-SHARED_PART = """<mujocoinclude>
-  <compiler/>
-  <option>
-    <flag energy="enable"/>
-  </option>
-</mujocoinclude>
-"""
+SHARED_PART = fixture_text("documents/shared_part.xml")
 
 
 def test_a_file_of_two_models_is_not_changed(course: Path, capsys: Capture) -> None:

@@ -36,19 +36,9 @@ pytestmark = pytest.mark.long
 
 PENDULUM = fixture_text("documents/cluster_pendulum.xml")
 SCENARIO = fixture_text("documents/cluster_scenario.toml")
-WRITES = """\
-import os
-os.makedirs("runs", exist_ok=True)
-with open("runs/new.txt", "w") as file:
-    file.write("7")
-"""
+WRITES = fixture_text("scripts/cluster_writes.txt")
 LIMITS = "[limits]\nscripts = 512\n"
-WORKER = """
-import os, pathlib
-def parent(pid):
-    return int(pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
-worker = parent(parent(os.getppid()))
-"""
+WORKER = fixture_text("scripts/cluster_worker.txt")
 """The process of Dask's worker: that of the child that has started this script's supervisor."""
 SCRIPTS = {
     "passes": ('print("hello", 3.14159)', "hello 3.14159"),

@@ -120,13 +120,7 @@ def test_data_is_json_without_the_code() -> None:
     assert (data["key"], data["stopAt"], data["seed"]) == (0, None, None)
 
 
-LAB = (
-    '{"title": "T", "model": "ball", "height": 200, "toggles": ["frames"], "note": "A note.",\n'
-    ' "setup": "ctx.a = 1", "controller": "ctx.b = 2",\n'
-    ' "controls": [{"label": "s", "min": 0, "max": 1, "value": 0.5, "param": "p"}],\n'
-    ' "readouts": [{"label": "r", "expr": "ctx.a"}],\n'
-    ' "verify": {"seconds": 0.2}}'
-)
+LAB = fixture_text("documents/compiled_lab.json")
 NEUTRAL = fixture_tables("lab_edits")["neutral"]
 """Edits that change nothing that a trial depends on."""
 EDITS = fixture_tables("lab_edits")["edits"]

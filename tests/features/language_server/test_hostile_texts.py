@@ -19,12 +19,7 @@ from support.fixture_cases import fixture_text
 from support.markdown_files import ROOT
 from support.scratch_course import Folder
 
-HOSTILE = (
-    "# <img src=x onerror=alert(1)> <!-- x --> <script>alert(1)</script> ![p](https://e.example/p.png)"
-    " [c](command:workbench.action.terminal.new) [j](javascript:alert(1)) [r][r] ``` ` ```` `b`"
-    " <https://e.example> https://e.example //e.example www.e.example a@e.example &lt;b&gt; &#60;"
-    " **b** __b__ *i* _i_ ~s~ ~~s~~ | a | $(alert) \\ \\` \\<b> [^1] [ ] \\"
-)
+HOSTILE = fixture_text("documents/hostile_words.txt")
 BREAKS = "\n\n- <b>\n\n    <i>\n\n```\n<u>\n\n[r]: command:x\n\n| a |\n| - |\r\r<s>\u2028<b>\n===\n"
 OUR_TOKENS = {"paragraph", "bullet_list", "list_item", "strong"}
 OUR_INLINES = {"inline", "text", "code_inline", "fence", "softbreak"}

@@ -22,12 +22,7 @@ NO_CLAIMS = """
 `"a_b"`, `f(`, `<x@y.org>`, `--delay-updates`, `a -> b`
 """
 WRONG = fixture_text("documents/wrong_names.md")
-OF_OTHERS = """
-`mj_data`, `mj_stp`, `mjcb_control`, `viewer.opt.flags`, `modl.nq`, `mjtJoint.mjJNT_FRE`,
-`MjSpec.from_fle`, `<joint dampng="2"/>`, `<geon/>`, `solreff="1"`, `mesure(2)`, `ball_sped`,
-`np.linalg.nrm(x)`, `time.slep(1)`, `--strct`, `examples/spim.py`, `[verify] rtoll`, `Drop`ped,
-`<mesh filename="a.stl"/>`, `mju_max(a, b)`, `mujoco.mjx.Modl`, `model.armature`
-"""
+OF_OTHERS = fixture_text("documents/names_of_others.md")
 """Names of which nobody here knows all that there are."""
 
 
