@@ -56,6 +56,7 @@ def test_names_of_other_libraries_and_projects_pass(make_course: MakeCourse) -> 
     assert named_mistakes(make_course(f"## Names\n{OF_OTHERS}\n{script}")) == []
 
 
+@pytest.mark.site
 @pytest.mark.parametrize(
     "assignment",
     [
