@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.lab_page import (
     EDITED_LAB,
     PAGE,
@@ -177,19 +177,7 @@ def test_link_carries_the_edited_model(page: Page, base: str) -> None:
     expect(lab_element.get_by_role("alert").filter(has_text="too long for a link")).to_be_visible()
 
 
-ROBOT = {
-    "robot/scene.xml": (
-        '<mujoco><compiler meshdir="assets"/><include file="body.xml"/>'
-        '<worldbody><geom type="plane" size="1 1 .1"/></worldbody></mujoco>'
-    ),
-    "robot/body.xml": (
-        '<mujoco><asset><mesh name="shell" file="shell.obj"/></asset><worldbody><body pos="0 0 1">'
-        '<freejoint/><geom type="mesh" mesh="shell"/></body></worldbody></mujoco>'
-    ),
-    "robot/assets/shell.obj": (
-        "v 0 0 0\nv .3 0 0\nv 0 .3 0\nv 0 0 .3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-    ),
-}
+ROBOT = fixture_tables("robot")["files"]
 DROP = fixture_text("scripts/drop.js")
 
 

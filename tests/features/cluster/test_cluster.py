@@ -15,7 +15,7 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.local_cluster import install_plugin, local_cluster
 from support.sandboxes import require_sandbox
 from support.scratch_course import (
@@ -40,27 +40,7 @@ WRITES = fixture_text("scripts/cluster_writes.txt")
 LIMITS = "[limits]\nscripts = 512\n"
 WORKER = fixture_text("scripts/cluster_worker.txt")
 """The process of Dask's worker: that of the child that has started this script's supervisor."""
-SCRIPTS = {
-    "passes": ('print("hello", 3.14159)', "hello 3.14159"),
-    "drifts": ("print(2)", "3"),
-    "fails": ('raise ValueError("no")', "3"),
-    "loops": ("while True: pass", "3"),
-    "takes": ("print(len(bytearray(1 << 30)))", "1073741824"),
-    "imports": ("import absent", "3"),
-    "says": ("import pathlib; print(pathlib.Path(__file__).resolve())", "here"),
-    "reads": ('print(open("data/numbers.txt").read())', "1 2 3"),
-    "follows": ('print(open("data/link.txt").read())', "1 2 3"),
-    "peeks": ('print(open(".hidden").read())', "secret"),
-    "lists": ('import os; print(sorted(os.listdir("models")))', "['arm.xml']"),
-    "moves": (
-        "import mujoco\n"
-        'model = mujoco.MjModel.from_xml_path("models/arm.xml")\n'
-        "data = mujoco.MjData(model)\n"
-        "mujoco.mj_step(model, data, 100)\n"
-        "print(repr(float(data.qpos[0])))",
-        "0.5",
-    ),
-}
+SCRIPTS = fixture_tables("cluster_scripts")["scripts"]
 
 
 @pytest.fixture(scope="module")
