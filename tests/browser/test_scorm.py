@@ -42,10 +42,10 @@ def visit(calm: BrowserContext, platform: str) -> Iterator[Callable[..., Page]]:
     """Opens the lesson in the platform; nothing may go wrong, and nothing be refused."""
     pages: list[Page] = []
 
-    def visit(learner: str = "ada") -> Page:
+    def visit() -> Page:
         page = calm.new_page()
         page.on("pageerror", lambda error: pytest.fail(str(error)))
-        page.goto(f"{platform}platform.html?who={learner}")
+        page.goto(f"{platform}platform.html?who=ada")
         lesson(page).locator("[data-question]").first.wait_for()
         pages.append(page)
         return page
