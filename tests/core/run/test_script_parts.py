@@ -28,8 +28,8 @@ def outputs(result: ScriptRun) -> list[str]:
 
 
 def test_each_part_has_what_it_printed(run: Run) -> None:
-    waiting = ["import os\nos.set_blocking(1, False)\nprint('x' * 9000)", "print('b')"]
-    last = ("an output that must not wait", waiting, ["x" * 9000 + "|", "b|"])
+    nonblocking = ["import os\nos.set_blocking(1, False)\nprint('x' * 9000)", "print('b')"]
+    last = ("an output that must not wait", nonblocking, ["x" * 9000 + "|", "b|"])
     for title, parts, expected in (*fixture_tables("script_parts")["printed"], last):
         result = run("\n".join(parts), part_lines=lines_of(parts))
         assert result.outcome is Outcome.OK, (title, result.stderr)
