@@ -10,19 +10,10 @@ from pathlib import Path
 import pytest
 
 from benchmarks.slips.constants import numbers_of
+from support.fixture_cases import fixture_text
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULE = '''
-"""A case of 3 kg."""
-_STEP, _SPAN = 1e-3, 50.0
-BALL = '<geom size="0.2 0" mass="2"/><option iterations="9"/>'
-GAIN = {0.5: "20"}
-
-
-def problem(rate: float = 4.0) -> Problem:
-    title, gap = f"a gap of {rate:g} m in 7 s", -0.25
-    return Problem(title, Scenario(1.5, 0.1, (gap,)), precision=1e-9)
-'''
+MODULE = fixture_text("scripts/mutated_module.txt")
 
 
 def test_numbers_of_a_module_and_why_some_are_left_alone() -> None:

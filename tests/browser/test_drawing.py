@@ -24,22 +24,10 @@ WINDOW: Any = {"width": 600, "height": 500}
 
 COMPARE = fixture_text("scripts/compare_pictures.js")
 
-REDS = """(n) => {
-  const canvas = document.querySelectorAll('.lab')[n].querySelector('canvas.lab-still')
-  const { width, height } = canvas
-  const { data } = canvas.getContext('2d').getImageData(0, 0, width, height)
-  let count = 0
-  for (let i = 0; i < data.length; i += 4) if (data[i] > 60 && data[i] > 3 * data[i + 1]) count++
-  return count
-}"""
+REDS = fixture_text("scripts/reds.js")
 
 
-GREENS = """(n) => {
-  const canvas = document.querySelectorAll('.lab')[n].querySelector('canvas.lab-still')
-  const { width, height } = canvas
-  const { data } = canvas.getContext('2d').getImageData(0, 0, width, height)
-  return Array.from({ length: width * height }, (_, i) => data[4 * i + 1])
-}"""
+GREENS = fixture_text("scripts/greens.js")
 
 
 def ready(page: Page, number: int) -> None:

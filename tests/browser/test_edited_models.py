@@ -11,7 +11,7 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from support.axe import violations
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.lab_page import (
     EDITED_LAB,
     PAGE,
@@ -29,14 +29,7 @@ pytestmark = pytest.mark.browser
 
 HOLDS = "([part, whole]) => document.querySelector(part).getBoundingClientRect().right <= whole"
 ENDLESS = '<option iterations="2000000000" tolerance="0" ls_iterations="9" solver="PGS"/>'
-KEEP_BEATS = """{
-  const set = window.setInterval
-  window.beats = []
-  window.setInterval = (action, ms) => {
-    if (ms === 5000) beats.push(action)
-    return set(action, ms)
-  }
-}"""
+KEEP_BEATS = fixture_text("scripts/keep_beats.js")
 """Keeps what asks a worker from time to time whether it still answers."""
 BEAT = "() => beats.at(-1)?.()"
 
@@ -184,25 +177,8 @@ def test_link_carries_the_edited_model(page: Page, base: str) -> None:
     expect(lab_element.get_by_role("alert").filter(has_text="too long for a link")).to_be_visible()
 
 
-ROBOT = {
-    "robot/scene.xml": (
-        '<mujoco><compiler meshdir="assets"/><include file="body.xml"/>'
-        '<worldbody><geom type="plane" size="1 1 .1"/></worldbody></mujoco>'
-    ),
-    "robot/body.xml": (
-        '<mujoco><asset><mesh name="shell" file="shell.obj"/></asset><worldbody><body pos="0 0 1">'
-        '<freejoint/><geom type="mesh" mesh="shell"/></body></worldbody></mujoco>'
-    ),
-    "robot/assets/shell.obj": (
-        "v 0 0 0\nv .3 0 0\nv 0 .3 0\nv 0 0 .3\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-    ),
-}
-DROP = """(lab, [name, bytes]) => {
-  const data = new DataTransfer()
-  data.items.add(new File([new Uint8Array(bytes)], name))
-  const event = new DragEvent('drop', { dataTransfer: data, bubbles: true, cancelable: true })
-  lab.querySelector('textarea').dispatchEvent(event)
-}"""
+ROBOT = fixture_tables("robot")["files"]
+DROP = fixture_text("scripts/drop.js")
 
 
 def archive(files: Mapping[str, str]) -> bytes:
@@ -258,12 +234,7 @@ def test_reader_opens_a_model_with_its_meshes_and_nothing_is_sent(page: Page) ->
     assert [request for request in requests if not request.startswith("GET ")] == []
 
 
-FINE = """<mujoco>
-  <asset><mesh name="pearl" builtin="sphere" params="4" scale="0.04 0.04 0.04"/></asset>
-  <worldbody>
-    <replicate count="40" offset="0.1 0 0"><geom type="mesh" mesh="pearl"/></replicate>
-  </worldbody>
-</mujoco>"""
+FINE = fixture_text("documents/fine_model.xml")
 
 
 def test_zip_offers_its_models_and_a_model_too_fine_to_draw_is_drawn_coarser(page: Page) -> None:

@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Locator, Page, Route, expect
 
 from support.axe import violations
 from support.built_sites import Site
+from support.fixture_cases import fixture_tables, fixture_text
 from support.lab_page import press, until, wait_for_condition, watch_page
 
 pytestmark = pytest.mark.browser
@@ -26,13 +27,7 @@ HURRY = """() => {
   return () => { window.setTimeout = set }
 }"""
 """Shortens the patience with a trial; gives what makes it long again."""
-REACH = """const errors = []
-for (const read of [
-  () => fetch, () => indexedDB, () => caches, () => navigator, () => XMLHttpRequest, () => WebSocket
-]) {
-  try { read() } catch (error) { errors.push(error.message.replace(" is not defined", "")) }
-}
-throw new Error(errors.join(" ") + " is not defined")"""
+REACH = fixture_text("scripts/reach.js")
 HOLDS = "document.documentElement.scrollWidth <= window.innerWidth"
 
 
@@ -112,18 +107,7 @@ def pytest_of(path: Path) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize(
-    "title, name, start, solution, failures",
-    [
-        ("A bar that", "test_1_1_bar.py", "-0.3 0 0", "-0.15 0 0", 1),
-        (
-            "Hold it",
-            "test_1_1_hold.py",
-            "data.qfrc_applied[0] = 0",
-            "ctx.way = 0.5 - data.qpos[0]; data.qfrc_applied[0] = 50 * ctx.way - 10 * data.qvel[0]",
-            2,
-        ),
-        ("A push", "test_1_1_speed.py", "return 2 * g * h", "return math.sqrt(2 * g * h)", 1),
-    ],
+    "title, name, start, solution, failures", fixture_tables("trials")["trials"]
 )
 def test_trials_run_by_pytest_on_a_file_of_the_page(
     page: Page, tmp_path: Path, title: str, name: str, start: str, solution: str, failures: int

@@ -23,13 +23,7 @@ MAX_STOPS = 1000
 
 FOCUSED_ELEMENT = fixture_text("scripts/focused_element.js")
 """Where the focus is; `null` where it has left the page."""
-FOCUS_IS_VISIBLE = """(() => {
-  const at = document.activeElement
-  if (!at || at === document.body || at === document.documentElement) return true
-  if (at.closest('.lab:not(.lab-on, :has(.lab-is-wrong))')) return false
-  const { top, bottom } = at.getBoundingClientRect()
-  return bottom > 0 && top < innerHeight
-})()"""
+FOCUS_IS_VISIBLE = fixture_text("scripts/focus_is_visible.js")
 """Whether the page has moved to the focus, since parts above it that are drawn late push it away,
 and the lab that has the focus has started, since its static form is hidden then."""
 

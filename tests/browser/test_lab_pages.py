@@ -11,6 +11,7 @@ from playwright.sync_api import Browser, BrowserContext, Route, expect
 
 from support.axe import violations
 from support.built_sites import Site
+from support.fixture_cases import fixture_text
 from support.lab_page import (
     ALL,
     AUTO,
@@ -312,13 +313,7 @@ def test_state_too_large_for_a_link_is_told(context: BrowserContext, base: str) 
     assert console == []
 
 
-BAD_PUSH = """
-let pushed = 0
-controls[2].run = ({ data }) => {
-  if (pushed++ === 0) data.qvel[0] = 1e11
-  else throw new Error('no rope')
-}
-"""
+BAD_PUSH = fixture_text("scripts/bad_push.js")
 
 
 def test_divergence_and_errors_of_lab_code_are_told_and_it_goes_on(

@@ -29,14 +29,7 @@ PICTURE = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0
 TEXTS = ("## One\n\nText of one.\n\n![a sketch](s.svg)\n", "## Two\n\nText of two.\n")
 FIRST, SECOND = "lessons/1.1-one.html", "lessons/1.2-two.html"
 
-COUNT_VISIT_MESSAGES = """
-window.toldOfVisits = 0
-const post = ServiceWorker.prototype.postMessage
-ServiceWorker.prototype.postMessage = function (...message) {
-  window.toldOfVisits += 1
-  return post.apply(this, message)
-}
-"""
+COUNT_VISIT_MESSAGES = fixture_text("scripts/count_visit_messages.js")
 SLOW_STORE = fixture_text("scripts/slow_store.js")
 QUIET = fixture_text("scripts/quiet_worker.js")
 

@@ -52,13 +52,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 REVEAL = fixture_text("scripts/reveal_memory.js")
 
 # The page's own script does not know the copy, and mounts nothing in it.
-COPY = """(number) => {
-  const place = document.querySelectorAll('.lab')[number]
-  const copy = place.cloneNode(true)
-  copy.id = 'tried'
-  place.replaceWith(copy)
-  copy.scrollIntoView()
-}"""
+COPY = fixture_text("scripts/copy.js")
 
 # Every lab lives as long as it takes to be there, drawn and running.
 COME_AND_GO = fixture_text("scripts/come_and_go.js")

@@ -10,6 +10,7 @@ from playwright.sync_api import BrowserContext, Page, expect
 
 from support.axe import violations
 from support.built_sites import Site, course_copy
+from support.fixture_cases import fixture_text
 from support.lab_page import becomes, until
 from support.preview_process import serve_preview
 from support.quiz_page import (
@@ -44,14 +45,7 @@ def page(calm: BrowserContext, quizzes: str) -> Iterator[Page]:
     yield from clean_page(calm, quizzes)
 
 
-REFERENCES = """() => {
-  const ids = [...document.querySelectorAll('[id]')].map((element) => element.id)
-  const twice = ids.filter((id, i) => ids.indexOf(id) !== i)
-  const named = ['for', 'aria-describedby', 'aria-labelledby'].flatMap((name) =>
-    [...document.querySelectorAll(`[${name}]`)].flatMap((element) =>
-      element.getAttribute(name).split(' ')))
-  return [twice, named.filter((id) => !ids.includes(id))]
-}"""
+REFERENCES = fixture_text("documents/quiz_references.bib")
 """Ids that are there twice, and references to none."""
 CAN_BE_PRESSED = ".quiz :is(button, input, summary):not(.lab *):visible"
 TOO_SMALL = """elements => elements.filter((element) => {

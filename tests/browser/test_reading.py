@@ -262,12 +262,7 @@ def test_numbers_are_neither_copied_nor_selected(
 
 # ------------------------------------------------------------------------------- side notes
 
-NOTES = """() => [...document.querySelectorAll('.footnotes > ol > li')].map((note) => {
-  const { top, bottom, left, right } = note.getBoundingClientRect()
-  const mark = document.getElementById(note.id.replace('fn:', 'fnref:')).getBoundingClientRect()
-  return { id: note.id, aside: note.classList.contains('aside'), top, bottom, left, right,
-    mark: mark.top, text: note.textContent }
-})"""
+NOTES = fixture_text("scripts/notes.js")
 IN_THE_WAY = """([left, right]) =>
   [...document.querySelectorAll('.prose > :not(.footnotes), .formula')]
   .map((box) => box.getBoundingClientRect())

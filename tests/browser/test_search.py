@@ -12,7 +12,7 @@ from playwright.sync_api import BrowserContext, Locator, Page, expect
 from support.axe import violations
 from support.built_sites import Site
 from support.chromium import OpenAddress
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.lab_page import becomes, until, wait_until_settled
 
 pytestmark = pytest.mark.browser
@@ -61,15 +61,7 @@ def test_nothing_is_loaded_before_it_is_asked_for(open_address: OpenAddress, sit
     assert page.evaluate(LOADED_FILES)[1] == "index.js", "its script, and the list of pages"
 
 
-QUERIES = {
-    "inretia tensro": "1.1 Lesson one",
-    "Iₓₓ": "1.1 Lesson one",
-    "\\boldsymbol{\\tau}": "1.1 Lesson one",
-    "mj_forward": "1.2 Lesson two",
-    "1.2": "1.2 Lesson two",
-    "hostile script": f"1.3 {HOSTILE}",
-    "<script>alert(3)</script>": f"1.3 {HOSTILE}",
-}
+QUERIES = fixture_tables("queries")["queries"]
 
 
 def test_what_a_learner_types_is_found_and_what_authors_wrote_is_text(

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.preview_process import serve_preview
 from support.scratch_course import GOOD, Folder
 
@@ -20,14 +20,7 @@ LESSONS = tomllib.loads(fixture_text("documents/extras.toml"))
 
 @pytest.mark.engine
 @pytest.mark.parametrize(
-    ("package", "lesson", "command", "message"),
-    [
-        ("scipy", "motion", "check", "a trial of a lab's equations needs the package scipy"),
-        ("mjbench", "formula", "bench", "`coursebuild bench` needs the package mjbench"),
-        ("mjbench", "formula", "stability", "`coursebuild stability` needs the package mjbench"),
-        ("mjbench", "formula", "diet", "`coursebuild diet` needs the package mjbench"),
-        ("PIL", "picture", "update", "`dot.png` needs the package Pillow"),
-    ],
+    ("package", "lesson", "command", "message"), fixture_tables("extras")["commands"]
 )
 def test_command_names_the_extra_that_it_needs(
     package: str,

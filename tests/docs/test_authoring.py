@@ -23,6 +23,7 @@ import pytest
 from coursebuild.cli import main
 from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.text.rules import RULES
+from support.fixture_cases import fixture_text
 from support.markdown_files import PAGES, ROOT, Fence, code_spans, fences, write_files
 from support.scratch_course import Folder
 
@@ -38,14 +39,7 @@ MESSAGES = [(a, b) for a, b in pairwise(FENCES) if b.is_("prints")]
 """Each message on a page, with the example above it."""
 SECOND = "content/lessons/1.2-large-swings.md"
 
-SWING = '''
-import math
-
-
-def period(length: float) -> float:
-    """Of a small swing, s."""
-    return 2 * math.pi * math.sqrt(length / 9.81)
-'''
+SWING = fixture_text("documents/swing.md")
 
 
 @pytest.fixture(scope="session")

@@ -68,16 +68,7 @@ FENCES = [
 
 MAP = fixture_text("documents/swings.toml")
 SCRIPT = "## A script\n\n```python file=examples/{}.py\nprint(2)\n```\n\n```output\n2\n```\n"
-LAB = """
-## A lab
-
-```lab plot
-title = "A line"
-x = {name = "r", max = 3, label = "r", at = 1}
-plots = [{ylabel = "r", ymin = 0, ymax = 6, traces = [{label = "r", expr = "r"}]}]
-expect = [{at = 1, expr = "r", min = 1, max = 1}]
-```
-"""
+LAB = fixture_text("documents/docs_lab.md")
 LESSON = '{"id": "1.4", "slug": "large-swings"}'
 BEFORE = {
     "explain models/pendulum.xml": ["new model pendulum"],

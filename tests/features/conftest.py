@@ -10,7 +10,7 @@ import pytest
 from support.archives import Package, entries
 from support.question_zoo import ANY, SCRIPT, furnish, quiz
 from support.rendered_course import Make, read_assets
-from support.scratch_course import GOOD, Folder
+from support.scratch_course import GOOD, Folder, maker
 
 
 @pytest.fixture(scope="session")
@@ -21,8 +21,7 @@ def make() -> Make:
 @pytest.fixture
 def make_course(tmp_path: Path, stores: Path) -> Callable[..., Folder]:
     def make(*lessons: str) -> Folder:
-        folder = Folder(tmp_path / "a cöurse")
-        folder.fill(lessons, stores)
+        folder = maker(tmp_path, stores)(*lessons)
         furnish(folder)
         return folder
 

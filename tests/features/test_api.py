@@ -17,65 +17,12 @@ from types import ModuleType
 import pytest
 
 from coursebuild import api
+from support.fixture_cases import fixture_tables, fixture_text
 from support.scratch_course import ROOT, CommandResult, Folder
 
 PAGE = ROOT / "docs/reference/api.md"
-HEAD = """\
-# The interface for features
-
-Features, and the tests of features, import from `coursebuild.api` alone; [Write a
-feature](../how-to/features.md) shows how. All other modules of coursebuild may change any day. This
-is version {version}: a feature that needs a newer one says so (`api=2`, say) and is refused where
-there is none. Each release that adds to the interface raises the version; what goes is announced in
-CHANGELOG.md. A field without a default has to be given. What is in a module, such as `marks`,
-Python's `help(marks)` tells.
-"""
-SUBJECTS = {
-    "What a feature has": ("core.features", "core.text.rules"),
-    "Text and its places": ("core.text.source",),
-    "Mistakes": ("core.text.diagnostics", "core.files.errors"),
-    "From a fence to its block": (
-        "core.syntax.decode",
-        "core.syntax.fence",
-        "core.syntax.json_text",
-        "core.syntax.toml_text",
-    ),
-    "The course": ("core", "core.model"),
-    "What was run, and files of the site": (
-        "core.model.results",
-        "core.engine.tool",
-        "core.scripts.extract",
-    ),
-    "Pages": (
-        "core.pages",
-        "core.pages.assets",
-        "core.pages.context",
-        "core.pages.library",
-        "core.pages.renderer",
-        "core.pages.urls",
-    ),
-    "Commands": (
-        "output",
-        "pipeline.arguments",
-        "pipeline.check",
-        "pipeline.load",
-        "pipeline.options",
-        "report",
-    ),
-    "Work in other processes": (
-        "core.engine.store",
-        "core.files.course_root",
-        "core.files.locks",
-        "core.files.write",
-        "core.run",
-        "core.run.dependencies",
-        "core.run.environments",
-        "core.run.run_store",
-        "core.run.sandbox",
-        "core.run.script_environment",
-        "core.run.script_server",
-    ),
-}
+HEAD = fixture_text("documents/api_head.md")
+SUBJECTS = fixture_tables("api")["subjects"]
 """The sections of the reference, with the modules whose names stand there."""
 
 

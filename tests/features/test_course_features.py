@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core import features
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.live_course import Live
 from support.live_course import live as live
 from support.markdown_files import DOCS, fences
@@ -261,30 +261,7 @@ def test_equal_ids_of_blocks_of_a_feature_are_reported(course: Folder) -> None:
     assert course.main("build").status == 0
 
 
-FAILURES = {
-    "parse=parse": ("parse=lambda fence, texts: 1 / 0", "`parse` of the feature `shout`", ":3"),
-    "Parsed(Shout(fence.span, fence.body.text.strip()))": (
-        "Shout(fence.span, fence.body.text.strip())",
-        "`parse` of the feature `shout`",
-        ":3",
-    ),
-    "Markup(f": ("1 / 0 or Markup(f", "`draw` of the feature `shout`", ":3"),
-    "draw=lambda page, block: Markup": (
-        "draw=lambda page, block: str",
-        "`draw` of the feature `shout`",
-        ":3",
-    ),
-    "markdown=lambda writer, block: ": (
-        "markdown=lambda writer, block: exit(0) if True else ",
-        "`markdown` of the feature `shout`",
-        ":3",
-    ),
-    "    rules=": (
-        "    check=lambda course, documents: (1 / 0 for _ in documents),\n    rules=",
-        "`check` of the feature `shout`",
-        "",
-    ),
-}
+FAILURES = fixture_tables("broken_features")["replaced"]
 
 
 @pytest.mark.site

@@ -7,47 +7,19 @@ from pathlib import Path
 
 import pytest
 
-from support.fixture_cases import check_text
-from support.scratch_course import Folder, block
+from support.fixture_cases import check_text, fixture_text
+from support.scratch_course import Folder
 from support.workflows import commit, git
 
-LAB = """
-```lab simlab
-{
-  "model": "ball",
-  "title": "%s",
-  "setup": "data.qvel[2] = %s",
-  "readouts": [{"label": "height", "expr": "data.qpos[2]"}]
-}
-```
-"""
+LAB = fixture_text("documents/diff_lab.md")
 MODEL = """
 <mujoco><worldbody><body pos="0 0 1"><freejoint/><geom size="%s"/></body></worldbody></mujoco>
 """
 DRAW = "import pathlib\npathlib.Path('flip.svg').write_text('<svg/>')\nprint('drawn')"
 TABLE = "Output:\n\n| n | error |\n| --- | --- |\n| 1 | 0.50 |\n| 2 | %s |\n\n"
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 100 50"><path d="M0 0H%s"/></svg>\n'
-OLD = (
-    "## One\n\nIt takes 3.5 s, and `1.25`{out} once more.\n\n"
-    + block("kept.py", "print(1.5)", "1.5")
-    + block("value.py", "print('value', 1.25, 'of', 7)", "value 1.25 of 7", "digits")
-    + block("table.py", "print('1 0.50')\nprint('2 0.25')")
-    + TABLE % "0.25"
-    + block("gone.py", "print('gone')", "gone")
-    + block("draw.py", DRAW, "drawn", info="figure=flip.svg")
-    + "Figure: ![A line](flip.svg) A line.\n"
-    + LAB % ("Drop", "0")
-    + LAB % ("Throw", "1")
-)
-NEW = (
-    OLD.replace("value 1.25 of 7\n", "value 1.35 of 7\nand more\n")
-    .replace("'of', 7", "'of', 7, '``'")
-    .replace("```text digits", "```text volatile")
-    .replace("| 2 | 0.25 |", "| 2 | 0.20 |")
-    .replace("takes 3.5 s", "takes 3.5 s, or 4.5 s")
-    .replace(block("gone.py", "print('gone')", "gone"), block("added.py", "print(1)", "1"))
-    .replace(LAB % ("Throw", "1"), LAB % ("Spin <b>@all</b>", "0") + LAB % ("Throw", "2"))
-)
+OLD = fixture_text("documents/diff_old.md")
+NEW = fixture_text("documents/diff_new.md")
 HERE = Path(__file__).parent
 
 

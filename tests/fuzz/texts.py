@@ -23,7 +23,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.source import Source
 from coursebuild.report.text import Style, diagnostic_text
-from support.fixture_cases import Case, read_cases
+from support.fixture_cases import Case, fixture_text, read_cases
 from support.plain_html import plain_html
 from support.random_lessons import KINDS
 from support.sample_lessons import (
@@ -39,13 +39,7 @@ from support.sample_lessons import (
 ROOT = Path(__file__).parents[2]
 FIXTURES = ROOT / "tests/fixtures"
 PATH = "content/lessons/1.1-one.md"
-MAP = """[course]
-title = "Fuzz"
-[[level]]
-id = "1"
-title = "Level"
-lesson = [{ id = "1.1", slug = "one", title = "One", status = "complete" }]
-"""
+MAP = fixture_text("documents/fuzz_map.toml")
 
 
 def seed_texts(name: str) -> Iterator[bytes]:

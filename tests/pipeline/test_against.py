@@ -289,15 +289,7 @@ def test_version_that_cannot_be_installed_leaves_nothing(make: Make, wheels: Pat
     assert environments(course) == []
 
 
-UV = """\
-#!{python}
-import os, sys
-pip, install, alone, option, target, progress, *words = sys.argv[1:]
-assert [pip, install, option, progress] == ["pip", "install", "--python", "--no-progress"]
-assert alone == "--no-config"
-assert "/coursebuild.tmp." in os.environ["TMPDIR"], "the next command removes it"
-os.execv(sys.executable, [sys.executable, "-m", pip, option, target, install, *words])
-"""
+UV = fixture_text("scripts/uv.txt")
 """A stand-in that installs as uv would."""
 
 

@@ -17,6 +17,7 @@ from support.archives import (
     packaging_schema,
     scorm_schema,
 )
+from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, Make
 
 AUTHORS = """\
@@ -64,13 +65,7 @@ def test_pages_and_exports_name_the_authors_and_say_how_to_cite(make: Make) -> N
     assert f"Cite as: Ada &amp; Noether, 李明. {title}. 2026. {link}" in front
 
 
-PREDICTION = """
-```quiz
-{"id": "one", "questions": [
-  {"kind": "numeric", "q": "How many?", "answer": 2, "tol": 0}
-]}
-```
-"""
+PREDICTION = fixture_text("documents/prediction.md")
 
 
 def test_packages_for_learning_platforms_name_the_authors_too(make: Make) -> None:

@@ -16,25 +16,8 @@ from support.scratch_course import Make, block
 pytestmark = pytest.mark.site
 
 MODEL = '<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>\n'
-HELPED = """\
-import mujoco
-from mjcourse import model_path
-
-from names import NAME
-
-model = mujoco.MjModel.from_xml_path(str(model_path("ball")))
-print(NAME, model.nq, open("runs/data.csv").read())
-"""
-LESSON = "## Files\n\n" + "".join(
-    (
-        block("helped.py", HELPED, "a ball 7 1,2"),
-        block("zipped.py", HELPED, "a ball 7 1,2", info="download=zip"),
-        block("names.py", 'NAME = "a ball"\n'),
-        block("astray.py", 'import os\n\nprint(os.path.isdir("content"))\n', "True"),
-        block("absent.py", "import torch\n\nprint(torch)\n", "1", info="requires=torch"),
-        block("args.py", "import sys\n\nprint(sys.argv[1:])\n", "['a b']", info="args=\"'a b'\""),
-    )
-)
+HELPED = fixture_text("documents/downloads_helped.md")
+LESSON = fixture_text("documents/downloads.md")
 
 
 def run(folder: Path, entry: str, *args: str) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.core.text.rules import RULES
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.scratch_course import HELLO, ROOT, Folder, Make, block
 
 pytestmark = pytest.mark.site
@@ -52,15 +52,7 @@ def verbose(folder: Folder, *arguments: str) -> str:
     return folder.main("check", "-v", *arguments).err
 
 
-EDITS = [
-    ("content/lessons/1.1-one.md", "## A", "## Another\n\nMore prose.", []),
-    ("content/course.toml", 'title = "Scratch"', 'title = "Other"', []),
-    ("content/lessons/1.1-one.md", '"hello"', '"hello" ', ["hello"]),
-    ("content/lessons/1.1-one.md", "s/hello.py", "s/hello.py timeout=9", ["hello"]),
-    ("content/lessons/1.1-one.md", "s/hello.py", 's/hello.py args="-v"', ["hello"]),
-    ("models/data.txt", "abc", "xyz", ["reads"]),
-    ("content/lessons/1.2-two.md", 'word = "help"', 'word = "held"', ["helper", "helped"]),
-]
+EDITS = fixture_tables("explaining")["edits"]
 
 
 def test_an_edit_runs_again_what_depends_on_it(course: Folder) -> None:
@@ -82,20 +74,7 @@ def test_an_edit_runs_again_what_depends_on_it(course: Folder) -> None:
     assert run_paths(course) == []
 
 
-QUESTIONS = (
-    "Path('content/extra.csv').exists()",
-    "os.path.isfile('content/extra.csv')",
-    "os.access('content/extra.csv', os.F_OK)",
-    "importlib.util.find_spec('extra') is not None",
-    "os.path.getsize('content/table.csv') > 2",
-    "Path('content/table.csv').stat().st_size > 2",
-    "'extra.csv' in os.listdir('content')",
-    "any(e.name == 'extra.csv' for e in os.scandir('content'))",
-    "glob.glob('content/*.csv') != ['content/table.csv']",
-    "next(Path('content').glob('extra.csv'), None) is not None",
-    "any('extra.csv' in files for _, _, files in os.walk('content'))",
-    "subprocess.call(['test', '-e', 'content/extra.csv']) == 0",
-)
+QUESTIONS = fixture_tables("explaining")["questions"]
 
 
 def test_what_a_script_asked_about_files_runs_it_again_when_the_answer_changes(make: Make) -> None:
@@ -137,16 +116,7 @@ def test_damaged_entry_and_unreachable_cache_are_no_mistake(course: Folder) -> N
 # --- explain
 
 
-REASONS = [
-    ("models/data.txt", "abc", "xyz", "models/data.txt changed"),
-    ("content/lessons/1.1-one.md", "read_text()))", "read_text() ))", "its text changed"),
-    (
-        "content/lessons/1.1-one.md",
-        "file=examples/reads.py",
-        "file=examples/reads.py timeout=9",
-        "its option `timeout` changed: 60 → 9",
-    ),
-]
+REASONS = fixture_tables("explaining")["reasons"]
 
 
 def test_explain_says_why_a_script_would_run(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, Folder, Make
 
 pytestmark = pytest.mark.engine
@@ -15,18 +16,8 @@ pytestmark = pytest.mark.engine
 BALL = """<mujoco><include file="part.xml"/><worldbody>
 <body><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"""
 PART = '<mujoco><option timestep="0.01"/></mujoco>'
-LAB = """```lab simlab
-{"model": "ball", "title": "Fall", "verify": {"seconds": 0.1},
- "readouts": [{"label": "height", "expr": "data.qpos[2]"}]}
-```
-
-"""
-INLINE = """```lab simlab
-{"xml": "<mujoco><include file='part.xml'/><worldbody><body><freejoint/><geom size='1'/></body>\
-</worldbody></mujoco>", "verify": {"seconds": 0.1}}
-```
-
-"""
+LAB = fixture_text("documents/explained_lab.md")
+INLINE = fixture_text("documents/explained_inline_lab.md")
 
 
 @pytest.fixture

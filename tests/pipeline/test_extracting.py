@@ -20,6 +20,7 @@ from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from support.built_sites import BuiltCourses
+from support.fixture_cases import fixture_tables, fixture_text
 from support.scratch_course import GOOD, Folder, Make, block
 
 TWO_SCRIPTS = "## Two\n\n" + block("a.py", "print('a')", "a") + block("sub/b.py", "print('b')", "b")
@@ -177,15 +178,7 @@ MODEL = """
   <worldbody><body><joint type="slide" axis="1 0 0"/><geom size="1" mass="1"/></body></worldbody>
 </mujoco>
 """
-DIVERGING_SCRIPT = f"""
-import mujoco
-
-model = mujoco.MjModel.from_xml_string('''{MODEL}''')
-data = mujoco.MjData(model)
-data.qfrc_applied[0] = 1e15
-mujoco.mj_step(model, data)
-print("error", data.qpos[0])
-"""
+DIVERGING_SCRIPT = fixture_text("scripts/diverging.txt")
 
 
 @pytest.mark.site
@@ -229,18 +222,7 @@ from pkg.part import word
 
 print(OWN, word())
 """
-FILES = {
-    "src/pkg/part.py": """import pathlib, period
-
-def word() -> str:
-    return (pathlib.Path(__file__).parent / "word.txt").read_text() + period.END
-""",
-    "src/pkg/word.txt": "swing",
-    "lib/period.py": 'END = "."\n',
-    "lib/pkg/part.py": "never found",
-    "src/mjcourse.py": "OWN = True\n",
-    "src/other.py": "never imported",
-}
+FILES = fixture_tables("extracted_files")["files"]
 
 
 @pytest.mark.site
@@ -337,17 +319,7 @@ def executed(path: Path, folder: Path) -> dict[str, str]:
     return printed
 
 
-TWO_SECTIONS = (
-    "## Uses\n\n"
-    + block("first.py", "import later\nimport elsewhere\nprint(later.x, elsewhere.y)", "1 2")
-    + "## Later\n\n"
-    + block("later.py", "x = 1\nif __name__ == '__main__':\n    import sys\n    sys.exit(0)")
-    + block(
-        "fails.py",
-        "import sys\nprint('out')\nprint('err', file=sys.stderr)\nsys.exit(3)",
-        info="norun",
-    )
-)
+TWO_SECTIONS = fixture_text("documents/two_sections.md")
 
 
 @pytest.mark.slow

@@ -7,18 +7,13 @@ import re
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, WAIT_FOR_GO, Make, block, kill_at_end
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
 
-QUIZ = """\
-```quiz
-{"id": "q", "questions": [
-  {"kind": "open", "q": "Why?", "reference": "Because."}
-]}
-```
-"""
+QUIZ = fixture_text("documents/fixed_quiz.md")
 SLIPS = GOOD.replace("text\n", "text rtol = 1e-6\n") + QUIZ.replace('"}', '",}').replace(
     '"q",', '"q"'
 )

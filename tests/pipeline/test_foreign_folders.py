@@ -17,19 +17,11 @@ from coursebuild.core.engine.manifest import MARKER
 from coursebuild.core.files.trust import seal
 from coursebuild.core.files.write import FileChange
 from support.editor import Editor
+from support.fixture_cases import fixture_tables
 from support.scratch_course import GOOD, Folder, Make, block
 from support.workflows import git
 
-LOOKING = (
-    ("check",),
-    ("fmt", "--check"),
-    ("explain", "1.1"),
-    ("doctor",),
-    ("extract",),
-    ("update",),
-    ("build",),
-    ("rename", "1.1", "1.2"),
-)
+LOOKING = fixture_tables("looking")["commands"]
 """Commands, the last of which writes what the user asks for."""
 
 

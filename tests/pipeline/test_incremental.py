@@ -126,12 +126,12 @@ def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
     course.extra = '[callouts.warning]\nlabel = "Careful"\npromise = "It bites."\n'
     course.save()
     assert drawn_pages(course.folder) == {lesson("1.3")}
-    text = course.folder.text("content/course.toml")
-    course.folder.write("content/course.toml", text.replace('"Tested"', '"Renamed"'))
-    assert course.folder.main("build", "--quiet").status == 0  # over the old site
-    for path, page in course.folder.tree("public").items():
-        if path.endswith(".html"):
-            assert b"Renamed" in page and b"Tested" not in page
+    for old, new in (('"Tested"', '"Renamed"'), ("[course]", '[course]\nlicence = "CC0-1.0"')):
+        course.folder.replace("content/course.toml", old, new)
+        assert course.folder.main("build", "--quiet").status == 0  # over the old site
+        for path, page in course.folder.tree("public").items():
+            if path.endswith(".html"):
+                assert new.split('"')[1].encode() in page and b"Tested" not in page, path
 
 
 JUNK = (b"null", msgspec.msgpack.encode((["os:system"], [16, "exit 70"])), pickle.dumps(Trap()))

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from coursebuild.cli import main
+from support.fixture_cases import fixture_text
 from support.mortal_commands import Mortals, mortal_commands
 from support.run_code import run_code
 from support.scratch_course import GOOD, Folder, Make, block
@@ -288,17 +289,7 @@ numbers = pytest.mark.parametrize(
     ("number", "status", "word"),
     [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
 )
-COMMAND = """
-import os, signal, sys
-number = signal.Signals(int(sys.argv.pop()))
-def during_import(event, arguments):
-    if event == "import" and arguments[0] == sys.argv[-1]:
-        {}
-signal.signal(signal.SIGINT, {})
-sys.addaudithook(during_import)
-from coursebuild.cli import main
-sys.exit(main())
-"""
+COMMAND = fixture_text("scripts/killed_command.txt")
 """A command; its last arguments: a module during whose import something happens, and a signal."""
 
 

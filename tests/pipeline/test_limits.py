@@ -88,6 +88,7 @@ def test_a_killed_check_leaves_no_compiler_and_the_next_one_its_folder_no_more(m
     assert [*folder.tmp.iterdir()] == [], left
 
 
+@pytest.mark.site
 def test_a_script_gets_the_memory_that_the_course_allows(make: Make) -> None:
     folder = make("## A\n\n" + block("big.py", "print(len(bytearray(300 << 20)))\n", "314572800"))
     assert folder.main("check").status == 0

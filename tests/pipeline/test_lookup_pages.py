@@ -16,14 +16,7 @@ pytestmark = pytest.mark.site
 HEAD = '[course]\ntitle = "<b>Course</b>"\n\n[[level]]\nid = "1"\ntitle = "One"\n'
 
 FIRST = fixture_text("documents/symbols_first.md")
-SECOND = """## Uses
-
-The [tensor](term:inertia-tensor), the [](lesson:1.1#eq:tensor), the [](lesson:1.1#eq:rate), the
-[rate](lesson:1.1#eq:rate) and $V${symbol="voltage"}, $z$. See [](lesson:1.1#tab:sizes).
-
-> [!note] Note
-> An [Äther]{term} is no thing; see [here](lesson:1.1).
-"""
+SECOND = fixture_text("documents/lookup_second.md")
 THIRD = fixture_text("documents/symbols_third.md")
 
 

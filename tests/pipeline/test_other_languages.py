@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 
 import pytest
 
@@ -13,15 +12,7 @@ from support.scratch_course import Folder, Make, block
 pytestmark = pytest.mark.site
 
 COPY = "import shutil, sys; shutil.copy(*sys.argv[1:])"
-RUNNERS = f"""
-[runners]
-sh = [["sh", "-e", "{{file}}"]]
-made = [
-  ["{sys.executable}", "-c", "{COPY}", "{{file}}", "{{folder}}/made.sh"],
-  ["sh", "{{folder}}/made.sh"],
-]
-lisp = [["no-such-lisp", "{{file}}"]]
-"""
+RUNNERS = fixture_text("documents/runners.toml")
 SUM = fixture_text("documents/shell.md")
 
 
@@ -131,17 +122,3 @@ def test_lines_of_a_file_of_any_language_are_shown(course: Folder) -> None:
     assert "```c show=src/step.c#L3\ndouble v;\n```" in course.text(course.lesson())
     course.write("src/step.c", "double x;\n\nfloat v;\n")
     assert "error[source-part]" in course.run("check").out
-
-
-def test_mistakes_of_the_map(course: Folder) -> None:
-    lines = 'python = [["python3", "{file}"]]\nC = [["cc", "{file}"]]\nzsh = [["zsh"]]\n'
-    course.write("content/course.toml", course.text("content/course.toml") + lines)
-    result = course.run("check")
-    assert result.status == 1
-    for line in (
-        "`python` is no kind of block that holds another language",
-        "help: Python scripts are run by `python` in `[verify]`",
-        "`C` is no kind of block that holds another language",
-        "no argument of `zsh` has `{file}`, the path of the script",
-    ):
-        assert line in result.out

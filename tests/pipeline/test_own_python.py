@@ -13,6 +13,7 @@ import numpy
 import pytest
 
 from coursebuild.core.run.script_environment import engine_version, python_version
+from support.fixture_cases import fixture_text
 from support.sandboxes import require_sandbox
 from support.scratch_course import GOOD, Folder, Make, block
 
@@ -20,16 +21,7 @@ pytestmark = pytest.mark.site
 
 
 PYTHON = ".venv/bin/python"
-SCRIPT = """\
-import sys
-import mujoco, planet
-from mjcourse import spatial
-print(sys.prefix[-6:], planet.NAME, spatial.__name__)
-try:
-    import msgspec
-except ModuleNotFoundError as error:
-    print(error)
-"""
+SCRIPT = fixture_text("scripts/own_python.txt")
 OUTPUT = "/.venv Mars mjcourse.spatial\nNo module named 'msgspec'"
 
 

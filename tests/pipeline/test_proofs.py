@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from support.fixture_cases import fixture_tables
 from support.scratch_course import Make, block
 
 pytestmark = pytest.mark.site
@@ -29,57 +30,14 @@ def assert_told(make: Make, lesson: str, old: str, new: str, remark: str) -> Non
     assert ("is not now" in out or "gave way" in out) is bool(remark)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "remark"),
-    [
-        (
-            "`0.357 s`{out}",
-            "`0.357 s`",
-            "1.1: `0.357 s` in line 15 was proved before and is not now "
-            "(proved: 1 output, 1 value)",
-        ),
-        ("`0.357 s`{out}", "0.357 s", "`0.357 s` in line 15 was proved before"),
-        ("`0.357 s`{out}", "a third of a second", ""),
-        (" `3.5 m/s`{out}.", " speed.", ""),
-        ("`3.5 m/s`{out}", "`3.5 m/s`{out=examples/fall.py}", ""),
-        ("It takes", "It took", ""),
-        (
-            "`0.357 s`{out}",
-            "`3.5`{out}",
-            "1.1: `0.357 s` gave way to `3.5` in line 15, which is printed elsewhere: "
-            '`{out="speed"}` chooses `speed 3.5 m/s`',
-        ),
-        (
-            "`3.5 m/s`{out}",
-            "`3.50 m/s`{out}",
-            "1.1: `3.5 m/s` gave way to `3.50 m/s` in line 15, which has more digits than are "
-            "printed: 3.5",
-        ),
-        ("`0.357 s`{out}", '`3.5`{out="speed"}', ""),
-        ("`0.357 s`{out}", "`0.36 s`{out}", ""),
-        ("It", "`0.357`{out}, `3.5`{out}, `0.36`{out}, `0.4`{out}, `3.5`{out}, It", ""),
-        ("It takes `0.357 s`{out}", "It ends with `3.5`{out}", ""),
-        ("0.357", "0.358", ""),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["values"])
 def test_a_value_that_is_bound_no_longer_is_told(
     make: Make, old: str, new: str, remark: str
 ) -> None:
     assert_told(make, LESSON, old, new, remark)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "remark"),
-    [
-        (
-            r"0.2\cdot0.2",
-            "0.2cdot0.2",
-            "1.1: the result `0.64` in line 3 was proved before and is not now (proved: nothing)",
-        ),
-        (r"16\cdot0.2\cdot0.2 = 0.64", r"16\cdot0.1\cdot0.2 = 0.32", ""),
-        (r"$16\cdot0.2\cdot0.2 = 0.64$ kg", "little", ""),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["results"])
 def test_a_result_that_is_not_computed_any_more_is_told(
     make: Make, old: str, new: str, remark: str
 ) -> None:
@@ -125,31 +83,13 @@ def test_a_table_without_its_caption_is_told(make: Make) -> None:
     assert_told(make, lesson, "Output:", "Table: Data", remark)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "remark"),
-    [
-        ("[there](", "there](", "1.1: the link to `#fall` in line 3 was proved before"),
-        ("[there](#fall)", "[here](#fall)", ""),
-        ("[there](#fall)", "there", ""),
-        ("[there](#fall)", "[there](pge:fall)", "1.1: the link to `#fall` in line 3 was proved"),
-        ("[there](#fall)", "[there]O#fall)", "1.1: the link to `#fall` in line 3 was proved"),
-        ("[there](#fall)", "[there](https://example.org)", ""),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["links"])
 def test_a_link_that_became_text_is_told(make: Make, old: str, new: str, remark: str) -> None:
     lesson = "## Fall\n\nAs [there](#fall).\n"
     assert_told(make, lesson, old, new, remark)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "remark"),
-    [
-        ("```quiz", "```qiuz", "1.1: the block `quiz` in line 5 was proved before"),
-        ("```mjcf", "```mcjf", "1.1: the block `mjcf` in line 9 was proved before"),
-        ('{"id": "1.1-q"', '{"id": "1.1-r"', ""),
-        ("```mjcf\n<mujoco/>\n```\n", "", ""),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["blocks"])
 def test_a_block_whose_word_is_misspelt_is_told(
     make: Make, old: str, new: str, remark: str
 ) -> None:

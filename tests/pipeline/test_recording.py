@@ -219,13 +219,7 @@ def test_preview_tells_noise_and_what_varies_when_idle(make: Make) -> None:
 # --- figures and data
 
 
-LINE = """from pathlib import Path
-
-with open("line.svg", "w") as file:
-    file.write('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9">')
-    file.write('<path d="M0 0L{end} 9"/></svg>')
-print("drawn", len(Path("line.svg").read_text()) > 9)
-"""
+LINE = fixture_text("scripts/recorded_line.txt")
 
 
 def drawing(path: str, end: float) -> str:

@@ -6,28 +6,13 @@ import shutil
 
 import pytest
 
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.scratch_course import Folder, Make
 
 pytestmark = pytest.mark.site
 
-CUPS = """\
-scale = 1.0
-print("steel", 66.64, 10.59, 84.8)
-for cup, start, rate, tau in (("steel", 84.9, 0.0121, 83.5), ("glass", 86.9, 0.0131, 73.5)):
-    print(f"{cup}  T0 = {scale * start:.1f} \u00b0C", end="  ")
-    print(f"k = {rate:.4f} 1/min  tau = {scale * tau:.1f} min")
-print(f"mean of tau {scale * 78.5:.1f} min")
-print("limit 78.5 min")"""
-TABLE = """\
-Output, the fits:
-
-| cup | T\u2080 (\u00b0C) | k (1/min) | \u03c4 (min) |
-| --- | --- | --- | --- |
-| steel | 84.9 | 0.0121 | 83.5 |
-
-On average it takes `78.5 min`{out="mean of tau"}, and for glass `73.5`{out}.
-"""
+CUPS = fixture_text("documents/remembered_cups.md")
+TABLE = fixture_text("documents/remembered_table.md")
 RECORD = "content/lessons/1.1-one.recorded.txt"
 
 
@@ -158,14 +143,6 @@ def test_explain_says_where_words_and_settings_are_printed(make: Make) -> None:
     )
 
 
-def test_a_lesson_takes_its_addresses_along_when_it_is_renamed(make: Make) -> None:
-    folder = make_cups(make)
-    before = folder.text(RECORD)
-    assert folder.main("rename", "1.1", "1.7").status == 0
-    assert folder.text(RECORD.replace("1.1", "1.7")) == before
-    assert not (folder.root / RECORD).exists()
-
-
 def test_a_lesson_with_an_error_keeps_what_is_remembered(make: Make) -> None:
     folder = make_cups(make)
     before = folder.text(RECORD)
@@ -184,26 +161,8 @@ def test_a_table_is_filled_below_its_header(make: Make) -> None:
     assert folder.main("check").status == 0
 
 
-def test_what_is_remembered_is_not_published(make: Make) -> None:
-    folder = make_cups(make)
-    assert folder.main("build").status == 0
-    assert [path for path in folder.tree("public") if "recorded" in path] == []
-
-
 EVERYWHERE = fixture_text("documents/bound_everywhere.md")
-PLACES = {
-    "heading": "## A period of `{}`{{out=",
-    "caption of an output": "Output, with `{}`{{out}}:",
-    "alternative text": "![A swing of `{}`{{out}} s]",
-    "caption of a figure": "It takes `{} s`{{out}}.",
-    "answer": '"answer": "`{}`{{out}}"',
-    "explanation": '"explain": "It takes `{}`{{out=examples/swing.py \\"period\\"}} s."',
-    "option": '"options": ["`{}`{{out}} s", "less"]',
-    "title of a lab": '"title": "A swing of `{}`{{out}} s"',
-    "line of a plot": '"refLines": [{{"y": "`{}`{{out}}"',
-    "line of a plot without an engine": 'refLines = [{{y = "`{}`{{out}}"',
-    "its label": 'label = "at `{}`{{out}} s"',
-}
+PLACES = fixture_tables("remembered_places")["places"]
 
 
 @pytest.mark.engine

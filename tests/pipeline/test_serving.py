@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from support.fixture_cases import fixture_tables
 from support.preview_process import Preview, serve_preview
 from support.scratch_course import (
     GOOD,
@@ -121,25 +122,7 @@ def test_address_of_nothing_has_the_page_that_says_so(preview: Preview) -> None:
     assert b'data-page="no/such/page.html" data-state=""' in body  # it is told when it connects
 
 
-OUTSIDE_PATHS = (
-    "/../secret.txt",
-    "/lessons/../../secret.txt",
-    "/%2e%2e/secret.txt",
-    "/..%2fsecret.txt",
-    "/%2e%2e%2f%2e%2e%2fetc/passwd",
-    "//etc/passwd",
-    "/etc/passwd",
-    "/..%5csecret.txt",
-    "/secret.txt%00.html",
-    "/content/course.toml",
-    "/public/index.html",
-    "/.coursebuild/lock",
-    "/.coursebuild-site",
-    "file:///etc/passwd",
-    "//[",
-    "/%ff%fe",
-    "*",
-)
+OUTSIDE_PATHS = fixture_tables("outside_paths")["paths"]
 
 
 def test_nothing_but_the_site_is_served(preview: Preview) -> None:

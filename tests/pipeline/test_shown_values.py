@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import enum
 import functools
-import shutil
 from collections.abc import Collection, Iterator, Mapping
 from decimal import Decimal
-from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -298,65 +296,3 @@ def test_each_field_of_the_frame_is_shown_and_in_its_key() -> None:
         unseen |= {name: page} if page == before[0] else {}
         assert key != before[1], name
     assert unseen == {}
-
-
-AUTHOR = {
-    "coursebuild/core/syntax/course_schema.py": (
-        '    licence: Annotated[str, describe("its name',
-        '    author: str = ""\n',
-    ),
-    "coursebuild/core/syntax/coursemap.py": (
-        "        licence=settings.licence,\n",
-        "        author=settings.author,\n",
-    ),
-    "coursebuild/core/model/course.py": (
-        "    licence: str\n    engine: str | None\n",
-        "    author: str\n",
-    ),
-    "templates/base.html": ("</footer>\n", "<p>By {{ frame.author }}.</p>\n"),
-}
-"""A key of the map that every page shows: in each file, a line and what it stands above."""
-AUTHOR_OF_FRAME = (
-    ("    licence: str\n", "    author: str\n"),
-    ("            licence=course.licence,\n", "            author=course.author,\n"),
-)
-"""The same in `frame.py`."""
-
-
-@pytest.mark.site
-def test_a_new_key_of_the_map_in_the_frame_makes_every_page_again(
-    tmp_path: Path, stores: Path
-) -> None:
-    tool, course = tmp_path / "tool", Folder(tmp_path / "course")
-    for name in ("coursebuild", "templates"):
-        ignored = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(ROOT / name, tool / name, ignore=ignored)
-    for name in ("site", "mjcourse"):
-        (tool / name).symlink_to(ROOT / name)
-    source = Folder(tool)
-    for path, (above, line) in AUTHOR.items():
-        source.replace(path, above, line + above)
-    course.fill(["## Hello\n\nText.\n"], stores)
-    course.replace("content/course.toml", "[course]\n", '[course]\nauthor = "Ada"\n')
-    env = {"PYTHONPATH": str(tool)}
-
-    def build() -> dict[str, bytes]:
-        result = course.run("build", "--quiet", env=env)
-        assert (result.status, result.out) == (0, ""), result
-        pages = course.tree("public").items()
-        return {path: data for path, data in pages if path.endswith(".html")}
-
-    # The frame does not see the course: a template cannot show what no field of its value holds.
-    failure = course.run("build", env=env)
-    assert (
-        "UndefinedError: 'coursebuild.core.pages.frame.FrameInputs object' has no attribute"
-        in failure.err
-    )
-    for above, line in AUTHOR_OF_FRAME:
-        source.replace("coursebuild/core/pages/frame.py", above, line + above)
-    first = build()
-    assert all(b"<p>By Ada.</p>" in page for page in first.values())
-    course.replace("content/course.toml", "Ada", "Grace")
-    second = build()
-    assert second.keys() == first.keys()
-    assert all(b"<p>By Grace.</p>" in page for page in second.values())

@@ -22,6 +22,7 @@ from pathlib import Path
 
 import pytest
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import (
     FIRST,
     GOOD,
@@ -42,13 +43,7 @@ from support.waiting import wait_for_file
 pytestmark = pytest.mark.site
 
 ERASE = "\r\x1b[K"
-SLOW = """
-import subprocess, sys, time
-from pathlib import Path
-child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
-Path(sys.argv[0]).with_suffix(".running").touch()
-time.sleep(600)
-"""
+SLOW = fixture_text("scripts/slow.txt")
 
 
 # --- a terminal

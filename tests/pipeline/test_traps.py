@@ -11,6 +11,7 @@ import pytest
 
 from coursebuild.cli.commands import known_commands
 from support.editor import Editor
+from support.fixture_cases import fixture_text
 from support.local_cluster import install_plugin
 from support.scratch_course import Folder, kill_at_end, processes
 from support.traps import COMMANDS, OF_MJBENCH, TrapFolder, mjbench, tool, variables
@@ -133,14 +134,7 @@ def test_no_trap_runs_in_a_run_of_pytest(traps: TrapFolder) -> None:
     assert "passed" in result.stdout, result.stdout + result.stderr
 
 
-WITHOUT_MUJOCO = """
-import os, sys
-sys.modules["mujoco"] = sys.modules["glfw"] = None  # importing them fails
-from coursebuild.cli import main
-status = main(sys.argv[1:])
-places = [os.path.realpath(place) for place in sys.path]
-sys.exit(status or os.path.realpath(".") in places)
-"""
+WITHOUT_MUJOCO = fixture_text("scripts/without_mujoco.txt")
 
 
 @pytest.mark.site

@@ -148,14 +148,7 @@ def test_update_writes_the_parts_of_files_that_a_lesson_shows(make: Make) -> Non
     assert "it has `return 2` here" in result.out
 
 
-TRAIN = """
-import os
-from pathlib import Path
-
-print(Path("models/data.txt").read_text(), len(os.listdir("models")))
-Path("runs").mkdir(exist_ok=True)
-Path("runs/count").open("a").write("+")
-"""
+TRAIN = fixture_text("documents/train.md")
 
 
 def test_long_work_is_run_only_when_that_is_asked_for(make: Make) -> None:

@@ -74,12 +74,7 @@ def drawn_pages(folder: Folder) -> set[str]:
         return set(site.drawn_paths)
 
 
-QUIZ = """```quiz
-{"id": "asked", "title": "Check", "questions": [
-  {"kind": "open", "id": "why", "q": "Why?", "reference": "So."}]}
-```
-
-"""
+QUIZ = fixture_text("documents/edited_quiz.md")
 """A question, asked in a lesson."""
 
 

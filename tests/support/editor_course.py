@@ -16,20 +16,8 @@ FIRST_LESSON, SECOND_LESSON, MAP = (
 )
 FALL = fixture_text("documents/edited_fall.md")
 LINKS = fixture_text("documents/edited_links.md")
-SOURCES = """@book{galilei1638,
-  author = {Galilei, Galileo},
-  title = {Two new sciences},
-  year = {1638},
-  isbn = {978-3-16-148410-0},
-}
-"""
-BALL = """<!-- A ball in the air. -->
-<mujoco>
-  <worldbody>
-    <body pos="0 0 1"><freejoint/><geom size="0.1"/></body>
-  </worldbody>
-</mujoco>
-"""
+SOURCES = fixture_text("documents/editor_references.bib")
+BALL = fixture_text("documents/ball.xml")
 
 
 def wait_for_results(editor: Editor) -> None:

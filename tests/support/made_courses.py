@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from msgspec.structs import replace
 
 from coursebuild.core.model import Course, Document, MjcfModel
 from coursebuild.core.model.course import CALLOUTS
-from coursebuild.core.model.results import ModelFacts
 from coursebuild.core.syntax.coursemap import parse_course_map
-from coursebuild.core.syntax.declarations import parse_declarations
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
@@ -40,25 +37,17 @@ def make_course(
     page_text: str = "Text.\n",
     *,
     models: Mapping[str, str] | None = None,
-    declaration_texts: Mapping[str, str] | None = None,
-    files: Iterable[str] = (),
 ) -> Course:
     """A course of two written lessons, a planned lesson and a page, with models by their names."""
     course = parse_course_map(Source("content/course.toml", MAP)).value
     assert course is not None
     texts = {"1.1": first, "1.2": second, "about": page_text}
-    declarations = [
-        parse_declarations(Source(f"models/{name}.toml", text)).value
-        for name, text in (declaration_texts or {}).items()
-    ]
     return replace(
         with_documents(course, documents_of(course, texts)),
         models=tuple(
             MjcfModel(name, Source(f"models/{name}.xml", text))
             for name, text in (models or {}).items()
         ),
-        files=tuple(files),
-        declarations=tuple(declaration for declaration in declarations if declaration is not None),
     )
 
 
@@ -90,15 +79,3 @@ def document(path: str, text: str, kinds: frozenset[str] = KINDS) -> Document:
 
 def rules_and_texts(diagnostics: Iterable[Diagnostic]) -> list[str]:
     return [f"{d.rule}: {d.span.text}" for d in diagnostics]
-
-
-def messages(diagnostics: Iterable[Diagnostic]) -> list[str]:
-    return [d.message + (f" [{d.help}]" if d.help else "") for d in diagnostics]
-
-
-def facts(**fields: Any) -> ModelFacts:
-    """The facts of a compiled model: those of an empty one, except for the given fields."""
-    empty: dict[str, Any] = dict.fromkeys(("bodies", "geoms", "joints", "nq", "nv", "nu"), 0)
-    empty |= {"timestep": 0.002, "integrator": "Euler", "total_mass": 0.0}
-    empty |= dict.fromkeys(("keyframes", "sites", "body_names"), ())
-    return ModelFacts(**(empty | fields))

@@ -14,16 +14,10 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from coursebuild.preview.server import PREFIX
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder, kill_at_end, wait_until_alone
 
-PATIENT = """
-import sys
-from coursebuild.cli import main
-from coursebuild.preview import live_course
-live_course.LONG_QUIET = 1.0
-live_course.LONGEST = 120.0
-sys.exit(main(sys.argv[1:]))
-"""
+PATIENT = fixture_text("scripts/patient.txt")
 """The command with longer waits for the rest of a save, so that it arrives in time on any machine.
 
 The usual waits suit a program that saves within a few milliseconds on an idle machine.

@@ -5,17 +5,11 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from support.fixture_cases import fixture_text
 from support.scratch_course import Folder
 
 SCRIPT = "```python file=examples/fall.py\nprint('drift  +6.6 %')\nprint('<b>&amp;')\n```\n\n"
-MODEL = """\
-<mujoco>
-  <worldbody>
-    <geom name="floor" type="plane" size="2 2 0.1"/>
-    <body pos="0 0 1"><freejoint/><geom name="ball" size="0.1"/></body>
-  </worldbody>
-</mujoco>
-"""
+MODEL = fixture_text("documents/zoo_model.xml")
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="4" height="4"><circle r="4"/></svg>'
 SIM = {
     "title": "Fall", "model": "ball", "controls": [],

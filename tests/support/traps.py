@@ -12,7 +12,8 @@ from importlib.metadata import packages_distributions
 from pathlib import Path
 
 from coursebuild.core.registry import features
-from support.scratch_course import GOOD, Folder, course_map
+from support.fixture_cases import fixture_text
+from support.scratch_course import Folder, course_map
 from support.workflows import git
 
 PROGRAMS = """
@@ -64,48 +65,12 @@ OF_MJBENCH = (
     ("diet", "models/box.xml", "--quick"),
 )
 """Commands of mjbench, which are given without a course as well."""
-LESSON = f"""{GOOD}
-Text with `numpy.sqrt`, `mujoco.mj_step` and $x^2$, about the [box](model:box).
-
-```python file=examples/falls.py
-import mujoco
-from mjcourse import model_path
-
-model = mujoco.MjModel.from_xml_path(str(model_path("box")))
-print("bodies", model.nbody)
-```
-
-Output:
-
-```text
-bodies 2
-```
-
-```sh file=examples/words.sh
-echo words
-```
-
-```output
-words
-```
-
-```lab
-{{"model": "box", "title": "A box",
- "controls": [{{"type": "button", "label": "Kick", "run": "data.qvel[2] += 1"}}],
- "readouts": [{{"label": "z", "expr": "data.qpos[2]"}}]}}
-```
-"""
+LESSON = fixture_text("documents/trapped_lesson.md")
 RUNNERS = """
 [runners]
 sh = [["sh", "{file}"]]
 """
-BOX = """<mujoco>
-  <worldbody>
-    <light pos="0 0 3"/>
-    <body pos="0 0 1"><freejoint/><geom type="box" size=".1 .1 .1" density="1000"/></body>
-  </worldbody>
-</mujoco>
-"""
+BOX = fixture_text("documents/trapped_model.xml")
 SCENARIO = """[[scenario]]
 name = "fall"
 title = "It falls"

@@ -9,21 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coursebuild.core.drawing.scales import log_ticks, markup_text, separate_labels
+from support.fixture_cases import fixture_tables
 
 
-@pytest.mark.parametrize(
-    ("low", "high", "most", "texts"),
-    [
-        (-12.3, -1.2, 7, "10⁻¹² 10⁻¹⁰ 10⁻⁸ 10⁻⁶ 10⁻⁴ 0.01"),
-        (-0.4, 0.6, 6, "0.5 1 2"),
-        (-1.2, 1.1, 6, "0.1 1 10"),
-        (0.0, 300.0, 6, "1 10¹⁰⁰ 10²⁰⁰ 10³⁰⁰"),
-        (0.2, 0.9, 5, "2 5"),
-        (2.1, 2.2, 4, "130 140 150"),
-        (-5.5, -4.1, 5, "5·10⁻⁶ 10⁻⁵ 2·10⁻⁵ 5·10⁻⁵"),
-        (-0.02, 0.03, 2, "1"),
-    ],
-)
+@pytest.mark.parametrize(("low", "high", "most", "texts"), fixture_tables("ticks")["logarithmic"])
 def test_ticks_of_a_logarithmic_axis(low: float, high: float, most: int, texts: str) -> None:
     assert " ".join(text for _, text in log_ticks(low, high, most)) == texts
 

@@ -28,7 +28,7 @@ from coursebuild.core.pages.typography import (
 )
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source, Span
-from support.fixture_cases import fixture_tables
+from support.fixture_cases import fixture_tables, fixture_text
 from support.plain_html import WORDS, PlainWriter
 from support.rendered_course import MAP, Make
 
@@ -130,14 +130,7 @@ SCRIPT = """```python file=examples/a.py
 print("<one>")
 ```
 """
-OUTPUT = """
-Output, in order:
-
-```text
-one  <1>
-two
-```
-"""
+OUTPUT = fixture_text("documents/marked_output.txt")
 
 
 def receipt(html: str) -> str:

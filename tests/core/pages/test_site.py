@@ -271,16 +271,7 @@ def test_links_of_a_site_below_a_path_stay_below_it() -> None:
     ]
 
 
-PATHS = [
-    "index.html",
-    "about.html",
-    "404.html",
-    "lessons/4.2-mass-and-inertia.html",
-    "models/arms/left hand.xml",
-    "examples/l4_2.py",
-    "a:b.html",
-    "levels/ü%23.html",
-]
+PATHS = CASES["paths"]
 
 
 def test_the_home_page_shows_paths_and_then_what_is_in_none(make: Make) -> None:

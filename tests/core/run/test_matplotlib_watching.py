@@ -173,10 +173,8 @@ def projections(figure: Figure) -> None:
 
 
 LAYOUTS = (
-    {"font.size": 14},
-    {"figure.constrained_layout.use": True},
-    {"font.family": "serif", "axes.titlepad": 20},
-    {"figure.subplot.left": 0.3, "figure.subplot.top": 0.7},
+    {"figure.constrained_layout.use": True, "font.size": 14},
+    {"font.family": "serif", "axes.titlepad": 20, "figure.subplot.left": 0.3},
 )
 
 

@@ -19,7 +19,7 @@ from coursebuild.core.model.results import CompileResult, Misspelling, ModelFact
 from coursebuild.core.run import compile_main, mjcf
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import TEXT_PATH, compile_all, model_files, readable_error
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.growth import processor_time_growth
 from support.model_files import TETRAHEDRON, png
 from support.run_code import program
@@ -216,21 +216,7 @@ def test_what_is_no_regular_file_is_not_read(root: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("element", "file"),
-    [
-        ('<include file="../../secret.xml"/>', "../secret.xml"),
-        ('<include file="{}/secret.xml"/>', "{}/secret.xml"),
-        ('<include file="link.xml"/>', "models/link.xml"),
-        ('<include file="folder/secret.xml"/>', "models/folder/secret.xml"),
-        ('<include file="folder/../secret.xml"/>', "models/secret.xml"),
-        ('<asset><mesh file="../../secret.xml"/></asset>', "../secret.xml"),
-        ('<asset><texture type="2d" file="../../secret.xml"/></asset>', "../secret.xml"),
-        ('<asset><hfield size="1 1 1 1" file="../../secret.xml"/></asset>', "../secret.xml"),
-        ('<asset><model name="m" file="../../secret.xml"/></asset>', "../secret.xml"),
-        ('<asset><mesh file="secret.xml"/></asset><compiler meshdir="../.."/>', "../secret.xml"),
-    ],
-)
+@pytest.mark.parametrize(("element", "file"), fixture_tables("outside_files")["elements"])
 def test_no_file_outside_the_course_is_read(root: Path, element: str, file: str) -> None:
     """By its path, or by a link to it or to a folder above it."""
     (root.parent / "outside").mkdir()

@@ -20,6 +20,7 @@ from coursebuild.core.run.script_environment import (
     places,
     wanted_packages,
 )
+from support.fixture_cases import fixture_text
 
 
 def test_conditions_do_not_depend_on_the_user() -> None:
@@ -76,15 +77,7 @@ def test_wanted_packages_are_named_in_the_folder_of_a_script(tmp_path: Path) -> 
             (tmp_path / name).unlink()
 
 
-X86 = """\
-processor\t: 0
-vendor_id\t: GenuineIntel
-model\t\t: 85
-model name\t: A   Processor\t@ 2.00GHz
-
-processor\t: 1
-model name\t: Another
-"""
+X86 = fixture_text("documents/cpuinfo_x86.txt")
 ARM = "processor\t: 0\nBogoMIPS\t: 50.00\nCPU implementer\t: 0x41\n\nModel\t\t: A Board Rev 1.1\n"
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.run.script_server import ScriptServer
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.runners import Run, both_ways, job
 
 pytestmark = pytest.mark.site
@@ -27,92 +27,10 @@ def outputs(result: ScriptRun) -> list[str]:
     return [result.stdout[start:end] for start, end in pairwise(edges)]
 
 
-PRINTED: list[tuple[str, Sequence[str], Sequence[str]]] = [
-    (
-        "buffered",
-        ["print('a')", "print('b')\nprint('c')", "print('d', end='')"],
-        ["a|", "b|c|", "d"],
-    ),
-    ("nothing", ["x = 1", "# a comment", "", "print(x)", "def f(): pass"], ["", "", "", "1|", ""]),
-    ("half a line", ["print('a', end='')", "print('b')"], ["a", "b|"]),
-    (
-        "the C library",
-        ["import ctypes\nc = ctypes.CDLL(None)\nc.printf(b'a')", "c.puts(b'b')", "c.printf(b'c')"],
-        ["a", "b|", "c"],
-    ),
-    ("os.write", ["import os\nprint('a')\nos.write(1, b'b')", "os.write(1, b'c')"], ["ba|", "c"]),
-    (
-        "another process",
-        [
-            "import subprocess\nprint('a')",
-            "subprocess.run(['echo', 'b'])\nprint('c')",
-            "subprocess.run('printf d', shell=True)",
-        ],
-        ["a|", "b|c|", "d"],
-    ),
-    (
-        "threads",
-        [
-            "from threading import Thread\nt = Thread(target=lambda: [print(n) for n in 'abc'])",
-            "t.start(); t.join()",
-            "print('d')",
-        ],
-        ["", "a|b|c|", "d|"],
-    ),
-    ("at the exit", ["import atexit\natexit.register(print, 'bye')", "print('b')"], ["", "b|bye|"]),
-    (
-        "a copy of the process",
-        [
-            "import os\nprint('a', flush=True)",
-            "child = os.fork()\nif child:\n    os.waitpid(child, 0)\n"
-            "else:\n    print('c', flush=True)\n    os._exit(0)",
-            "print('d')",
-        ],
-        ["a|", "c|", "d|"],
-    ),
-    (
-        "a stream in place of the output",
-        [
-            "import io, sys\nprint('a')\nsys.stdout = io.StringIO()",
-            "print('b')\nkept, sys.stdout = sys.stdout.getvalue(), sys.__stdout__",
-            "print(kept.upper(), end='')",
-        ],
-        ["a|", "", "B|"],
-    ),
-    (
-        "an output that goes elsewhere for a while",
-        [
-            "import os\nprint('a', flush=True)\nkept = os.dup(1)\nother = os.memfd_create('x')",
-            "os.dup2(other, 1)\nprint('b')",
-            "print('c', flush=True)\nos.dup2(kept, 1)",
-            "print(os.lseek(other, 0, 1))",
-        ],
-        ["a|", "", "", "4|"],
-    ),
-    ("a closed stream", ["import sys\nprint('a')\nsys.stdout.close()", "x = 1"], ["a|", ""]),
-    ("letters of several bytes", ["print('ä€😀')", "print('ö')"], ["ä€😀|", "ö|"]),
-    ("line ends", [r"print('a\r\nb\r\n', end='')", r"print('\r\nc')"], ["a|b|", "|c|"]),
-    ("an end in the first part", ["print('a')\nraise SystemExit", "print('b')"], ["a|", ""]),
-    (
-        "an end without ceremony",
-        ["import os\nprint('a', flush=True)\nos._exit(0)", "1"],
-        ["a|", ""],
-    ),
-    (
-        "an output that must not wait",
-        ["import os\nos.set_blocking(1, False)\nprint('x' * 9000)", "print('b')"],
-        ["x" * 9000 + "|", "b|"],
-    ),
-    (
-        "a docstring and a feature below a comment",
-        ["# first", '"""Of the module."""\nfrom __future__ import annotations', "print(__doc__)"],
-        ["", "", "Of the module.|"],
-    ),
-]
-
-
 def test_each_part_has_what_it_printed(run: Run) -> None:
-    for title, parts, expected in PRINTED:
+    nonblocking = ["import os\nos.set_blocking(1, False)\nprint('x' * 9000)", "print('b')"]
+    last = ("an output that must not wait", nonblocking, ["x" * 9000 + "|", "b|"])
+    for title, parts, expected in (*fixture_tables("script_parts")["printed"], last):
         result = run("\n".join(parts), part_lines=lines_of(parts))
         assert result.outcome is Outcome.OK, (title, result.stderr)
         assert outputs(result) == [text.replace("|", "\n") for text in expected], title

@@ -10,7 +10,7 @@ import pytest
 
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.run.typesetting import MathEngine
-from support.fixture_cases import fixture_text
+from support.fixture_cases import fixture_tables, fixture_text
 from support.run_code import program, run_code
 
 GLOBAL = {"class", "style", "mathbackground", "mathcolor"}
@@ -24,16 +24,7 @@ ALLOWED_ATTRIBUTES = {
 """What the HTML checker takes and browsers draw; a `span` in `mtext` is the number of an equation.
 """
 FORMULAS = fixture_text("documents/formulas.tex").strip().splitlines()
-DISPLAY_ONLY = r"""
-\begin{align}a&=b\\c&=d\end{align}
-\begin{align*}a&=b\\c&=d\end{align*}
-\begin{equation}a=b\label{eq}\end{equation}
-\begin{flalign*} a &= b \end{flalign*}
-\begin{gather}a=b\\c=d\end{gather}
-\begin{multline}a\\b\end{multline}
-\begin{CD} A @>a>> B \\ @VVbV @AAcA \\ C @= D \end{CD}
-\tag{3} x
-""".strip().splitlines()
+DISPLAY_ONLY = fixture_tables("display_only")["formulas"]
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from coursebuild.core.scripts.bindings import PrintedOutputs, check_bindings, de
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.numbers import Number, round_like, scan, scan_prose
-from support.fixture_cases import fixture_tables
+from support.fixture_cases import fixture_tables, fixture_text
 from support.growth import processor_time_growth
 from support.sample_lessons import course, describe, document, make_run
 
@@ -91,16 +91,7 @@ def test_scanning_repeated_text_takes_linear_time() -> None:
     assert {piece: growth for piece, growth in growths.items() if growth > 24} == {}
 
 
-OUTPUT = """\
-an L-shaped body: [0.073333 0.026667 0.      ] m
-moments [0.00376854 0.01383146 0.0168    ]
-axis (z): 0 flips
-axis (y): 4 flips, 20 s
-RK4           kinetic energy  -0.000 %  change 3.9e-11 kg m^2/s
-Euler         kinetic energy  +6.641 %  change 6.9e-04 kg m^2/s
-implicitfast  kinetic energy  -6.040 %  change 6.4e-04 kg m^2/s
-took 12.50ms, limit nan
-"""
+OUTPUT = fixture_text("documents/bound_output.txt")
 
 
 def script(path: str = "examples/a.py") -> str:
@@ -346,17 +337,7 @@ def test_a_number_in_a_caption_is_one_of_its_own_output() -> None:
     assert diagnostic.rule == "binding-mismatch"
 
 
-UNIT_PLACES = (
-    "| depth ({}) |\n| --- |\n| `33.6`{{out}} |",
-    "| what | value ({}) |\n| --- | --- |\n| depth | `33.6`{{out}} |\n| again | `33.6`{{out}} |",
-    "The depth is `33.6`{{out}} {}.[^deep]\n\n[^deep]: Below the surface.",
-    '```quiz\n{{"id": "q", "questions": [{{"kind": "numeric", "q": "How deep?", '
-    '"answer": "`33.6`{{out}}", "unit": "{}"}}]}}\n```',
-    '```lab\n{{"model": "rod", "plots": [{{"ylabel": "depth ({})", "refLines": '
-    '[{{"y": "`33.6`{{out}}"}}], "traces": [{{"label": "a", "expr": "data.time"}}]}}]}}\n```',
-    '```lab plot\nx = {{max = 3}}\nplots = [{{ylabel = "depth ({})", refLines = '
-    '[{{y = "`33.6`{{out}}"}}], traces = [{{label = "a", expr = "x"}}]}}]\n```',
-)
+UNIT_PLACES = CASES["unit_places"]
 
 
 def test_the_unit_of_a_number_may_stand_in_a_header_or_field_beside_it() -> None:

@@ -150,19 +150,9 @@ def test_reasons_why_convergence_is_not_measured() -> None:
 # --- text
 
 
-@pytest.mark.parametrize(
-    ("recorded", "moved_output", "expected"),
-    [
-        ("heads", "tails", [("heads", "tails")]),
-        ("x -0.0", "x 0.0", [("-0.0", "0.0")]),
-        ("a\nb", "a", [("b", "")]),
-        ("a", "a\nb", [("", "b")]),
-    ],
-)
-def test_text_that_changes(
-    recorded: str, moved_output: str, expected: list[tuple[str, str]]
-) -> None:
-    assert flips(measure(recorded, moved_output)) == expected
+@pytest.mark.parametrize(("recorded", "moved_output", "expected"), CASES["changing_texts"])
+def test_text_that_changes(recorded: str, moved_output: str, expected: list[list[str]]) -> None:
+    assert [[*flip] for flip in flips(measure(recorded, moved_output))] == expected
 
 
 # --- scripts

@@ -11,7 +11,7 @@ import pytest
 from coursebuild.core.scripts.module_code import CourseModule, NotOneFileError
 from coursebuild.core.scripts.single_file import Belongings, single_file
 from coursebuild.core.text.python_code import find_imports
-from support.fixture_cases import Case, read_cases
+from support.fixture_cases import Case, fixture_tables, read_cases
 
 CASES = read_cases(Path(__file__).with_name("single_files.md"))
 
@@ -54,21 +54,7 @@ def test_one_file_prints_what_script_and_modules_print(case: Case, tmp_path: Pat
     assert run(tmp_path / "beside") == run(tmp_path / "alone") == case.expected, text
 
 
-REFUSED = {
-    "a module that prints": ("from m import a\n", "print(1)\na = 2\n"),
-    "a module that prints, of which an import is used": (
-        "from m import math\n",
-        "import math\nprint(1)\n",
-    ),
-    "a module that prints, of which nothing is used": ("import m\n", "print(1)\n"),
-    "a package that a module imports a part of": ("from m import os as o\n", "import os.path\n"),
-    "a module that is a value": ("import m\nprint(m)\n", "a = 2\n"),
-    "a name that is bound twice": ("from m import a\n", "a = 1\na = a + 1\n"),
-    "everything of a module": ("from m import *\n", "a = 1\n"),
-    "an import in a function": ("def f():\n    from m import a\n    return a\n", "a = 1\n"),
-    "a module that asks where it lies": ("from m import a\n", "a = __file__\n"),
-    "a name that is also the script's": ("from m import a\na = 3\nprint(a)\n", "a = 1\n"),
-}
+REFUSED = fixture_tables("single_files")["refused"]
 
 
 @pytest.mark.parametrize("name", REFUSED)

@@ -19,18 +19,12 @@ from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.figures import describe_difference, prepare_figure
 from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.text.diagnostics import Diagnostic, Edit
-from support.fixture_cases import fixture_tables
+from support.fixture_cases import fixture_tables, fixture_text
 from support.sample_lessons import DIGITS, EXACT, VOLATILE, table, tolerance, update
 
 CASES = fixture_tables("tables")
 
-OUTPUT = """\
-integrators
-  RK4           kinetic energy  -0.000 %   |change| 3.9e-11 kg m^2/s
-  Euler         kinetic energy  +6.641 %   |change| 6.9e-04 kg m^2/s
-  implicitfast  kinetic energy  -6.040 %   |change| 6.4e-04 kg m^2/s
-  implicit      kinetic energy  -6.040 %   |change| 6.4e-04 kg m^2/s
-"""
+OUTPUT = fixture_text("documents/table_output.txt")
 HEAD = "| integrator | energy | momentum |\n| --- | ---: | ---: |\n"
 ROWS = """\
 | RK4 | −0.000 % | 3.9e-11 |

@@ -24,7 +24,7 @@ from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.features.quiz.model import Quiz
-from support.fixture_cases import Case, check_cases, fixture_text
+from support.fixture_cases import Case, check_cases, fixture_tables, fixture_text
 from support.plain_html import plain_html
 from support.random_lessons import KINDS, markdown
 from support.tree_dump import dump
@@ -109,18 +109,7 @@ def test_deep_emphasis_loses_its_marks_and_no_text() -> None:
     assert str(plain_html(document_of(text))).count("a ") == 200
 
 
-REPEATED_PIECES = [
-    *("[", "]", "*", "_", "$", "$$", "`", "~", "|", "<", "&", "!", "![", "[^", "[^a]", "("),
-    *("{", "\\", "#", ">", "> ", "- ", "1. ", "\t", "$a", "a$ ", "$$a\n\n", "*a ", "a*"),
-    *("*a_", "**a ", "a**b", "[a](", '[a](b "', "[a](<b", "[a][b]", "[a]: b\n"),
-    *("[a]: b 'x\n", "[a\n", "`a", "``a`", "`a$", "<a ", '<a "', "<!--", "<?"),
-    *('<a href="x">', "<b>", "</b>", "&amp;", "|\n", "a|b\n-|-\n", "- a\n", "> a\n"),
-    *("$$\n", "$$\na\n", "```\n", "a\n===\n", "a\n=\n", "[^a]: x\n", "Lesson 2.2 "),
-    *("Lessons 1.1, 2.2, ", "- [ ] a\n", "<http://a.b>", "~~a", "~~~a~~~ ", "[a](u) "),
-    *("`x`{out}", "`x`{out", "\\$", "> [!note] a\n\n", "a\\\n", "a  \n", "<p>", "<div>\n\n"),
-    *("# a {#b}\n", "# a {#\n", "Output:\n\n", "    a\n", "```python\nx\n```\n"),
-    "Output:\n\n```text\na\n```\n",
-]
+REPEATED_PIECES = fixture_tables("repeated_pieces")["pieces"]
 
 
 def calls(text: str) -> int:

@@ -6,16 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from support.scratch_course import Folder, Make
+from support.scratch_course import Make, maker
 
 
 @pytest.fixture
 def make(tmp_path: Path, stores: Path) -> Make:
     """Makes a course of these lessons, in a folder with no simple name."""
-
-    def make(*lessons: str | bytes) -> Folder:
-        folder = Folder(tmp_path / "a cöurse")
-        folder.fill(lessons, stores)
-        return folder
-
-    return make
+    return maker(tmp_path, stores)

@@ -8,88 +8,28 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from support.fixture_cases import Case, check_cases
 from support.plain_html import check_formatting, format_text
 from support.random_lessons import markdown
 from support.scratch_course import CommandResult, Make
 
-ROOT = Path(__file__).parents[3]
+HERE = Path(__file__).parent
+ROOT = HERE.parents[2]
 MAP = "content/course.toml"
 DOCUMENTS = [*ROOT.glob("content/*/*.md"), *ROOT.glob("docs/reference/*.md")]
 
-TIDY = {
-    "empty lines": (
-        "\n\n## A\nb\n\n\n\nc \n```text\na  \n\n\nb\n```\n> d\n>\n> \n> e\n>  - f\n\n\n",
-        "## A\n\nb\n\nc\n\n```text\na  \n\n\nb\n```\n\n> d\n>\n> e\n>\n>  - f\n",
-    ),
-    "what belongs together": (
-        "<!-- b -->\nc\\\nd  \ne[^f][^g]\n\n- h\n- i\n\n[^f]: F\n[^g]: G\n\n> [!note] T\n> - j\n\n",
-        "<!-- b -->\nc\\\nd  \ne[^f][^g]\n\n- h\n- i\n\n[^f]: F\n[^g]: G\n\n> [!note] T\n> - j\n",
-    ),
-    "line ends": ("## A\r\ntext \r\n\r\n\r\nmore", "## A\r\n\r\ntext\r\n\r\nmore\r\n"),
-    "table": (
-        "a|`b\\|`|c\n-|:-:|--:\n| 質量 |x||\n|**m**||1.25|\n",
-        "| a     | `b\\|` |    c |\n| ----- | :---: | ---: |\n"
-        "| 質量  |   x   |      |\n| **m** |       | 1.25 |\n",
-    ),
-    "table in a list": (
-        "- a\n\n  | b | c |\n  |---|---|\n  | long | d |\n",
-        "- a\n\n  | b    | c   |\n  | ---- | --- |\n  | long | d   |\n",
-    ),
-    "wide table": (
-        f"|a| b |\n|:--|--|\n| {'word ' * 24}| |\n",
-        f"| a | b |\n| :--- | --- |\n| {'word ' * 24}| |\n",
-    ),
-    "JSON in lines": (
-        '> ```quiz\n> { "id":"q",\n>   "questions" : [ {"kind" :"open",\n>    "q":"{,} b" ,\n>\n>\n'
-        '>   "hints":[\n> "h"\n> ], "reference" : "c"\n> }]}\n> ```\n',
-        '> ```quiz\n> {"id": "q",\n>  "questions": [{"kind": "open",\n'
-        '>                 "q": "{,} b",\n>\n'
-        '>                 "hints": [\n>                   "h"\n>                 ],'
-        ' "reference": "c"\n>                }]}\n> ```\n',
-    ),
-    "JSON in one line": (
-        '```quiz\n{"id":"q","title":"A quiz of which the JSON is too long for one line of text",'
-        '"questions":[{"kind":"open","q":"a","reference":"b"}]}\n```\n',
-        '```quiz\n{\n  "id": "q",\n'
-        '  "title": "A quiz of which the JSON is too long for one line of text",\n'
-        '  "questions": [{"kind": "open", "q": "a", "reference": "b"}]\n}\n```\n',
-    ),
-}
+
+def test_text_is_tidied_and_keeps_its_lines(rewriting: bool) -> None:
+    check_cases(HERE / "tidied.md", lambda case: tidy(case.input), rewriting=rewriting)
+    assert tidy("## A\r\ntext \r\n\r\n\r\nmore") == "## A\r\n\r\ntext\r\n\r\nmore\r\n"
 
 
-@pytest.mark.parametrize(("text", "expected"), TIDY.values(), ids=TIDY)
-def test_text_is_tidied_and_keeps_its_lines(text: str, expected: str) -> None:
-    assert tidy(text) == expected
+def test_paragraphs_are_wrapped_at_a_width(rewriting: bool) -> None:
+    def wrap(case: Case) -> str:
+        assert tidy(case.input) == case.input, case.title
+        return tidy(case.input, width=18)
 
-
-WRAPPED_TEXTS = {
-    "words": ("One two three\nfour five six.", "One two three four\nfive six."),
-    "no other block": ("About fifteen and - 7 or 1. or # x", "About fifteen and -\n7 or 1. or # x"),
-    "solid parts": (
-        "A formula $a +\nb$ and `some code` too",
-        "A formula $a + b$\nand `some code`\ntoo",
-    ),
-    "attributes": (
-        'Mass $m${symbol="mass" unit="kg"} of it',
-        'Mass\n$m${symbol="mass"\nunit="kg"} of it',
-    ),
-    "list in a quote": (
-        "> - one two three four five\n>   six seven\n> - eight",
-        "> - one two three\n>   four five six\n>   seven\n> - eight",
-    ),
-    "footnote": ("x[^n]\n\n[^n]: one two three four", "x[^n]\n\n[^n]: one two\n      three four"),
-    "callout": (
-        "> [!note] A title of its own\n> one two three four",
-        "> [!note] A title of its own\n> one two three\n> four",
-    ),
-    "forced lines": ("one two three four five  \nsix", "one two three four five  \nsix"),
-}
-
-
-@pytest.mark.parametrize(("text", "expected"), WRAPPED_TEXTS.values(), ids=WRAPPED_TEXTS)
-def test_paragraphs_are_wrapped_at_a_width(text: str, expected: str) -> None:
-    assert tidy(text) == f"{text}\n"
-    assert tidy(text, width=18) == f"{expected}\n"
+    check_cases(HERE / "wrapped.md", wrap, rewriting=rewriting)
 
 
 def tidy(text: str, width: int = 0) -> str:
@@ -104,10 +44,11 @@ def test_any_text_says_the_same(text: str, lesson: bool, width: int) -> None:
     check_formatting(text, width, lesson)
 
 
-@pytest.mark.parametrize("name", ["text", "quizzes", "scripts", "9.2-soft-contact"])
-def test_real_documents_say_the_same(name: str) -> None:
-    (path,) = (path for path in DOCUMENTS if path.stem == name)
-    check_formatting(path.read_text(), 60, path.parent.name == "lessons")
+@pytest.mark.site
+def test_real_documents_say_the_same() -> None:
+    for name in ("text", "quizzes", "scripts", "9.2-soft-contact"):
+        (path,) = (path for path in DOCUMENTS if path.stem == name)
+        check_formatting(path.read_text(), 60, path.parent.name == "lessons")
 
 
 @pytest.mark.site

@@ -15,15 +15,11 @@ import pytest
 
 from coursebuild import __version__
 from coursebuild.core.run.script_environment import site_folders
+from support.fixture_cases import fixture_text
 from support.sandboxes import require_sandbox
 from support.scratch_course import ROOT, Folder, command
 
-REPORT = """\
-wrote 17 files to {0}, in a new Git repository
-
-  coursebuild -C {1} serve    look at the course, and write
-  coursebuild -C {1} build    verify it, and write the site to public/
-"""
+REPORT = fixture_text("documents/init_report.txt")
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import textwrap
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -12,50 +11,17 @@ import pytest
 from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.text.source import Source
 from coursebuild.features.authoring.course_map import with_lesson
-from support.fixture_cases import fixture_text
-from support.scratch_course import FIRST, ROOT, SECOND, CommandResult, Folder, Make, block
+from support.fixture_cases import fixture_tables, fixture_text
+from support.scratch_course import FIRST, ROOT, SECOND, CommandResult, Folder, Make
 
 pytestmark = pytest.mark.site
 
 MAP = "content/course.toml"
-HEAD = '[course]\ntitle = "C"\n\n[[level]]\nid = "1"\ntitle = "One"  # a level\n'
-ENTRY = '[[level.lesson]]\nid = "{}"\nslug = "{}"\ntitle = "{}"\nstatus = "{}"\n'
-NEW = ENTRY.format("1.4", "new", "New", "draft")
-
-
-def planned(id: str, slug: str = "x") -> str:
-    return ENTRY.format(id, slug, "X", "planned")
-
-
-PLACES = {
-    "an empty level": (HEAD, HEAD + "\n" + NEW),
-    "no line end at the end": (HEAD.rstrip("\n"), HEAD + "\n" + NEW.rstrip("\n")),
-    "behind the one before, not by letters": (
-        f"{HEAD}\n{planned('1.3')}# of 1.3\n\n# of 1.10\n{planned('1.10')}\n# the end\n",
-        f"{HEAD}\n{planned('1.3')}\n{NEW}\n# of 1.3\n\n# of 1.10\n{planned('1.10')}\n# the end\n",
-    ),
-    "before the first, above its comment": (
-        f"{HEAD}\n# of 1.5\n# too\n{planned('1.5')}",
-        f"{HEAD}\n{NEW}\n# of 1.5\n# too\n{planned('1.5')}",
-    ),
-    "the last of a level that another follows": (
-        f'{HEAD}\n{planned("1.3")}minutes = 3 # short\n\n# ---\n\n[[level]]\nid = 2\ntitle = "T"\n',
-        f"{HEAD}\n{planned('1.3')}minutes = 3 # short\n\n{NEW}\n# ---\n\n"
-        '[[level]]\nid = 2\ntitle = "T"\n',
-    ),
-    "entries that stand close, and a table between": (
-        f"{HEAD}{planned('1.3')}{planned('1.5')}[verify]\ncompare = 'digits'\n",
-        f"{HEAD}{planned('1.3')}\n{NEW}\n{planned('1.5')}[verify]\ncompare = 'digits'\n",
-    ),
-    "as far in as those around it": (
-        f"{HEAD}\n{textwrap.indent(planned('1.3'), '  ')}",
-        f"{HEAD}\n{textwrap.indent(planned('1.3'), '  ')}\n{textwrap.indent(NEW, '  ')}",
-    ),
-}
+CASES = fixture_tables("authoring")
 
 
 def test_entry_is_inserted_in_order_and_the_rest_is_unchanged() -> None:
-    for case, (before, after) in PLACES.items():
+    for case, before, after in CASES["places"]:
         for end in ("\n", "\r\n"):
             course = parse_course_map(Source(MAP, before.replace("\n", end))).value
             assert course is not None
@@ -79,43 +45,14 @@ def test_new_lesson_is_checked_and_built_as_it_is(make: Make) -> None:
     assert ids[1:] == ["1.1", "1.2", "1.2.1", "1.3", "1.4", "1.10"]
 
 
-REFUSED_COMMANDS = [
-    ("lesson 1.1 T", "there is already a lesson 1.1: Lesson one"),
-    (
-        "lesson 7.1 T",
-        "the map has no level for `7.1`; `coursebuild new level 7 TITLE` adds it; known: `1`",
-    ),
-    ("lesson ../x T", "the map has no level for `../x`; known: `1`"),
-    ("lesson 1.9", "the following arguments are required: TITLE"),
-    ("level 2", "the following arguments are required: TITLE"),
-    ("level 1 T", f"{MAP} cannot have a level 1: the level id `1` is used twice"),
-    ("level a/b T", f"{MAP} cannot have a level a/b: "),
-    ("page There --id A/b", f"{MAP} cannot have a page A/b: "),
-    ("page There", "there is already a file content/pages/there.md"),
-    ("page 力学", "`力学` makes no name for a file; choose one with `--id`"),
-    ("page \udcff", "the title is not UTF-8"),
-    ("lesson 1 T", f"{MAP} cannot have a lesson 1: "),
-    ("lesson 1./../x T", f"{MAP} cannot have a lesson 1./../x: "),
-    ("lesson 1.3 T --slug A/b", f"{MAP} cannot have a lesson 1.3: "),
-    ("lesson 1.3 \udcff", "the title is not UTF-8"),
-    ("lesson 1.3 مقدمة", "`مقدمة` makes no name for a file; choose one with `--slug`"),
-    ("lesson 1.7 there", "there is already a file content/lessons/1.7-there.md"),
-    ("model ../x", "`../x` is not a name for a model: use letters, digits, `_` and `-`"),
-    ("model there", "there is already a file models/there.xml"),
-    ("feature quiz", "there is already a feature or a fence `quiz`"),
-    ("feature Big-1", "`Big-1` is not a name for a feature: use lower-case letters"),
-    ("template lessn.html", "there is no template `lessn.html`; did you mean `lesson.html`?"),
-    ("template ../base.html", "there is no template `../base.html`; did you mean `base.html`?"),
-]
-
-
 def test_refused_addition_changes_nothing(make: Make) -> None:
     folder = make(FIRST)
     folder.write("content/lessons/1.7-there.md", "## There\n")
     folder.write("models/there.xml", "<mujoco/>")
     folder.write("content/pages/there.md", "Here.\n")
     before = folder.tree()
-    for arguments, message in REFUSED_COMMANDS:
+    not_utf8 = [(f"{kind} \udcff", "the title is not UTF-8") for kind in ("page", "lesson 1.3")]
+    for arguments, message in (*CASES["additions"], *not_utf8):
         result = folder.main("new", *arguments.split(" "))
         assert (result.status, result.out) == (2, ""), arguments
         assert message in result.err, arguments
@@ -273,27 +210,10 @@ def test_planned_lesson_and_one_out_of_order_stay_where_they_are(course: Folder)
     assert ids == ["1", "1.9", "1.8", "1.3", "1.30"]
 
 
-DOUBTS = [
-    ("content/lessons/1.1-one.md", "In `lesson:1.2`.\n"),
-    ("content/lessons/1.1-one.md", "<!-- see lesson 1.2 -->\n"),
-    ("content/lessons/1.1-one.md", '<a href="1.2-two.html">there</a>\n'),
-    ("content/lessons/1.1-one.md", "As in Lessons 1.1–1.3.\n"),
-    ("content/lessons/1.1-one.md", "As in Lessons 1.2 to 1.3.\n"),
-    ("content/lessons/1.1-one.md", "As in Lessons 0.9 to 1.2.\n"),
-    ("content/lessons/1.1-one.md", "As in lesson 1.2.\n"),
-    ("content/lessons/1.1-one.md", block("c.py", "# LESSONS 1.1 and 1.2\nprint(1)")),
-    (MAP, "# Lesson 1.2 is short.\n"),
-    (MAP, '[[silence]]\nrule = "image-alt"\nreason = "r"\npath = "content/lessons/1.2-*"\n'),
-    ("models/ball.xml", "<mujoco><!-- for Lesson 1.2 --></mujoco>\n"),
-    ("models/ball.toml", "# Lesson 1.2 measures it.\n"),
-    ("features/own.py", '"""For Lesson 1.2."""\n'),
-]
-
-
 def test_doubtful_places_are_listed_and_nothing_is_changed(make: Make) -> None:
     folder = make(FIRST, SECOND, "## Three\n\nLesson 1.2.\n")
     folder.write("models/ball.xml", "<mujoco/>\n")
-    for path, text in DOUBTS:
+    for path, text in CASES["doubts"]:
         before = folder.tree()
         old = before.get(path, b"")
         folder.write(path, old + b"\n" + text.encode())
@@ -320,23 +240,10 @@ def test_doubtful_places_are_listed_and_nothing_is_changed(make: Make) -> None:
     assert folder.text("features/own.py") == '"""For Lesson 1.2."""\n'
 
 
-REFUSED_RENAMES = [
-    ("1.9 1.8", "no lesson is called `1.9`"),
-    ("1.2 1.2", "there is already a lesson 1.2: Lesson two"),
-    ("1.2 1.3", "there is already a lesson 1.3: Lesson three"),
-    (
-        "1.2 9.9",
-        "the map has no level for `9.9`; `coursebuild new level 9 TITLE` adds it; known: `1`",
-    ),
-    ("1.2 1.a/b", f"{MAP} cannot have a lesson 1.a/b: "),
-    ("1.2 1.8", "there is already a file content/lessons/1.8-two.md"),
-]
-
-
 def test_refused_renaming_changes_nothing(course: Folder) -> None:
     course.write("content/lessons/1.8-two.md", "## There\n")
     before = course.tree()
-    for arguments, message in REFUSED_RENAMES:
+    for arguments, message in CASES["renames"]:
         result = course.main("rename", *arguments.split())
         assert (result.status, result.out) == (2, ""), arguments
         assert message in result.err, arguments

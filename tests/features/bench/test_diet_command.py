@@ -11,27 +11,14 @@ import pytest
 
 from coursebuild.cli import main
 from coursebuild.core.model.report_files import DIET
+from support.fixture_cases import fixture_text
 from support.scratch_course import ROOT, course_map
 
 Capture = pytest.CaptureFixture[str]
 pytestmark = pytest.mark.site
 
-MODEL = """<mujoco>
-  <worldbody>
-    <body name="bob" pos="0 0 1"><joint axis="0 1 0"/><geom size=".05" pos=".3 0 0"/></body>
-  </worldbody>
-  <option timestep="0.02">
-    <flag energy="enable"/> <!-- for the plot -->
-  </option>
-</mujoco>
-"""
-LESSON = """## A
-
-```python file=examples/a.py
-from mjcourse import model_path
-SCRIPT
-```
-"""
+MODEL = fixture_text("documents/diet_model.xml")
+LESSON = fixture_text("documents/diet_lesson.md")
 CLEAN = MODEL.replace('    <flag energy="enable"/> <!-- for the plot -->\n', "")
 
 
@@ -224,13 +211,7 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_interface(
         assert {finding["kind"] for finding in findings if finding["fixable"]} == kinds
 
 
-SHARED_PART = """<mujocoinclude>
-  <compiler/>
-  <option>
-    <flag energy="enable"/>
-  </option>
-</mujocoinclude>
-"""
+SHARED_PART = fixture_text("documents/shared_part.xml")
 
 
 def test_a_file_of_two_models_is_not_changed(course: Path, capsys: Capture) -> None:

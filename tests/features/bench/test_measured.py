@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -15,52 +13,18 @@ from coursebuild.features.bench.grids import bounded, factor, percent, power, se
 from mjbench.reports.model_report import StepCost
 from samples.reports import interval
 from support.bench_reports import swing
+from support.fixture_cases import fixture_tables
 from support.model_reports import box, case, diet, reports, row, run, scenario, scene
 from support.rendered_course import MAP, Make
-
-TEXTS: dict[Callable[[Any], str], dict[Any, str]] = {
-    power: {
-        0.0: "0",
-        1.0: "1.00",
-        -0.0604: "−0.0604",
-        0.001234: "0.00123",
-        12345.0: "12345",
-        123456.0: "1.23 × 10<sup>5</sup>",
-        -4.1e-10: "−4.10 × 10<sup>−10</sup>",
-        9.999e-4: "0.00100",
-        9.9e-4: "9.90 × 10<sup>−4</sup>",
-        math.nan: "nan",
-        None: "",
-    },
-    percent: {
-        0.0: "0 %",
-        -0.0604: "−6.040 %",
-        1e-5: "+0.001 %",
-        99.0: "+9900.000 %",
-        100.0: "+10000 %",
-        2.5e-13: "+2.5 × 10<sup>−11</sup> %",
-    },
-    factor: {None: "", 0.123456: "0.123", 99.9: "99.9", 1359.4: "1 360"},
-    size: {
-        0: "0 B",
-        9999: "9 999 B",
-        10_000: "10 kB",
-        81_212: "81 kB",
-        9_999_000: "9 999 kB",
-        10**7: "10 MB",
-        98_765_432: "99 MB",
-    },
-    sentence: {"": "", "it is": "It is.", "Is it?": "Is it?"},
-}
 
 
 def test_numbers_and_sentences_as_text() -> None:
     """Three digits, and a power of ten where a number needs one; a thin space before a unit."""
-    texts = {
-        write: {value: write(value).replace("\u2009", " ") for value in expected}
-        for write, expected in TEXTS.items()
-    }
-    assert texts == TEXTS
+    cases = fixture_tables("measured")
+    for write in (power, percent, factor, size, sentence):
+        for value, text in cases[write.__name__]:
+            assert write(value).replace("\u2009", " ") == text
+    assert [power(math.nan), power(None), factor(None)] == ["nan", "", ""]
     assert bounded(1e-11, 1e-11) == "&lt; 1.0\u2009×\u200910<sup>−11</sup>"
     assert [bounded(v, 0.0) for v in (None, 0.0, 0.5)] == ["", "0", "0.500"]
     assert bounded(0.002, 1e-3) == "0.00200"

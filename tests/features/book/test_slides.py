@@ -91,14 +91,7 @@ def test_one_file_is_enough_and_wild_html_does_nothing_in_it(make_course: Make) 
     assert "default-src" in policy[1] and "unsafe-eval" not in policy[1]
 
 
-LAB = """## A curve
-
-```lab plot
-title = "Square"
-x = {name = "x", max = 2}
-plots = [{traces = [{label = "square", expr = "x**2"}]}]
-```
-"""
+LAB = fixture_text("documents/slides_lab.md")
 
 
 def test_what_a_lab_loads_is_in_the_file(make_course: Make) -> None:

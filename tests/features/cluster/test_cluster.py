@@ -15,6 +15,7 @@ import pytest
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.model.results import ScriptJob
+from support.fixture_cases import fixture_tables, fixture_text
 from support.local_cluster import install_plugin, local_cluster
 from support.sandboxes import require_sandbox
 from support.scratch_course import (
@@ -33,63 +34,13 @@ from support.waiting import wait_for_file, wait_until
 
 pytestmark = pytest.mark.long
 
-PENDULUM = """\
-<mujoco>
-  <asset><material name="unused"/></asset>
-  <worldbody>
-    <body name="arm">
-      <joint name="hinge" axis="0 1 0" damping="0.01"/>
-      <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02"/>
-    </body>
-  </worldbody>
-</mujoco>
-"""
-SCENARIO = """\
-[[scenario]]
-name = "swings"
-duration = 0.1
-timesteps = [0.002]
-search = [0.002, 0.004]
-
-[[sweep]]
-name = "damping"
-vary = {{ "joint:hinge.damping" = {} }}
-"""
-WRITES = """\
-import os
-os.makedirs("runs", exist_ok=True)
-with open("runs/new.txt", "w") as file:
-    file.write("7")
-"""
+PENDULUM = fixture_text("documents/cluster_pendulum.xml")
+SCENARIO = fixture_text("documents/cluster_scenario.toml")
+WRITES = fixture_text("scripts/cluster_writes.txt")
 LIMITS = "[limits]\nscripts = 512\n"
-WORKER = """
-import os, pathlib
-def parent(pid):
-    return int(pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
-worker = parent(parent(os.getppid()))
-"""
+WORKER = fixture_text("scripts/cluster_worker.txt")
 """The process of Dask's worker: that of the child that has started this script's supervisor."""
-SCRIPTS = {
-    "passes": ('print("hello", 3.14159)', "hello 3.14159"),
-    "drifts": ("print(2)", "3"),
-    "fails": ('raise ValueError("no")', "3"),
-    "loops": ("while True: pass", "3"),
-    "takes": ("print(len(bytearray(1 << 30)))", "1073741824"),
-    "imports": ("import absent", "3"),
-    "says": ("import pathlib; print(pathlib.Path(__file__).resolve())", "here"),
-    "reads": ('print(open("data/numbers.txt").read())', "1 2 3"),
-    "follows": ('print(open("data/link.txt").read())', "1 2 3"),
-    "peeks": ('print(open(".hidden").read())', "secret"),
-    "lists": ('import os; print(sorted(os.listdir("models")))', "['arm.xml']"),
-    "moves": (
-        "import mujoco\n"
-        'model = mujoco.MjModel.from_xml_path("models/arm.xml")\n'
-        "data = mujoco.MjData(model)\n"
-        "mujoco.mj_step(model, data, 100)\n"
-        "print(repr(float(data.qpos[0])))",
-        "0.5",
-    ),
-}
+SCRIPTS = fixture_tables("cluster_scripts")["scripts"]
 
 
 @pytest.fixture(scope="module")

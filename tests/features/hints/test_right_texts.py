@@ -48,6 +48,7 @@ def this_repository() -> Iterator[tuple[str, str]]:
             yield path.relative_to(ROOT).as_posix(), path.read_text("utf-8")
 
 
+@pytest.mark.site
 def test_right_texts_are_read_without_a_mistake_or_a_hint() -> None:
     """As far as parsing goes, so that formulas are not typeset."""
     failures, count = {}, 0
@@ -63,6 +64,7 @@ def test_right_texts_are_read_without_a_mistake_or_a_hint() -> None:
     assert count > 500
 
 
+@pytest.mark.site
 def test_names_in_right_texts_are_no_mistakes(make_course: MakeCourse) -> None:
     """In a course about MuJoCo, whose scripts make a model and its data."""
     texts = [text for _, text in right_texts() if "$$" not in text and not re.search(r"\$\S", text)]

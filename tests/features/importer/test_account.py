@@ -22,31 +22,7 @@ CONSTRUCTS = fixture_tables("imported")
 """By format."""
 TARGETS = fixture_text("documents/targets.md")
 """What roles refer to."""
-MORE: dict[str, dict[str, str]] = {
-    "myst": {
-        "_toc.yml": "format: jb-book\nroot: one\nchapters: [{file: two}]\n",
-        "_config.yml": "parse: {myst_substitutions: {mass: 3 kg}}\n",
-        "refs.bib": "@book{wa17, title = {T}, year = 1900}\n",
-        "code.py": "none = 1\nwa58 = 2\n",
-        "part.txt": "Included wa59.\n",
-        "data.csv": "1\n",
-    },
-    "quarto": {
-        "_quarto.yml": "project: {type: book}\nbook: {title: Q, chapters: [one.qmd, two.md]}\n",
-        "_part.qmd": "Included wb14.\n",
-        "refs.bib": "@book{wb24, title = {T}}\n",
-    },
-    "mkdocs": {
-        "mkdocs.yml": "site_name: M\nnav: [{One: one.md}, {Two: two.md}]\ndocs_dir: .\n",
-        "code.py": "no = 1\n# --8<-- [start:part]\nwc18 = 1\n# --8<-- [end:part]\n",
-    },
-    "mdbook": {
-        "book.toml": '[book]\ntitle = "B"\nsrc = "."\n',
-        "SUMMARY.md": "# Summary\n\n- [One](one.md)\n- [Two](two.md)\n- [Later wd13]()\n",
-        "code.rs": "// no\nwd1();\nwd2();\n// ANCHOR: wd\nwd3();\n// ANCHOR_END: wd\n",
-    },
-    "docusaurus": {"docusaurus.config.js": "module.exports = {\n  title: 'D',\n}\n"},
-}
+MORE = fixture_tables("imported_beside")["files"]
 FORMATS = {
     "myst": "one.md",
     "quarto": "one.qmd",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from coursebuild.features.importer.pandoc_tables import rewrite_tables
-from support.fixture_cases import FIXTURES, Case, check_cases
+from support.fixture_cases import FIXTURES, Case, check_cases, fixture_tables
 
 
 def rewritten(case: Case) -> str:
@@ -23,19 +23,6 @@ def test_what_pandoc_reads_as_a_table_is_one(rewriting: bool) -> None:
     check_cases(FIXTURES / "imports/pandoc_tables.md", rewritten, rewriting=rewriting)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "--- ---\n\ntext\n\n--- ---\n",
-        "Title\n-----\n\ntext\n",
-        "| a | b\n| - | -\n| c | d\n",
-        "```\n\n+---+\n| a |\n+---+\n```\n",
-        "- item\n\n  ```\n\n  a   b\n  --- ---\n  ```\n",
-        "    +---+\n    | a |\n    +---+\n",
-        "a long sentence stands here\n---- ----\n\n",
-        "words of a sentence go on\n--- --- ---\nwords of a sentence go on\n",
-        "| a single line\n",
-    ],
-)
+@pytest.mark.parametrize("text", fixture_tables("no_tables")["texts"])
 def test_what_is_no_table_stays(text: str) -> None:
     assert rewrite_tables(text, lambda line: None) == (text, 0)

@@ -10,6 +10,8 @@ import pytest
 from coursebuild.cli import main
 from support.fixture_cases import fixture_text
 
+pytestmark = pytest.mark.site
+
 TEXT = fixture_text("documents/inline_values.md")
 GLUED = fixture_text("documents/glued_values.md")
 RUNNER = """

@@ -14,7 +14,7 @@ from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.script_environment import engine_version
 from coursebuild.features.lab.compile import LabCode, compile_lab, trial_inputs
 from coursebuild.features.lab.engines.native import TRIAL, WASM, asset_digest
-from support.fixture_cases import check_lines
+from support.fixture_cases import check_lines, fixture_tables, fixture_text
 from support.lab_values import Bench, lab_of, make_lab
 
 Form: TypeAlias = Literal["statements", "setter", "expression", "target"]
@@ -63,15 +63,7 @@ FULL: dict[str, Any] = {
 }
 
 
-USE = """(m) => {
-  const env = {ctx: {}, data: {time: 7}}
-  m.setup(env)
-  m.controller(env)
-  const given = [3, 4, 5, 'a']
-  m.controls.forEach((control, i) => (control.set ? control.set(env, given[i]) : control.run(env)))
-  const all = (functions) => functions.map((f) => f(env))
-  return [env.ctx, all(m.readouts), m.plots.map(all), m.expect[0](env)]
-}"""
+USE = fixture_text("documents/used_lab.txt")
 EXPECTED_REPLY = [{"n": 1, "a": 3, "b": 4, "p": 5, "o": "a", "c": "pressed"}, [1, "it's"], [[7]], 5]
 
 
@@ -128,37 +120,10 @@ def test_data_is_json_without_the_code() -> None:
     assert (data["key"], data["stopAt"], data["seed"]) == (0, None, None)
 
 
-LAB = (
-    '{"title": "T", "model": "ball", "height": 200, "toggles": ["frames"], "note": "A note.",\n'
-    ' "setup": "ctx.a = 1", "controller": "ctx.b = 2",\n'
-    ' "controls": [{"label": "s", "min": 0, "max": 1, "value": 0.5, "param": "p"}],\n'
-    ' "readouts": [{"label": "r", "expr": "ctx.a"}],\n'
-    ' "verify": {"seconds": 0.2}}'
-)
-NEUTRAL = [
-    ("Text.", "Another text."),
-    ('"title": "T"', '"title": "Another"'),
-    ('"height": 200', '"height": 300'),
-    ('"toggles": ["frames"]', '"toggles": ["com"]'),
-    ('"note": "A note."', '"note": "Another *note*."'),
-    ('{"title"', '{ "dock": true,\n\n "title"'),
-    ('"setup": "ctx.a = ', '"setup": "ctx.a \\u003d '),
-]
+LAB = fixture_text("documents/compiled_lab.json")
+NEUTRAL = fixture_tables("lab_edits")["neutral"]
 """Edits that change nothing that a trial depends on."""
-EDITS = [
-    ('"ctx.a = ', '"ctx.a = 100 + '),
-    ("ctx.b = 2", "ctx.b = 3"),
-    ('"max": 1', '"max": 2'),
-    ('"value": 0.5', '"value": 0.6'),
-    ('"expr": "ctx.a"', '"expr": "ctx.a + 1"'),
-    ('"seconds": 0.2', '"seconds": 0.3'),
-    ('"seconds": 0.2', '"seconds": 0.2, "rtol": 0'),
-    ('"height"', '"camera": {"azimuth": 3}, "height"'),
-    ('"height"', '"seed": 3, "height"'),
-    ('"height"', '"stopAt": 3, "height"'),
-    ('"height"', '"expect": [{"t": 0, "expr": "1", "min": 1}], "height"'),
-    ('"height"', '"key": 0, "height"'),
-]
+EDITS = fixture_tables("lab_edits")["edits"]
 """Edits after which a lab must be tried again."""
 
 

@@ -28,6 +28,7 @@ from coursebuild.features.lab.equations.reference import (
     compare_values,
     evaluate,
 )
+from support.fixture_cases import fixture_text
 from support.text_cases import parse_lab
 
 PATIENCE = math.inf
@@ -164,12 +165,7 @@ def test_solution_is_that_of_the_equation(engine: EquationEngine) -> None:
         )
 
 
-BALL = """
-t = {max = 20}
-controls = [{label = "e", param = "e", min = 0.1, max = 0.9, value = 0.8}]
-states = {h = {start = 0, rate = "v"}, v = {start = 5, rate = "-10"}}
-events = [{when = "h < 0", set = {v = "-e*v"}, stop = "v < 1e-4"}]
-"""
+BALL = fixture_text("documents/equations_ball.toml")
 
 
 def test_ball_that_starts_on_the_floor_bounces_at_its_times_and_stops(

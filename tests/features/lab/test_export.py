@@ -346,18 +346,6 @@ def test_functions_and_arrays_do_what_they_do_in_v8(
     assert float(ctx.n) == pytest.approx(theirs, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        '"it\'s"',
-        "'say \"a\\n\"'",
-        "'\\u00e9\\x41\\u{1F600} é 😀'",
-        "'\\\\ \\' \\0 \\q'",
-        '`it\'s "a"\r\n$ {} \\` \\${1} \\u00e9 $`',
-        "`$${`}`}${ `{${`'`}` }`",
-        "''+``",
-        "`${(2.345).toFixed(1)} ${(-1 / 3).toFixed()} ${7}`",
-    ],
-)
+@pytest.mark.parametrize("code", fixture_tables("javascript")["texts"])
 def test_texts_are_those_of_v8(v8: Isolate, engine: EngineDescription, code: str) -> None:
     assert eval(translate_expression(engine, code, FIELDS)) == v8.call("run", code, 10.0)

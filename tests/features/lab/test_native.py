@@ -16,18 +16,13 @@ import numpy as np
 import pytest
 
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
+from support.fixture_cases import fixture_text
 from support.lab_values import BALL, Bench, make_lab
 from support.model_files import TETRAHEDRON
 
 pytestmark = pytest.mark.engine
 
-HEAP = """<mujoco><option timestep="0.002" integrator="{}"/>
-<worldbody><geom type="plane" size="2 2 .1"/>
-<body pos="0 0 .3"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
-<body pos=".05 .02 .6" euler="20 10 5"><freejoint/><geom type="box" size=".1 .08 .06"/></body>
-<body pos="-.03 0 .9"><freejoint/><geom type="sphere" size=".07"/></body>
-<body pos="1 0 .5"><joint name="slide" type="slide" damping=".1"/><geom size=".1"/></body>
-</worldbody><actuator><motor joint="slide"/></actuator></mujoco>"""
+HEAP = fixture_text("documents/heap.xml")
 SLIDING = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/><body pos="0 0 .3">
 <joint name="j" {}/><geom size=".1"/></body></worldbody><actuator>{}</actuator></mujoco>"""
 

@@ -20,12 +20,7 @@ SCRIPT = fixture_text("scripts/lab_in_short.txt")
 """What a script of a lab defines, in short."""
 FORGERY = """import os; os.write(3, b'{"error": "", "start": "forged"}\\n'); os._exit(0)"""
 """Answers in the place of the child."""
-CHILDREN = """import os, time
-    for _ in range(20):
-        if os.fork() == 0:
-            own = b"x" * (60 << 20)
-            break
-    time.sleep(60)"""
+CHILDREN = fixture_text("scripts/children.txt")
 FILE = """file = open("/many", "wb")
     while True: file.write(bytes(1 << 20))"""
 

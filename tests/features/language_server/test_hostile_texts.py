@@ -15,15 +15,11 @@ from markdown_it.token import Token
 
 from coursebuild.core.pages.marks import code_span, escape_text, fence
 from support.editor import Editor
+from support.fixture_cases import fixture_text
 from support.markdown_files import ROOT
 from support.scratch_course import Folder
 
-HOSTILE = (
-    "# <img src=x onerror=alert(1)> <!-- x --> <script>alert(1)</script> ![p](https://e.example/p.png)"
-    " [c](command:workbench.action.terminal.new) [j](javascript:alert(1)) [r][r] ``` ` ```` `b`"
-    " <https://e.example> https://e.example //e.example www.e.example a@e.example &lt;b&gt; &#60;"
-    " **b** __b__ *i* _i_ ~s~ ~~s~~ | a | $(alert) \\ \\` \\<b> [^1] [ ] \\"
-)
+HOSTILE = fixture_text("documents/hostile_words.txt")
 BREAKS = "\n\n- <b>\n\n    <i>\n\n```\n<u>\n\n[r]: command:x\n\n| a |\n| - |\r\r<s>\u2028<b>\n===\n"
 OUR_TOKENS = {"paragraph", "bullet_list", "list_item", "strong"}
 OUR_INLINES = {"inline", "text", "code_inline", "fence", "softbreak"}
@@ -86,29 +82,7 @@ MAP = "content/course.toml"
 MODEL = "models/ball.xml"
 QUOTED = "<img src=x> [c](command:x) <!-- `b` -->"
 FILE = "content/a `b` <img src=x> ![p](c).txt"
-TEXT = r"""## HOSTILE {#head}
-
-A [rotor]{term="<img src=x> [c](command:x)"} is `<img src=x>` or `` ` `` and \<img src=y> \![p](c).
-
-```python file=examples/hostile.py
-print("5.25 ``` <img src=x> ![p](c)")
-```
-
-Output:
-
-````text
-5.25 ``` <img src=x> ![p](c)
-````
-
-So `5.25`{out}.
-
-> [!bad] Title
-> Text
-
-See Level 1, [this](lesson:1.1), [its head](#head), [a page](page:evil), [the ball](model:ball),
-[what turns](term:img-srcx-ccommandx), [the script](examples/hostile.py),
-[a file](<../a `b` \<img src=x\> ![p](c).txt>).
-""".replace("HOSTILE", HOSTILE)
+TEXT = fixture_text("documents/hostile_lesson.md")
 
 
 @pytest.fixture(scope="module")

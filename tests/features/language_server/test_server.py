@@ -23,9 +23,11 @@ from support.editor_course import (
     open_course,
     wait_for_results,
 )
+from support.fixture_cases import fixture_tables
 from support.scratch_course import Folder, block, wait_until_alone
 
 pytestmark = pytest.mark.site
+CASES = fixture_tables("language_server")
 
 
 @pytest.fixture(scope="module")
@@ -181,95 +183,26 @@ def test_a_model_that_goes_is_missed(editor: Editor) -> None:
 
 # --- what things are
 
-HOVERS = [
-    (FIRST_LESSON, "$\\om|ega${symbol", "- `\\omega`: angular velocity, rad/s"),
-    (FIRST_LESSON, "I \\om|ega^2", "- `\\omega`: angular velocity, rad/s"),
-    (FIRST_LESSON, "data.qp|os[2]:", "mjtNum * qpos"),
-    (FIRST_LESSON, "data.qp|os[2]:", "shape `(nq,)`, here `(7,)`"),
-    (FIRST_LESSON, "model.opt.time|step", "timestep"),
-    (FIRST_LESSON, "mujoco.mj_st|ep(", "Advance simulation"),
-    (FIRST_LESSON, '"expr": "data.qp|os', "position"),
-    (FIRST_LESSON, "`1.0|00`{out}", "after 0.002 s at 1.000 m"),
-    (FIRST_LESSON, "[!warn|ing]", "Something that easily goes wrong, or costs dearly."),
-    (FIRST_LESSON, '"tit|le"', "`title`: "),
-    (FIRST_LESSON, 'model_path("ba|ll")', "A ball in the air."),
-    (SECOND_LESSON, "model:ba|ll", "A ball in the air.\n\n1 bodies, 1 geoms; nq = 7, nv = 6"),
-    (SECOND_LESSON, "term:mom|ent", "\n\nThe moment of inertia weighs mass by its distance."),
-    (SECOND_LESSON, "lesson:1.1#fa|ll", "**Lesson 1.1: "),
-    (SECOND_LESSON, "lesson:1.1#eq:en|ergy", "```tex\nE = m g h\n```"),
-    (SECOND_LESSON, "examples/fa|ll.py", "`examples/fall.py`, a script of 1.1"),
-    (SECOND_LESSON, "mj_st|ep(model", "mj_step(m: mujoco._structs.MjModel"),
-    (SECOND_LESSON, "`body_m|ass`", "shape `(nbody,)`"),
-    (SECOND_LESSON, "<joint dam|ping", "damping"),
-    (SECOND_LESSON, "@galilei|1638", "Galilei, Galileo (1638). Two new sciences."),
-    (SECOND_LESSON, "(#tab:fa|lls)", "Table 1.2.1: Two falls"),
-    (MAP, "stat|us =", ""),
-]
-
 
 def test_hovers(editor: Editor) -> None:
     for path in (FIRST_LESSON, SECOND_LESSON, MAP):
         editor.until(path)
     # Models are compiled beside.
     editor.wait_for(lambda: "here `(7,)`" in editor.hover_text(FIRST_LESSON, "data.qp|os[2]:"))
-    texts = [(path, needle, editor.hover_text(path, needle)) for path, needle, _ in HOVERS]
-    assert [
-        hover for hover, (*_, part) in zip(texts, HOVERS, strict=True) if part not in hover[-1]
-    ] == []
-
-
-DEFINITIONS = [
-    (FIRST_LESSON, "I \\om|ega^2", f"{FIRST_LESSON}:3"),
-    (FIRST_LESSON, "`1.0|00`{out}", f"{FIRST_LESSON}:21"),
-    (FIRST_LESSON, "`fall_d|ata`", f"{FIRST_LESSON}:13"),
-    (SECOND_LESSON, "model:ba|ll", "models/ball.xml:1"),
-    (SECOND_LESSON, "term:mom|ent", f"{FIRST_LESSON}:3"),
-    (SECOND_LESSON, "lesson:1.1#fa|ll", f"{FIRST_LESSON}:1"),
-    (SECOND_LESSON, "lesson:1.1#eq:en|ergy", f"{FIRST_LESSON}:6"),
-    (SECOND_LESSON, "examples/fa|ll.py", f"{FIRST_LESSON}:8"),
-    (SECOND_LESSON, "Lesson 1.1| and", f"{FIRST_LESSON}:1"),
-    (SECOND_LESSON, "(#li|nks)", f"{SECOND_LESSON}:1"),
-    (SECOND_LESSON, "@galilei|1638", "content/references.bib:1"),
-    (MAP, 'id = "1.|2"', f"{SECOND_LESSON}:1"),
-]
+    hovers = [(*hover, editor.hover_text(*hover[:2])) for hover in CASES["hovers"]]
+    assert [hover for hover in hovers if hover[2] not in hover[3]] == []
 
 
 def test_definitions(editor: Editor) -> None:
-    places = [(path, needle, editor.definition(path, needle)) for path, needle, _ in DEFINITIONS]
-    assert places == DEFINITIONS
+    definitions = CASES["definitions"]
+    places = [[path, needle, editor.definition(path, needle)] for path, needle, _ in definitions]
+    assert places == definitions
 
 
 # --- what may be written
 
 
-@pytest.mark.parametrize(
-    ("path", "typed", "label", "new"),
-    [
-        (SECOND_LESSON, "[x](lesson:|", "1.1", "1.1"),
-        (SECOND_LESSON, "As Lesson 1|", "1.2", "1.2"),
-        (SECOND_LESSON, "[x](model:b|", "ball", "ball"),
-        (SECOND_LESSON, "[x](term:|", "moment-of-inertia", "moment-of-inertia"),
-        (SECOND_LESSON, "[x](lesson:1.1#|", "eq:energy", "eq:energy"),
-        (SECOND_LESSON, "See [](#tab|", "tab:falls", "tab:falls"),
-        (SECOND_LESSON, "As [@gal|", "galilei1638", "galilei1638"),
-        (SECOND_LESSON, "As [see @galilei1638, p. 3; @|", "galilei1638", "galilei1638"),
-        (SECOND_LESSON, "`1`{out=|", "examples/fall.py", "examples/fall.py"),
-        (SECOND_LESSON, "It calls `mj_for|", "mj_forward", "mj_forward"),
-        (SECOND_LESSON, "In `<free|", "freejoint", "freejoint"),
-        (SECOND_LESSON, 'In `<joint axis="1 0 0" dam|', "damping", "damping"),
-        (SECOND_LESSON, "Run `coursebuild ch|", "check", "check"),
-        (SECOND_LESSON, "> [!w|", "warning", "warning"),
-        (SECOND_LESSON, "```|", "quiz", "quiz"),
-        (SECOND_LESSON, "```python\nmodel.opt.|\n```", "timestep", "timestep"),
-        (SECOND_LESSON, '```lab simlab\n{"camera": {"|}}\n```', "azimuth", '"azimuth"'),
-        (SECOND_LESSON, '```quiz\n{"questions": [{"kind": "|"}]}\n```', "mcq", '"mcq"'),
-        (SECOND_LESSON, '```quiz\n{"questions": [{"kind": "numeric", |}]}\n```', "tol", '"tol"'),
-        (MAP, "\n[[silence]]\nrule = |", "heading-skip", '"heading-skip"'),
-        (MAP, "\n[[level]]\n|", "title", "title"),
-        (MAP, '\n[[level.lesson]]\nprerequisites = ["1.1", "|', "1.2", '"1.2"'),
-        (MAP, "\n[[level.lesson]]\nstatus = |", "draft", '"draft"'),
-    ],
-)
+@pytest.mark.parametrize(("path", "typed", "label", "new"), CASES["completions"])
 def test_completions(editor: Editor, path: str, typed: str, label: str, new: str) -> None:
     editor.write(path, editor.texts[path] + "\n" + typed.replace("|", "", 1))
     item = editor.proposals(path, typed)[label]

@@ -14,25 +14,7 @@ from support.scratch_course import Folder, block
 
 MakeCourse = Callable[..., Folder]
 
-SCRIPT = block(
-    "spin.py",
-    """import json
-import time
-
-import mujoco
-import numpy as np
-
-
-def measure(height):
-    ball_speed = np.sqrt(2 * 9.81 * height)
-    return ball_speed
-
-
-model = mujoco.MjModel.from_xml_string("<mujoco/>")
-data = mujoco.MjData(model)
-print(json.dumps({"fall_time": 1}))""",
-    '{"fall_time": 1}',
-)
+SCRIPT = fixture_text("scripts/names.py.txt")
 KNOWN = fixture_text("documents/known_names.md")
 NO_CLAIMS = """
 `damping`, `page.blocks`, `reader.add("x_y")`, `pip install --user x`, `x = 1`, `a.b.c`,
@@ -40,12 +22,7 @@ NO_CLAIMS = """
 `"a_b"`, `f(`, `<x@y.org>`, `--delay-updates`, `a -> b`
 """
 WRONG = fixture_text("documents/wrong_names.md")
-OF_OTHERS = """
-`mj_data`, `mj_stp`, `mjcb_control`, `viewer.opt.flags`, `modl.nq`, `mjtJoint.mjJNT_FRE`,
-`MjSpec.from_fle`, `<joint dampng="2"/>`, `<geon/>`, `solreff="1"`, `mesure(2)`, `ball_sped`,
-`np.linalg.nrm(x)`, `time.slep(1)`, `--strct`, `examples/spim.py`, `[verify] rtoll`, `Drop`ped,
-`<mesh filename="a.stl"/>`, `mju_max(a, b)`, `mujoco.mjx.Modl`, `model.armature`
-"""
+OF_OTHERS = fixture_text("documents/names_of_others.md")
 """Names of which nobody here knows all that there are."""
 
 
@@ -79,6 +56,7 @@ def test_names_of_other_libraries_and_projects_pass(make_course: MakeCourse) -> 
     assert named_mistakes(make_course(f"## Names\n{OF_OTHERS}\n{script}")) == []
 
 
+@pytest.mark.site
 @pytest.mark.parametrize(
     "assignment",
     [

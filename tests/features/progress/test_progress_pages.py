@@ -11,6 +11,7 @@ import pytest
 from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.features.quiz.page import letter, shuffle, unit_html
 from coursebuild.features.quiz.parse import text_key
+from support.fixture_cases import fixture_tables
 from support.rendered_course import Make
 
 
@@ -108,15 +109,7 @@ def test_the_key_of_an_output_question_is_what_the_script_printed(make: Make) ->
     assert 'data-answer="two" data-compare="digits">' in html
 
 
-@pytest.mark.parametrize(
-    ("comparison", "rule"),
-    [
-        ("exact", "exact"),
-        ("digits", "digits"),
-        ("rtol=1e-6 atol=1e-12", "rtol=1e-06 atol=1e-12"),
-        ("volatile", "digits"),
-    ],
-)
+@pytest.mark.parametrize(("comparison", "rule"), fixture_tables("progress_pages")["outputs"])
 def test_an_output_question_is_graded_as_its_recording_is_compared(
     make: Make, comparison: str, rule: str
 ) -> None:
@@ -184,15 +177,6 @@ def test_letters_go_on_after_z() -> None:
     assert [letter(i) for i in (0, 25, 26, 27, 701, 702)] == ["A", "Z", "AA", "AB", "ZZ", "AAA"]
 
 
-@pytest.mark.parametrize(
-    ("unit", "html"),
-    [
-        ("kg m^2", "kg m<sup>2</sup>"),
-        ("m s^-1", "m s<sup>−1</sup>"),
-        ("N m^{-2}/x^10", "N m<sup>−2</sup>/x<sup>10</sup>"),
-        ("<b>^", "&lt;b&gt;^"),
-        ("", ""),
-    ],
-)
+@pytest.mark.parametrize(("unit", "html"), fixture_tables("progress_pages")["units"])
 def test_exponents_of_a_unit_are_raised(unit: str, html: str) -> None:
     assert unit_html(unit) == html

@@ -21,7 +21,7 @@ from support.archives import (
     packaging_schema,
     referenced_files,
 )
-from support.fixture_cases import check_lines, fixture_tables
+from support.fixture_cases import check_lines, fixture_tables, fixture_text
 from support.hostile_html import HOSTILE, REFUSED_TEXTS
 from support.qti_rules import MATHML, QTI
 from support.qti_rules import mistakes as item_mistakes
@@ -237,21 +237,7 @@ def test_package_of_hard_cases_is_whole_and_its_losses_are_reported(make_course:
 # --- edits
 
 
-EXERCISE = """\
-```exercise model
-id = "1.1-heavy"
-text = "Make it weigh $2$ kg."
-start = "<mujoco><worldbody><body><geom size='1' mass='1'/></body></worldbody></mujoco>"
-solution = "<mujoco><worldbody><body><geom size='1' mass='2'/></body></worldbody></mujoco>"
-explain = "Its mass is that of its geom."
-
-[[trials]]
-name = "it weighs 2 kg"
-expr = "model.body_mass[1]"
-min = 2
-unit = "kg"
-```
-"""
+EXERCISE = fixture_text("documents/qti_exercise.md")
 
 
 @pytest.mark.site
@@ -295,21 +281,7 @@ def test_package_follows_edits_and_names_of_other_items_stay(make_course: Make) 
     assert re.fullmatch(r"https://example\.org/c/lessons/1\.1-one\.html#a\.[0-9a-f]{8}", address)
 
 
-GOOD_ITEM = f"""\
-<assessmentItem xmlns="{QTI}" xmlns:m="http://www.w3.org/1998/Math/MathML" identifier="q" title="t"
- adaptive="false" timeDependent="false">
-<responseDeclaration identifier="RESPONSE" cardinality="single" baseType="identifier">
-<correctResponse><value>A</value></correctResponse></responseDeclaration>
-<outcomeDeclaration identifier="SCORE" cardinality="single" baseType="float"/>
-<itemBody><p>Which <b>one</b>?</p>
-<choiceInteraction responseIdentifier="RESPONSE" shuffle="false" maxChoices="1">
-<simpleChoice identifier="A">a</simpleChoice><simpleChoice identifier="B">b</simpleChoice>
-</choiceInteraction></itemBody>
-<responseProcessing><responseCondition><responseIf>
-<match><variable identifier="RESPONSE"/><correct identifier="RESPONSE"/></match>
-<setOutcomeValue identifier="SCORE"><baseValue baseType="float">1</baseValue></setOutcomeValue>
-</responseIf></responseCondition></responseProcessing>
-</assessmentItem>"""
+GOOD_ITEM = fixture_text("documents/good_item.xml")
 BAD = fixture_tables("bad_items")["replacements"]
 
 
