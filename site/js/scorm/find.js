@@ -8,14 +8,14 @@ const DEPTH = 50 // the most nested frames that are searched
  * @param {Window} window
  */
 export function findApi(window) {
-  return findAbove(window) ?? findAbove(openerOf(window)) ?? openersOfTop(window)
+  return findAbove(window) ?? findAbove(read(window, 'opener')) ?? openersOfTop(window)
 }
 
 function findAbove(window) {
   for (let depth = 0; window && depth < DEPTH; depth++) {
-    const api = apiOf(window)
+    const api = read(window, 'API')
     if (api) return api
-    const parent = parentOf(window)
+    const parent = read(window, 'parent')
     if (parent === window) return null
     window = parent
   }
@@ -26,32 +26,17 @@ function findAbove(window) {
 function openersOfTop(window) {
   let top = window
   for (let depth = 0; depth < DEPTH; depth++) {
-    const parent = parentOf(top)
+    const parent = read(top, 'parent')
     if (!parent || parent === top) break
     top = parent
   }
-  return top === window ? null : findAbove(openerOf(top))
+  return top === window ? null : findAbove(read(top, 'opener'))
 }
 
-function apiOf(window) {
+/** A property of a window; `null` where another host forbids to read it. */
+function read(window, name) {
   try {
-    return window.API ?? null
-  } catch {
-    return null
-  }
-}
-
-function parentOf(window) {
-  try {
-    return window.parent ?? null
-  } catch {
-    return null
-  }
-}
-
-function openerOf(window) {
-  try {
-    return window?.opener ?? null
+    return window?.[name] ?? null
   } catch {
     return null
   }

@@ -8,6 +8,7 @@
  * 3. Each answer goes to the platform at once, with the new points and status.
  */
 
+import { hashOf } from '../page/hash.js'
 import { grade, nameOf } from './answers.js'
 import { pack, unpack } from './suspend.js'
 
@@ -94,7 +95,7 @@ export class Visit {
 /** Whether this browser's progress belongs to another learner; from now on it belongs to this one. */
 function changesLearner(learner, course, storage) {
   const name = `${LEARNER}${course}`
-  const mark = digest(learner)
+  const mark = hashOf(learner).toString(16) // a name is not stored
   try {
     if (storage?.getItem(name) === mark) return false
     storage?.setItem(name, mark)
@@ -102,11 +103,4 @@ function changesLearner(learner, course, storage) {
   } catch {
     return true // unknown
   }
-}
-
-/** A digest that distinguishes learners without storing their names: FNV-1a, 32 bits (G. Fowler, L. Noll, K. Vo). */
-function digest(text) {
-  let hash = 0x811c9dc5
-  for (const byte of new TextEncoder().encode(text)) hash = Math.imul(hash ^ byte, 0x01000193) >>> 0
-  return hash.toString(16)
 }
