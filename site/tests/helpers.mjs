@@ -10,6 +10,11 @@ export const here = (name) => new URL(name, import.meta.url)
 export const wasm = new WebAssembly.Module(readFileSync(new URL(import.meta.resolve('@mujoco/mujoco/mujoco.wasm'))))
 export { loadMujoco }
 
+/** Of the V8 that runs trials; not every Node has it. */
+Uint8Array.prototype.toBase64 ??= function () {
+  return Buffer.from(this).toString('base64')
+}
+
 /** A new engine; most tests of a file share one. */
 export const newEngine = (log) => createEngine(loadMujoco, wasm, log)
 

@@ -9,8 +9,7 @@
  */
 
 import { cameraAxes, dot, Framing, isShown } from '../core/framing.js'
-import { packed } from './base64.js'
-import { withSmallTextures } from './record.js'
+import { packed, withSmallTextures } from './record.js'
 
 const SECONDS = 3
 const MOMENTS = 60 // at which a run is looked at
