@@ -48,13 +48,6 @@ export class Choices {
     return this.entry() !== null
   }
 
-  clear() {
-    for (const { input } of this.options) {
-      input.checked = false
-      input.disabled = false
-    }
-  }
-
   focus() {
     this.options[0]?.input.focus()
   }
