@@ -14,6 +14,8 @@
  * Coordinates are those of the camera: to the right, up, and into the picture.
  */
 
+import { dot, toLocal } from './vectors.js'
+
 const ASPECT = 1.6 // width of a view over its height
 const MARGIN = 0.9 // part of the view that the motion may fill
 const SURROUNDINGS = 0.3 // in sizes of the motion: what stands still and is nearer than this belongs in the picture
@@ -68,7 +70,6 @@ export class Framing {
     this.stillReaches = []
   }
 
-  /** Begin a run. */
   begin() {
     this.runs.push([])
   }
@@ -129,7 +130,7 @@ export class Framing {
   /** How far a geom reaches in a direction. */
   support(model, data, i, d) {
     const m = data.geom_xmat.subarray(9 * i, 9 * i + 9)
-    const local = [0, 1, 2].map((j) => m[j] * d[0] + m[3 + j] * d[1] + m[6 + j] * d[2])
+    const local = toLocal(m, d)
     const [a, b, c] = model.geom_size.subarray(3 * i, 3 * i + 3)
     const centre = dot(data.geom_xpos.subarray(3 * i, 3 * i + 3), d)
     const { SPHERE, CAPSULE, ELLIPSOID, CYLINDER } = this.kinds
@@ -199,7 +200,6 @@ export class Framing {
   }
 }
 
-export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 const furthest = (moments) => moments[0].map((_, i) => Math.max(...moments.map((moment) => moment[i])))
 const sizeOf = (reach) => Math.max(...[0, 2, 4].map((i) => reach[i] + reach[i + 1]))
 const rows = (array, start, count) => Array.from({ length: count }, (_, i) => array.subarray(3 * (start + i), 3 * (start + i) + 3))

@@ -80,16 +80,16 @@ export class Lab {
   /** Start with every control at its initial value. Controls without `init` are applied here and not at a reset. */
   start() {
     this.controls.restart()
-    this.controls.applyParams()
+    this.controls.applyAll('param')
     this.toKeyframe()
-    this.controls.applyOnce()
+    this.controls.applyAll('once')
     this.prepare()
   }
 
   /** The keyframe, the parameters, `setup`, then the controls with `init`. */
   reset() {
     this.queue = []
-    this.controls.applyParams()
+    this.controls.applyAll('param')
     this.toKeyframe()
     this.prepare()
   }
@@ -105,7 +105,7 @@ export class Lab {
 
   prepare() {
     if (this.code.setup) call(['setup'], () => this.code.setup(this.env))
-    this.controls.applyInit()
+    this.controls.applyAll('init')
     this.forget()
     this.settle()
   }
@@ -155,7 +155,6 @@ export class Lab {
     return this.controls.values
   }
 
-  /** Set a slider or a list to a value. */
   setControl(i, value) {
     this.act([i, value], () => {
       this.controls.take(i, value)
@@ -166,7 +165,6 @@ export class Lab {
     })
   }
 
-  /** Press a button. */
   press(i) {
     this.act([i], () => {
       this.engine.mj.mj_forward(this.model, this.data)
@@ -422,7 +420,7 @@ export class Lab {
     values.forEach((value, i) => {
       if (value !== null) this.controls.take(i, value)
     })
-    this.controls.applyWhere()
+    this.controls.applyAll()
     this.reset()
     if (physics === null) return
     this.physics.write(physics)

@@ -8,7 +8,8 @@
  * less than a hundredth of the picture's height counts as standing. The rectangles around the others are added up, on a grid.
  */
 
-import { cameraAxes, dot, Framing, isShown } from '../core/framing.js'
+import { cameraAxes, Framing, isShown } from '../core/framing.js'
+import { dot } from '../core/vectors.js'
 import { packed, withSmallTextures } from './record.js'
 
 const SECONDS = 3
