@@ -55,7 +55,6 @@ export function pathOf(address, scope) {
   }
 }
 
-/** The address of a path. */
 export function addressOf(path, scope) {
   return new URL(path.split('/').map(encodeURIComponent).join('/'), scope).href
 }

@@ -1,16 +1,7 @@
 /** Marks the current section in the list of contents, and keeps it in sight if the list scrolls. */
 
 /** The index of the last heading at or above `line` (px from the top of the window); -1 above the first. */
-export function currentHeading(tops, line) {
-  let low = 0
-  let high = tops.length
-  while (low < high) {
-    const middle = (low + high) >> 1
-    if (tops[middle] <= line) low = middle + 1
-    else high = middle
-  }
-  return low - 1
-}
+export const currentHeading = (tops, line) => tops.findLastIndex((top) => top <= line)
 
 /**
  * How far a list that scrolls must move so that an entry is in sight, with room for one more on either side.
@@ -38,10 +29,10 @@ export function followContents(document) {
   let isPending = false
   const mark = () => {
     isPending = false
-    const atEnd = innerHeight + scrollY >= document.documentElement.scrollHeight - 2
+    // At the end of a page the last heading in sight counts, however low it stands.
+    const atEnd = scrollY > 0 && innerHeight + scrollY >= document.documentElement.scrollHeight - 2
     const tops = pairs.map(({ heading }) => heading.getBoundingClientRect().top)
-    const index = atEnd && scrollY > 0 ? lastVisible(tops) : currentHeading(tops, innerHeight * 0.25)
-    const link = pairs[index]?.link ?? null
+    const link = pairs[currentHeading(tops, innerHeight * (atEnd ? 1 : 0.25))]?.link ?? null
     if (link === current) return
     current?.removeAttribute('aria-current')
     link?.setAttribute('aria-current', 'location')
@@ -68,9 +59,4 @@ function keepInSight(link, anyLink) {
   if (list.scrollHeight <= list.clientHeight || list.querySelector(':focus-visible')) return
   if (link) list.scrollTop += listMove(list.getBoundingClientRect(), link.getBoundingClientRect())
   else list.scrollTop = 0
-}
-
-/** At the end of a page the last heading in sight counts, however low it stands. */
-function lastVisible(tops) {
-  return currentHeading(tops, innerHeight)
 }

@@ -91,7 +91,6 @@ function* pairs(state, other) {
 /** Count the answers and lessons of a file that a state lacks. */
 const countMissing = (state, file) => [...pairs(file, state)].filter(({ entry, counterpart }) => isMissing(counterpart, entry)).length
 
-/** Count the answers and lessons of a state that are new or changed. */
 function countChanges(state, previous) {
   const counts = { answers: 0, lessons: 0 }
   for (const { kind, entry, counterpart } of pairs(state, previous)) counts[kind] += differs(entry, counterpart)

@@ -177,7 +177,6 @@ async function fetchPage(address) {
   return new DOMParser().parseFromString(await response.text(), 'text/html')
 }
 
-/** Resolve the addresses in a part of another page. */
 function resolveAddresses(part, address) {
   for (const name of ['href', 'src', 'data-config', 'data-script']) {
     for (const element of part.querySelectorAll(`[${name}]`)) {

@@ -37,7 +37,6 @@ export function emptyState() {
   return { reset: 0, answers: new Map(), lessons: new Map() }
 }
 
-/** The latest tick in a state. */
 export function latest(state) {
   let tick = state.reset
   for (const entry of entriesOf(state)) {

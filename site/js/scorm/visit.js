@@ -8,6 +8,7 @@
  * 3. Each answer goes to the platform at once, with the new points and status.
  */
 
+import { readChoice, writeChoice } from '../page/choices.js'
 import { hashOf } from '../page/hash.js'
 import { grade, nameOf } from './answers.js'
 import { pack, unpack } from './suspend.js'
@@ -51,7 +52,6 @@ export class Visit {
     this.#report()
   }
 
-  /** A question was answered. */
   answered(quiz, key, answer) {
     if (answer.lesson !== this.#lesson) return
     this.#answers.set(nameOf(quiz, key), { quiz, key, ...answer })
@@ -60,7 +60,6 @@ export class Visit {
     this.#report()
   }
 
-  /** The lesson was read. */
   wasRead() {
     if (this.#read) return
     this.#read = true
@@ -72,7 +71,6 @@ export class Visit {
     this.location = anchor
   }
 
-  /** The visit ends. */
   ends() {
     this.#report()
     this.#session.finish()
@@ -96,11 +94,7 @@ export class Visit {
 function changesLearner(learner, course, storage) {
   const name = `${LEARNER}${course}`
   const mark = hashOf(learner).toString(16) // a name is not stored
-  try {
-    if (storage?.getItem(name) === mark) return false
-    storage?.setItem(name, mark)
-    return true // also if it belongs to nobody that a platform has named
-  } catch {
-    return true // unknown
-  }
+  if (readChoice(name, storage) === mark) return false
+  writeChoice(name, mark, storage)
+  return true // also if it belongs to nobody that a platform has named, or that is unknown
 }
