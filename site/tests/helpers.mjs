@@ -1,5 +1,6 @@
 /** What the tests of the labs share: the engine under Node, models, and small labs. */
 
+import './new-in-node.mjs'
 import { readFileSync } from 'node:fs'
 import loadMujoco from '@mujoco/mujoco'
 import { createEngine } from '../js/lab/core/engine.js'
@@ -9,11 +10,6 @@ import { saveModel } from '../js/lab/trial/parity.js'
 export const here = (name) => new URL(name, import.meta.url)
 export const wasm = new WebAssembly.Module(readFileSync(new URL(import.meta.resolve('@mujoco/mujoco/mujoco.wasm'))))
 export { loadMujoco }
-
-/** Of the V8 that runs trials; not every Node has it. */
-Uint8Array.prototype.toBase64 ??= function () {
-  return Buffer.from(this).toString('base64')
-}
 
 /** A new engine; most tests of a file share one. */
 export const newEngine = (log) => createEngine(loadMujoco, wasm, log)

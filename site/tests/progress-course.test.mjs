@@ -1,5 +1,6 @@
 /** What a reader has done of a course, and where to go on; when a lesson counts as read. */
 
+import './new-in-node.mjs'
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { markOf, nextUp, overview, readQuizzes, totals } from '../js/progress/course.js'

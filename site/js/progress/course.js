@@ -4,7 +4,7 @@
  * Entry points: `readQuizzes`, `overview`, `totals`, `markOf`, `nextUp`. All of it is pure.
  */
 
-import { answersByQuiz, matchQuestions } from './match.js'
+import { matchQuestions } from './match.js'
 
 /**
  * Parse the list of a lesson's questions in a page: `ID:KEY,KEY ID:…`, ids percent-encoded.
@@ -30,7 +30,7 @@ export function readQuizzes(text) {
  *   question exists, each with the `page` that has it and the present key of the `question`
  */
 export function overview(lessons, answers, storedLessons) {
-  const byQuiz = answersByQuiz(answers)
+  const byQuiz = Map.groupBy(answers, ({ quiz }) => quiz)
   const states = new Map()
   const matchedAnswers = []
   const orphans = { answers: [], lessons: [] }

@@ -58,11 +58,9 @@ export class Framing {
     const planes = visible.filter((i) => model.geom_type[i] === this.kinds.PLANE)
     this.tilted = planes.some((i) => data.geom_xmat[9 * i + 8] < LEVEL)
     this.planes = planes.map((i) => data.geom_xpos[3 * i + 2])
-    this.trees = new Map() // the geoms of each body that may fall, with all that it carries
-    for (const i of this.movingGeoms) {
-      const root = model.body_rootid[model.geom_bodyid[i]]
-      if (model.body_mocapid[root] < 0) this.trees.set(root, [...(this.trees.get(root) ?? []), i])
-    }
+    const rootOf = (i) => model.body_rootid[model.geom_bodyid[i]]
+    const fallible = this.movingGeoms.filter((i) => model.body_mocapid[rootOf(i)] < 0)
+    this.trees = Map.groupBy(fallible, rootOf) // the geoms of each body that may fall, with all that it carries
     this.bottom = null // the depth of what the scene stands on, once a moment was observed
     this.fallen = new Map() // heights of the bodies that have fallen out of the scene
     this.runs = []

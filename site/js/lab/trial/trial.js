@@ -394,12 +394,8 @@ class Trial {
   // --- claims and the goal
 
   claims() {
-    const groups = new Map()
-    this.config.expect.forEach((claim, i) => {
-      const key = JSON.stringify(claim.after)
-      groups.set(key, [...(groups.get(key) ?? []), { ...claim, i }])
-    })
-    for (const claims of groups.values()) {
+    const numbered = this.config.expect.map((claim, i) => ({ ...claim, i }))
+    for (const claims of Map.groupBy(numbered, ({ after }) => JSON.stringify(after)).values()) {
       claims.sort((a, b) => a.t - b.t)
       this.attempt(['expect', claims[0].i], describe(claims[0].after), (lab) => this.checkClaims(lab, claims))
     }
