@@ -83,7 +83,6 @@ const plain = code()
 
 test('a lab becomes ready, shows itself, and waits', async () => {
   const bench = new Bench({ codes: { plain: code({ readouts: [({ data }) => data.qpos[2]] }) } })
-  bench.send({ type: 'warm', wasm: 'wasm' })
   await bench.load('a', { readouts: [{}] })
   assert.deepEqual(bench.messages.map(({ type }) => type), ['ready', 'frame'])
   const [ready, frame] = bench.messages

@@ -26,9 +26,7 @@ export function followContents(document) {
     .filter(({ heading }) => heading)
   if (pairs.length === 0) return () => {}
   let current = null
-  let isPending = false
   const mark = () => {
-    isPending = false
     // At the end of a page the last heading in sight counts, however low it stands.
     const atEnd = scrollY > 0 && innerHeight + scrollY >= document.documentElement.scrollHeight - 2
     const tops = pairs.map(({ heading }) => heading.getBoundingClientRect().top)
@@ -39,13 +37,10 @@ export function followContents(document) {
     current = link
     keepInSight(link, links[0])
   }
-  const schedule = () => {
-    if (!isPending) requestAnimationFrame(mark)
-    isPending = true
-  }
   const abort = new AbortController()
-  addEventListener('scroll', schedule, { passive: true, signal: abort.signal })
-  addEventListener('resize', schedule, { signal: abort.signal })
+  // Browsers send one of these events for each picture at most.
+  addEventListener('scroll', mark, { passive: true, signal: abort.signal })
+  addEventListener('resize', mark, { signal: abort.signal })
   mark()
   return () => {
     abort.abort()

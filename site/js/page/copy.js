@@ -6,7 +6,7 @@ import { selectAll } from './select.js'
 const SHOWN_FOR = 2000 // ms
 
 /** The code of a listing: all its parts, folded ones too, without its output. */
-export function codeOf(listing) {
+function codeOf(listing) {
   return [...listing.querySelectorAll('pre > code')].map((code) => code.textContent).join('')
 }
 

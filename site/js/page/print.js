@@ -6,7 +6,7 @@
 import { h } from '../lab/page/dom.js'
 
 /** A text as a string of CSS. */
-export function cssString(text) {
+function cssString(text) {
   return `"${text.replaceAll(/["\\]/g, '\\$&').replaceAll(/[\n\r\f\0]/g, ' ')}"`
 }
 

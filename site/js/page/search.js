@@ -10,14 +10,14 @@ import { loadOnce } from './scripts.js'
 const KEY = 'coursebuild.shortcuts'
 
 /** Whether shortcuts of a single key are on (WCAG 2.1.4). */
-export const singleKeys = () => readChoice(KEY) !== 'off'
+const singleKeys = () => readChoice(KEY) !== 'off'
 
 const setSingleKeys = (isOn) => writeChoice(KEY, isOn ? null : 'off')
 
 const FIELDS = 'input, textarea, select, [contenteditable]:not([contenteditable="false"]), .lab, dialog[open]'
 
 /** Whether keys belong to something else: a text field, a simulation, another dialog. */
-export const isTaken = (target) => target?.closest?.(FIELDS) != null
+const isTaken = (target) => target?.closest?.(FIELDS) != null
 
 /**
  * What a key means here: `open`, or nothing.

@@ -74,7 +74,7 @@ function joinMaps(first = new Map(), second = new Map(), mergeValues) {
 }
 
 /** Merge two entries, given the time of a reset; `undefined` if nothing is left. */
-export function mergeEntries(first = NOTHING, second = NOTHING, reset = 0) {
+function mergeEntries(first = NOTHING, second = NOTHING, reset = 0) {
   const removedAt = Math.max(first.gone, second.gone)
   const cutoff = Math.max(removedAt, reset)
   const gone = removedAt > reset ? removedAt : 0

@@ -3,12 +3,12 @@
 const DEPTH = 50 // the most nested frames that are searched
 
 /**
- * The platform's API: in this window or a parent of it, else in the window that opened this one or a parent of that; else `null`.
- * Windows of other hosts are passed over.
+ * The platform's API: in this window or a parent of it, else in the window that opened this one, or of which this one is a frame, or in a
+ * parent of that; else `null`. Windows of other hosts are passed over.
  * @param {Window} window
  */
 export function findApi(window) {
-  return findAbove(window) ?? findAbove(read(window, 'opener')) ?? openersOfTop(window)
+  return findAbove(window) ?? findAbove(read(window, 'opener')) ?? findAbove(read(read(window, 'top'), 'opener'))
 }
 
 function findAbove(window) {
@@ -20,17 +20,6 @@ function findAbove(window) {
     window = parent
   }
   return null
-}
-
-/** A platform may open a window of which this one is a frame: then the top window has the opener. */
-function openersOfTop(window) {
-  let top = window
-  for (let depth = 0; depth < DEPTH; depth++) {
-    const parent = read(top, 'parent')
-    if (!parent || parent === top) break
-    top = parent
-  }
-  return top === window ? null : findAbove(read(top, 'opener'))
 }
 
 /** A property of a window; `null` where another host forbids to read it. */

@@ -55,7 +55,7 @@ function* menuPages(document) {
 const plain = (node) => node.textContent.replace(/\s+/g, ' ').trim()
 
 /** The address of the current section. */
-export function hereAddress(document) {
+function hereAddress(document) {
   const headings = [...document.querySelectorAll('main :is(h2, h3, h4, h5, h6)[id]')]
   const current = headings.findLast((heading) => heading.getBoundingClientRect().top <= innerHeight * 0.25)
   return document.baseURI.split('#')[0] + (current ? `#${encodeURIComponent(current.id)}` : '')

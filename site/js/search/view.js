@@ -5,7 +5,7 @@ import { fill } from '../lab/page/words.js'
 import { form } from '../page/words.js'
 
 /** The nodes of a text with marks. */
-export const markedText = (parts) => parts.map(({ text, isMarked }) => (isMarked ? h('mark', {}, text) : text))
+const markedText = (parts) => parts.map(({ text, isMarked }) => (isMarked ? h('mark', {}, text) : text))
 
 /** The address of a page of the course, or of a place on it. */
 export function address(root, path, anchor = '') {

@@ -48,12 +48,6 @@ export class Connection {
     }
   }
 
-  /** Fetch and start the engine before a lab needs it. */
-  warm(wasm) {
-    if (this.worker === null) this.begin()
-    this.worker.postMessage({ type: 'warm', wasm })
-  }
-
   begin() {
     this.worker = this.start(this.url)
     this.silence = 0
