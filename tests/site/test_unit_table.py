@@ -21,7 +21,7 @@ _SYMBOLS |= {"substance": "mol", "luminosity": "cd", "angle": "rad"}
 
 
 def page_units() -> dict[str, list[Any]]:
-    """Of each symbol scale, powers, and whether it takes prefixes; a revolution is an angle here."""
+    """Of each symbol scale, powers, whether it takes prefixes; a revolution is an angle here."""
     table: dict[str, list[Any]] = {}
     for symbol, row in UNITS.items():
         units = find_symbol(symbol)
