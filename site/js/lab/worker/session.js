@@ -281,7 +281,7 @@ const HANDLERS = {
     session.stale = true
   },
   examine(session, { part }) {
-    session.lab.panel?.choose(part)
+    if (session.lab.panel !== null) session.lab.panel.part = part
     session.stale = true
   },
   actuate: (session, { index, value, play }) => session.act((lab) => lab.actuate(index, value), play),
