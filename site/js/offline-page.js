@@ -5,12 +5,11 @@
  */
 
 import { h } from './lab/page/dom.js'
-import { fill as fillIn } from './lab/page/words.js'
 import { FILES, groupsFor, isSparing, parseList } from './offline/list.js'
 import { Store } from './offline/store.js'
 import { activeWorker, storeChoice, storedChoice, visit, workingRoot } from './page/offline.js'
 import { decode } from './page/unfold.js'
-import { readWords } from './page/words.js'
+import { fill as fillIn, readWords } from './page/words.js'
 
 const words = readWords(document)
 const CHOICES = ['read', 'text', 'all', 'none']

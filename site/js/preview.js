@@ -12,7 +12,7 @@ import { Marks } from './preview/marks.js'
 import { Panel } from './preview/panel.js'
 import { setClock } from './preview/times.js'
 import { Twin } from './preview/twin.js'
-import { say } from './progress/words.js'
+import { say } from './page/words.js'
 
 const script = document.currentScript
 const page = script.dataset.page

@@ -18,7 +18,7 @@ import {
 } from '../js/lab/page/numbers.js'
 import { LONGEST, readLink, writeLink } from '../js/lab/page/share.js'
 import { spread } from '../js/lab/page/span.js'
-import { fill } from '../js/lab/page/words.js'
+import { fill } from '../js/page/words.js'
 
 test('numbers keep their width when the sign changes, and zero has none', () => {
   assert.equal(formatNumber(-6, 3), '−6.000')

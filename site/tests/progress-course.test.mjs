@@ -5,7 +5,7 @@ import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { markOf, nextUp, overview, readQuizzes, totals } from '../js/progress/course.js'
 import { Reading } from '../js/progress/reading.js'
-import { say } from '../js/progress/words.js'
+import { say } from '../js/page/words.js'
 import { answer } from './progress-helpers.mjs'
 
 const given = (quiz, key, own = {}) => ({ quiz, key, ...answer(own) })

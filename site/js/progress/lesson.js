@@ -5,7 +5,7 @@ import { currentHeading } from '../page/contents.js'
 import { textWithout } from '../page/select.js'
 import { Reading } from './reading.js'
 import { sign } from './signs.js'
-import { say } from './words.js'
+import { say } from '../page/words.js'
 
 const SECOND = 1000
 const FIRST_NOTE = 5 // seconds before a place is recorded

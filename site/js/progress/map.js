@@ -8,7 +8,7 @@ import { h } from '../lab/page/dom.js'
 import { textWithout } from '../page/select.js'
 import { markOf, nextUp, overview, readQuizzes, totals } from './course.js'
 import { sign } from './signs.js'
-import { say } from './words.js'
+import { say } from '../page/words.js'
 
 /** The lessons that a page lists: their rows, in order. */
 export function readRows(part) {

@@ -12,7 +12,7 @@ import { memoize } from '../page/scripts.js'
 import { overview } from './course.js'
 import { readRows } from './map.js'
 import { agenda } from './schedule.js'
-import { say } from './words.js'
+import { say } from '../page/words.js'
 
 const PAGES = 50 // that are kept
 

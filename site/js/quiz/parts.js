@@ -1,7 +1,7 @@
 /** Small parts that all kinds of questions share. */
 
 import { h, pictogram } from '../lab/page/dom.js'
-import { fill } from '../lab/page/words.js'
+import { fill } from '../page/words.js'
 
 export { fill, h }
 

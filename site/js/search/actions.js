@@ -2,7 +2,7 @@
  * The actions of a page: commands made from its elements, and lessons by their number.
  */
 
-import { fill } from '../lab/page/words.js'
+import { fill } from '../page/words.js'
 import { termsOf } from './words.js'
 
 /** The commands of a page, each with an id and a title; `href` is its target, `run` does it and may return a message. */

@@ -4,7 +4,7 @@
  */
 
 import { h } from '../lab/page/dom.js'
-import { fill } from '../lab/page/words.js'
+import { fill } from '../page/words.js'
 import { matchActions, pagesByNumber, pageActions } from './actions.js'
 import { forgetQueries, noteQuery, recentQueries } from './recent.js'
 import { address, hitParts, pageTitle, summary } from './view.js'

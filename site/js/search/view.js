@@ -1,8 +1,7 @@
 /** Shows results as elements. Texts from the index become text nodes; none is parsed as HTML. */
 
 import { h } from '../lab/page/dom.js'
-import { fill } from '../lab/page/words.js'
-import { form } from '../page/words.js'
+import { fill, say } from '../page/words.js'
 
 /** The nodes of a text with marks. */
 const markedText = (parts) => parts.map(({ text, isMarked }) => (isMarked ? h('mark', {}, text) : text))
@@ -40,7 +39,7 @@ export function hitParts({ trail, excerpt }) {
 /** The number of results, in words. */
 export function summary(result, strings) {
   if (result.count === 0) return fill(strings.none, { query: result.query })
-  const count = fill(form((key) => strings[key] ?? key, 'count', result.count), { n: result.count })
+  const count = say((key) => strings[key] ?? key, 'count', { n: result.count })
   const quoted = result.instead.map((word) => fill(strings.quoted, { word })).join(`${strings.comma} `)
   const instead = quoted ? fill(strings.instead, { words: quoted }) : ''
   return [`${count}.`, instead, result.complete ? '' : strings.part_failed].filter(Boolean).join(' ')

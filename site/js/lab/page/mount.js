@@ -3,7 +3,7 @@
 import { holdPlace, inSight } from '../../page/place.js'
 import { h } from './dom.js'
 import { readLink } from './share.js'
-import { fill } from './words.js'
+import { fill } from '../../page/words.js'
 
 /**
  * Put a live instrument in place of a lab's static form, which stays if the lab cannot run.
