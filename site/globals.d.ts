@@ -9,4 +9,5 @@ interface Navigator {
 interface DocumentEventMap {
   'coursebuild:answered': CustomEvent
   'coursebuild:changed': CustomEvent
+  'coursebuild:reading': CustomEvent
 }

@@ -15,10 +15,5 @@ import { mount } from './lab/page/mount.js'
  * @param {Record<string, any> | null} progress where reached goals are kept, see progress/store.js
  */
 export function mountLab(element, texts, progress = null) {
-  return mount(
-    element,
-    texts,
-    () => null,
-    (config, _, words) => new Desk(element, config, words, progress),
-  )
+  return mount(element, texts, (config, _, words) => new Desk(element, config, words, progress))
 }

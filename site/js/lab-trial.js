@@ -21,7 +21,6 @@ import { judge } from './exercise/judge.js'
 import { createEngine } from './lab/core/engine.js'
 import { Lab } from './lab/core/lab.js'
 import { current } from './lab/core/piece.js'
-import { fromBase64 } from './lab/trial/base64.js'
 import { Guard } from './lab/trial/guard.js'
 import { played } from './lab/trial/motion.js'
 import { lookUp } from './lab/trial/names.js'
@@ -64,7 +63,7 @@ globalThis.booted = () => {
 
 globalThis.trial = (json) => {
   const request = JSON.parse(json)
-  const bytes = request.mjb === undefined ? new Uint8Array(buffers.get('mjb')) : fromBase64(request.mjb)
+  const bytes = request.mjb === undefined ? new Uint8Array(buffers.get('mjb')) : /** @type {any} */ (Uint8Array).fromBase64(request.mjb)
   output.length = 0
   guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
   const now = () => {

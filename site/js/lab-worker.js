@@ -37,7 +37,7 @@ async function get(url) {
 /**
  * Judge an attempt in a worker that the page has started for it, which the page ends if it takes too long.
  *
- * To the worker: judge {config, module, mjb, wasm}; the last three are absolute addresses. To the page:
+ * To the worker: judge {lab, config, module, mjb, wasm}; the last three are absolute addresses. To the page:
  *
  *   judging                                the engine has started
  *   verdict {index, passed, seen, failure} of a trial, in their order (see judge.js)
@@ -46,9 +46,9 @@ async function get(url) {
  *
  * @param {Record<string, any>} message
  */
-async function judgeHere({ config, module, mjb, wasm }) {
+async function judgeHere({ lab, config, module, mjb, wasm }) {
   const { post, fetchBytes, importModule } = host.services
-  const tell = (type, rest = {}) => post({ type, ...rest }, [])
+  const tell = (type, rest = {}) => post({ type, lab, ...rest }, [])
   try {
     const model = config.exercise.subject === 'model' ? null : fetchBytes(mjb)
     const [engine, code, bytes] = await Promise.all([host.start(wasm), importModule(module), model])

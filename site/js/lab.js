@@ -8,7 +8,6 @@ import { Exercise } from './exercise/page.js'
 import { mountCustom } from './lab/page/custom.js'
 import { Instrument } from './lab/page/instrument.js'
 import { mount } from './lab/page/mount.js'
-import { missingFeature } from './lab/page/support.js'
 import { Workbench, openEditor } from './lab/page/workbench.js'
 
 /**
@@ -19,7 +18,8 @@ import { Workbench, openEditor } from './lab/page/workbench.js'
  * @param {Record<string, any> | null} progress where reached goals and solved exercises are kept, see progress/store.js
  */
 export function mountLab(element, texts, progress = null) {
-  return mount(element, texts, missingFeature, (config, base, words) => {
+  return mount(element, texts, (config, base, words) => {
+    if (typeof WebAssembly !== 'object') throw new Error(words('lab.live.no_wasm'))
     const { exercise } = element.dataset
     if (exercise) return new Exercise(element, { ...config, exercise: JSON.parse(exercise) }, base, words, progress)
     const Kind = { simlab: Instrument, mjcf: Workbench }[config.kind ?? 'simlab']

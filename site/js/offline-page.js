@@ -4,10 +4,12 @@
  * Loaded by that page only. Without it the page says that nothing is stored.
  */
 
+import { h } from './lab/page/dom.js'
 import { FILES, groupsFor, isSparing, parseList } from './offline/list.js'
 import { Store } from './offline/store.js'
 import { activeWorker, storeChoice, storedChoice, visit, workingRoot } from './page/offline.js'
-import { readWords } from './page/words.js'
+import { decode } from './page/unfold.js'
+import { fill as fillIn, readWords } from './page/words.js'
 
 const words = readWords(document)
 const CHOICES = ['read', 'text', 'all', 'none']
@@ -20,9 +22,7 @@ if (root && place) {
   if (window.caches) begin(place).catch(({ message }) => say(place, fill('failed', { message })))
 }
 
-function fill(key, values) {
-  return words(`offline.live.${key}`).replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole)
-}
+const fill = (key, values) => fillIn(words(`offline.live.${key}`), values)
 
 /** Show the page that could not be shown, with a link to it; go there as soon as there is a network. */
 function nameMissing(place) {
@@ -30,35 +30,15 @@ function nameMissing(place) {
   if (!failedAddress) return
   const url = new URL(failedAddress, location.href)
   if (url.origin !== location.origin || !url.pathname.startsWith(root.pathname)) return
-  const paragraph = document.createElement('p')
-  paragraph.className = 'keep-missing'
-  const address = document.createElement('span')
-  address.className = 'keep-address'
-  address.textContent = readable(url)
-  const link = document.createElement('a')
-  link.href = url.href
-  link.textContent = words('offline.live.retry')
-  paragraph.append(words('offline.live.missing'), ' ', address, ' ', link)
-  place.before(paragraph)
+  const address = h('span', { class: 'keep-address' }, decode(url.pathname) + url.search)
+  const link = h('a', { href: url.href }, words('offline.live.retry'))
+  place.before(h('p', { class: 'keep-missing' }, words('offline.live.missing'), ' ', address, ' ', link))
   window.addEventListener('online', () => location.replace(url.href))
-}
-
-function readable({ pathname, search }) {
-  try {
-    return decodeURIComponent(pathname) + search
-  } catch {
-    return pathname + search
-  }
 }
 
 async function begin(place) {
   const store = new Store(window.caches, root.href)
-  if (storedChoice(document) !== 'none') await keepUp(place, store, () => offer(place, store))
-  else await listOnly(place, store)
-}
-
-/** Offer the choices while nothing is stored. */
-async function listOnly(place, store) {
+  if (storedChoice(document) !== 'none') return keepUp(place, store, () => offer(place, store))
   await offer(place, store)
   say(place, words('offline.live.never'))
 }
@@ -87,28 +67,13 @@ async function offer(place, store) {
   const list = await newestList(store)
   const currentChoice = storedChoice(document)
   const automatic = list && groupsFor('auto', list, isSparing(navigator.connection)).includes('text') ? 'text' : 'read'
-  const group = document.createElement('fieldset')
-  const legend = document.createElement('legend')
-  legend.textContent = words('offline.live.legend')
-  group.append(legend)
-  for (const choice of CHOICES) {
-    const label = document.createElement('label')
-    const button = document.createElement('input')
-    button.type = 'radio'
-    button.name = 'keep'
-    button.value = choice
-    button.checked = choice === (currentChoice === 'auto' ? automatic : currentChoice)
-    button.addEventListener('change', () => choose(place, store, choice))
+  const labels = CHOICES.map((choice) => {
+    const checked = choice === (currentChoice === 'auto' ? automatic : currentChoice)
+    const button = h('input', { type: 'radio', name: 'keep', value: choice, checked, onchange: () => choose(place, store, choice) })
     const size = list ? megabytes((SIZES[choice] ?? []).reduce((sum, name) => sum + list.bytes[name], 0)) : '…'
-    const text = document.createElement('span')
-    text.textContent = fill(choice, { size })
-    label.append(button, text)
-    group.append(label)
-  }
-  const status = document.createElement('p')
-  status.className = 'keep-status'
-  status.setAttribute('role', 'status')
-  place.replaceChildren(group, status)
+    return h('label', {}, button, h('span', {}, fill(choice, { size })))
+  })
+  place.replaceChildren(h('fieldset', {}, h('legend', {}, words('offline.live.legend')), ...labels), makeStatus())
 }
 
 async function newestList(store) {
@@ -139,12 +104,12 @@ function megabytes(bytes) {
   return number.format(Math.max(bytes / 1e6, 0.1)).replaceAll(' ', '\u00a0')
 }
 
+const makeStatus = () => h('p', { class: 'keep-status', role: 'status' })
+
 function say(place, text) {
   let status = place.querySelector('.keep-status')
   if (!status) {
-    status = document.createElement('p')
-    status.className = 'keep-status'
-    status.setAttribute('role', 'status')
+    status = makeStatus()
     place.append(status)
   }
   if (status.textContent !== text) status.textContent = text

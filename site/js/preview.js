@@ -5,13 +5,14 @@
  * still as the server sent it.
  */
 
+import { h } from './lab/page/dom.js'
 import { holdPlace } from './page/place.js'
 import { connect } from './preview/connection.js'
 import { Marks } from './preview/marks.js'
 import { Panel } from './preview/panel.js'
 import { setClock } from './preview/times.js'
 import { Twin } from './preview/twin.js'
-import { say } from './progress/words.js'
+import { say } from './page/words.js'
 
 const script = document.currentScript
 const page = script.dataset.page
@@ -42,7 +43,7 @@ async function take() {
       const response = await fetch(location.href, { cache: 'no-store' })
       const next = parse(await response.text())
       const fresh = stateOf(next)
-      if (state === '' || needsLoad(head, next)) return location.reload()
+      if (state === '' || scripts(head) !== scripts(next)) return location.reload()
       if (fresh === '') break // the page is gone again; a message will follow
       change(next)
       state = fresh
@@ -75,11 +76,6 @@ async function ask(command, values) {
   }
 }
 
-/** Whether the page must be loaded as a whole. */
-function needsLoad(old, next) {
-  return scripts(old) !== scripts(next)
-}
-
 /** Take over a new page's title, language and style sheet. Its scripts cannot be taken over. */
 function takeHead(next) {
   document.title = next.title
@@ -95,11 +91,7 @@ async function takeSheet(address) {
   old.dataset.next = address
   await loadFonts(new URL(address, document.baseURI)).catch(() => {})
   if (old.dataset.next !== address) return // there is a newer one
-  const fresh = document.createElement('link')
-  fresh.rel = 'stylesheet'
-  fresh.href = address
-  fresh.addEventListener('load', () => old.remove())
-  fresh.addEventListener('error', () => fresh.remove())
+  const fresh = h('link', { rel: 'stylesheet', href: address, onload: () => old.remove(), onerror: () => fresh.remove() })
   old.after(fresh)
 }
 
@@ -108,16 +100,6 @@ async function loadFonts(address) {
   const fonts = [...text.matchAll(/url\(["']?([^"')]+\.woff2)["']?\)/g)].map(([, file]) => new URL(file, address))
   await Promise.all(fonts.map(async (font) => (await fetch(font)).arrayBuffer()))
 }
-
-/** Unregister service workers that a published site left at this address, so that they do not answer for the preview. */
-async function dismissWorkers(navigator) {
-  const registrations = (await navigator.serviceWorker?.getRegistrations()) ?? []
-  const scripts = (registration) => [registration.active, registration.waiting, registration.installing].filter(Boolean)
-  const isSiteWorker = (registration) => scripts(registration).some(({ scriptURL }) => new URL(scriptURL).pathname.endsWith('/service-worker.js'))
-  await Promise.all(registrations.filter(isSiteWorker).map((registration) => registration.unregister()))
-}
-
-dismissWorkers(navigator).catch(() => {}) // a browser may hide them from pages
 
 connect(page, {
   hello(greeting) {

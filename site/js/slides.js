@@ -6,6 +6,7 @@
  * in a page from disk, workers can fetch no others.
  */
 
+import { h } from './lab/page/dom.js'
 import { linkedLab, loadLabs } from './page/labs.js'
 import { mountQuizzes } from './page/quizzes.js'
 import { markScrolling } from './page/scroll.js'
@@ -22,14 +23,8 @@ const PRESSED = 'a, button, summary, [role="button"]'
 const words = readWords(document)
 const slides = [...document.querySelectorAll('.slide')]
 const isRightToLeft = document.documentElement.dir === 'rtl'
-const counter = document.createElement('span')
-const [back, on] = ['previous', 'next'].map((name) => {
-  const button = document.createElement('button')
-  button.type = 'button'
-  button.className = `slides-${name}`
-  button.setAttribute('aria-label', words(`slides.${name}`))
-  return button
-})
+const counter = h('span')
+const [back, on] = ['previous', 'next'].map((name) => h('button', { type: 'button', class: `slides-${name}`, 'aria-label': words(`slides.${name}`) }))
 let current = -1
 
 /** Show a slide, and move the focus to it, so that it is read aloud. */
@@ -93,13 +88,9 @@ function press(event) {
 }
 
 function addControls() {
-  const bar = document.createElement('nav')
-  bar.className = 'slides-bar'
-  bar.setAttribute('aria-label', words('slides.label'))
-  bar.append(back, counter, on)
   back.addEventListener('click', () => go(current - 1))
   on.addEventListener('click', () => go(current + 1))
-  document.body.append(bar)
+  document.body.append(h('nav', { class: 'slides-bar', 'aria-label': words('slides.label') }, back, counter, on))
 }
 
 /** A file in the page, unpacked. */

@@ -1,5 +1,6 @@
 /** What the tests of the labs share: the engine under Node, models, and small labs. */
 
+import './new-in-node.mjs'
 import { readFileSync } from 'node:fs'
 import loadMujoco from '@mujoco/mujoco'
 import { createEngine } from '../js/lab/core/engine.js'

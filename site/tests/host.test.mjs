@@ -83,7 +83,6 @@ const plain = code()
 
 test('a lab becomes ready, shows itself, and waits', async () => {
   const bench = new Bench({ codes: { plain: code({ readouts: [({ data }) => data.qpos[2]] }) } })
-  bench.send({ type: 'warm', wasm: 'wasm' })
   await bench.load('a', { readouts: [{}] })
   assert.deepEqual(bench.messages.map(({ type }) => type), ['ready', 'frame'])
   const [ready, frame] = bench.messages
@@ -435,6 +434,4 @@ test('a model without code starts from its first keyframe, and says what it offe
   assert.deepEqual([...bench.of('frame').at(-1).panel.ctrl], [0.5])
   bench.send({ type: 'state', lab: 'a' })
   assert.ok([...bench.of('state')[0].state.physics].includes(3))
-  bench.send({ type: 'keyframe', lab: 'a', index: 4 })
-  assert.equal(bench.of('error').at(-1).kind, 'refused')
 })

@@ -89,7 +89,7 @@ test('a worker of one lab ends with it, and when it does not answer', (t) => {
   assert.ok(!workers[1].ended, 'it answers')
   t.mock.timers.tick(60_000)
   assert.ok(workers[1].ended)
-  assert.deepEqual(got, ['worker'], 'told once')
+  assert.deepEqual(got, ['silent'], 'told once')
   assert.equal(workers[0].sent.filter(({ type }) => type === 'ping').length, 0)
   line.close()
 })

@@ -11,7 +11,7 @@ const filled = (history, count, dt = 0.01) => {
 }
 
 test('samples come out in order, each trace from its place', () => {
-  const [times, a, b] = filled(new History(2, null), 3, 1).table()
+  const [times, a, b] = filled(new History(2, null), 3, 1).columns
   assert.deepEqual(
     [[...times], [...a], [...b]],
     [
@@ -24,7 +24,7 @@ test('samples come out in order, each trace from its place', () => {
 
 test('a window keeps one sample before it, however long the run', () => {
   const history = filled(new History(2, 5), 100_000)
-  const [times, a] = history.table()
+  const [times, a] = history.columns
   assert.ok(times[0] < history.last - 5 && times[1] >= history.last - 5 - 1e-9)
   assert.equal(a[a.length - 1], 99_999)
   assert.ok(times.every((time, i) => i === 0 || time > times[i - 1]))
@@ -33,7 +33,7 @@ test('a window keeps one sample before it, however long the run', () => {
 
 test('a plot of everything thins out and still spans the whole run', () => {
   const history = filled(new History(2, null), 50_000)
-  const [times, a, b] = history.table()
+  const [times, a, b] = history.columns
   assert.ok(history.length > 1500 && history.length <= 4000, String(history.length))
   assert.equal(times[0], 0)
   assert.ok(history.last > 499)
@@ -62,7 +62,7 @@ test('what comes after a time is dropped, and a window is filled again from the 
   whole.cut(4.005)
   recent.refill(whole, 4.005 - 2)
   for (const history of [whole, recent]) assert.ok(Math.abs(history.last - 4) < 1e-9)
-  assert.ok(Math.abs(recent.table()[0][0] - 2.01) < 1e-9)
+  assert.ok(Math.abs(recent.columns[0][0] - 2.01) < 1e-9)
   recent.push(4.01, [9, 7, 8], 1)
   assert.deepEqual(recent.at(4.01), [7, 8])
   whole.cut(-1)

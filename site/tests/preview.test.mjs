@@ -4,7 +4,7 @@ import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { align, inOrder } from '../js/preview/align.js'
 import { editorLink, summary } from '../js/preview/panel.js'
-import { difference } from '../js/preview/text.js'
+import { difference } from '../js/preview/twin.js'
 import { setClock, timesOf } from '../js/preview/times.js'
 
 const same = (a, b) => a === b

@@ -1,10 +1,11 @@
 /** What a reader has done of a course, and where to go on; when a lesson counts as read. */
 
+import './new-in-node.mjs'
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { markOf, nextUp, overview, readQuizzes, totals } from '../js/progress/course.js'
 import { Reading } from '../js/progress/reading.js'
-import { say } from '../js/progress/words.js'
+import { say } from '../js/page/words.js'
 import { answer } from './progress-helpers.mjs'
 
 const given = (quiz, key, own = {}) => ({ quiz, key, ...answer(own) })

@@ -155,7 +155,7 @@ test('the API is found in windows above and in the one that opened this one, and
   assert.equal(findApi(alone), API)
   const popup = { opener: top }
   popup.parent = popup
-  assert.equal(findApi({ parent: popup }), API)
+  assert.equal(findApi({ parent: popup, top: popup }), API)
   const circle = {}
   circle.parent = { parent: circle }
   assert.equal(findApi(circle), null)

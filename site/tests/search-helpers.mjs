@@ -1,7 +1,8 @@
 /** An index made under Node, as the build makes one, so that the tests of the search need no build. */
 
 import { openPage } from '../js/search/sections.js'
-import { hashOf, isFuzzy, shelfOf, termsOf } from '../js/search/words.js'
+import { hashOf } from '../js/page/hash.js'
+import { isFuzzy, shelfOf, termsOf } from '../js/search/words.js'
 import { lexicon } from '../js/search/spelling.js'
 import { readShard } from '../js/search/index.js'
 

@@ -3,7 +3,8 @@ import { readFileSync } from 'node:fs'
 import test from 'node:test'
 import { pageFile, readPages, readShard, shardFile } from '../js/search/index.js'
 import { distance, lexicon, likelyTerms, tolerance } from '../js/search/spelling.js'
-import { hashOf, isFuzzy, placesOf, shelfOf, termsOf, wordsOf } from '../js/search/words.js'
+import { hashOf } from '../js/page/hash.js'
+import { isFuzzy, placesOf, shelfOf, termsOf, wordsOf } from '../js/search/words.js'
 import { encoded } from './search-helpers.mjs'
 
 const agreed = JSON.parse(readFileSync(new URL('search-words.json', import.meta.url)))

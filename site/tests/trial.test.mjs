@@ -2,7 +2,6 @@
 
 import assert from 'node:assert/strict'
 import { before, test } from 'node:test'
-import { fromBase64, toBase64 } from '../js/lab/trial/base64.js'
 import { crc32 } from '../js/lab/trial/parity.js'
 import { Guard } from '../js/lab/trial/guard.js'
 import { runTrial } from '../js/lab/trial/trial.js'
@@ -395,7 +394,7 @@ test('what parity needs: the start, what a controller wrote, and the way', () =>
   const { main } = attempt(PENDULUM, { key: 'up' }, { controller: 'data.ctrl[0] = Math.round(5 * data.time) % 2' }, { seconds: 1 })
   const { parity } = main
   const array = ({ type, data }) => {
-    const bytes = fromBase64(data)
+    const bytes = Uint8Array.from(Buffer.from(data, 'base64'))
     const kinds = { f64: Float64Array, i32: Int32Array, u32: Uint32Array }
     return [...new kinds[type](bytes.buffer, bytes.byteOffset, bytes.byteLength / kinds[type].BYTES_PER_ELEMENT)]
   }
@@ -411,17 +410,6 @@ test('what parity needs: the start, what a controller wrote, and the way', () =>
   const changing = attempt(PENDULUM, {}, { controller: 'model.dof_damping[0] = data.time' }, { seconds: 0.1 })
   assert.equal(changing.main.parity.modelChanged, true)
   assert.equal(attempt(PENDULUM, {}, {}, { seconds: 0.1, parity: false }).main.parity, null)
-})
-
-test('base64 there and back, with and without the functions of the engine', () => {
-  assert.equal(toBase64(new Uint8Array([])), '')
-  for (const length of [0, 1, 2, 3, 4, 255, 0x3000, 0x3001, 100_000]) {
-    const bytes = Uint8Array.from({ length }, (_, i) => (i * 167 + (i >> 8)) & 255)
-    const text = toBase64(bytes)
-    assert.equal(text, Buffer.from(bytes).toString('base64'))
-    assert.deepEqual(fromBase64(text), bytes)
-  }
-  assert.equal(toBase64(new Float64Array([1.5]).subarray(0, 1)), Buffer.from(new Float64Array([1.5]).buffer).toString('base64'))
 })
 
 test('CRC-32 is that of zlib', () => {

@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping
-from http import HTTPStatus
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from coursebuild.core.engine.store import Store
 from coursebuild.pipeline.options import Options
-from coursebuild.preview.answers import PREFIX, Answers
 from coursebuild.preview.server import PreviewServer
 from coursebuild.preview.session import Session
 from support.built_sites import Site
@@ -307,38 +305,23 @@ class FolderSession(Session):
         return file.read_bytes() if file.is_file() else None
 
 
-class OneScript(Answers):
-    """Answers of which one script is empty: that of the page, or the worker's."""
-
-    def __init__(self, session: Session, script: str) -> None:
-        super().__init__(session)
-        self.empty = "/service-worker.js" if script == "preview.js" else f"{PREFIX}preview.js"
-
-    def find(self, path: str) -> tuple[HTTPStatus, str, bytes]:
-        status, kind, data = super().find(path)
-        return status, kind, b"" if path.endswith(self.empty) else data
-
-
-@pytest.mark.parametrize("script", ["preview.js", "worker.js"])
 def test_preview_is_never_shown_from_what_a_site_kept_at_its_address(
-    context: BrowserContext, offline_course: Folder, tmp_path: Path, script: str
+    context: BrowserContext, offline_course: Folder, tmp_path: Path
 ) -> None:
-    """Either of two things sees the worker off: the page's script, and the worker in its place."""
+    """The worker that the preview serves in its place sees it off."""
     shutil.copytree(offline_course.root / "first", tmp_path / "site")
     host = Host(tmp_path / "site")
     page, _ = settled_page(context, host)
     host.stop()
     session = FolderSession(Options(host.folder, 1, Store(host.folder)))
     preview = PreviewServer("127.0.0.1", int(host.url.split(":")[2].strip("/")), session)
-    preview.answers = OneScript(session, script)
     preview.start()
     try:
         page.goto(f"{host.url}{FIRST}?token={preview.access.token}")
         page.wait_for_url(host.url + FIRST)  # the link let the browser in
         left = "navigator.serviceWorker.getRegistrations().then(all => all.length === 0)"
         until(page, left)
-        if script == "worker.js":
-            until(page, "caches.keys().then(names => names.length === 0)")
+        until(page, "caches.keys().then(names => names.length === 0)")
         page.clock.install()
         page.goto(host.url + SECOND)
         page.clock.run_for(10_000)

@@ -4,15 +4,13 @@
  * The simulation runs in a dedicated worker, as that of a model which readers edit; the trials in one more.
  */
 
+import { Connection } from '../lab/page/connection.js'
 import { h, textButton } from '../lab/page/dom.js'
 import { Editor } from '../lab/page/editor.js'
 import { Instrument } from '../lab/page/instrument.js'
 import { formatReadout, withUnit } from '../lab/page/numbers.js'
 import { sign } from '../progress/signs.js'
 import { formulaCode } from './formula.js'
-
-const STARTING = 60_000 // ms for the engine to arrive and start
-const PATIENCE = 10_000 // ms for one trial
 
 export class Exercise extends Instrument {
   constructor(element, config, base, words, progress = null) {
@@ -173,9 +171,7 @@ export class Exercise extends Instrument {
     const { button, t } = this.config.exercise.trials[i]
     this.load(this.checkedText)
     ;[...this.readouts.element.children].forEach((row, n) => (row.hidden = n !== i))
-    this.whenReady(() => {
-      this.simulation.replay({ values: this.initial, events: button === null ? [] : [[0, button]], end: t })
-    })
+    this.simulation.replay({ values: this.initial, events: button === null ? [] : [[0, button]], end: t })
     this.body.querySelector('.lab-stage').scrollIntoView({ block: 'nearest' })
   }
 
@@ -195,33 +191,14 @@ export class Exercise extends Instrument {
  *   `end`: after all verdicts; else with what is wrong, which is empty if it took too long
  * @returns {() => void} ends it without a word
  */
-function judgeAttempt({ worker: address, module, mjb, wasm }, config, on) {
-  const worker = new Worker(address, { type: 'module', name: 'exercise' })
-  let timer = 0
-  const stop = () => {
-    clearTimeout(timer)
-    worker.terminate()
-  }
-  const end = (problem) => {
-    stop()
-    on.end(problem)
-  }
-  const wait = (ms) => {
-    clearTimeout(timer)
-    timer = setTimeout(() => end(''), ms)
-  }
-  worker.onmessage = ({ data: { type, index, message, ...verdict } }) => {
-    if (type === 'judged') return end(null)
-    if (type === 'refused') return end(message)
-    wait(PATIENCE)
-    if (type === 'verdict') on.verdict(index, verdict)
-    else if (type === 'judging') on.begun()
-  }
-  worker.onerror = (event) => {
-    event.preventDefault?.()
-    end(event.message ?? 'the worker does not start')
-  }
-  wait(STARTING)
-  worker.postMessage({ type: 'judge', config, module, mjb, wasm })
-  return stop
+function judgeAttempt({ worker, ...addresses }, config, on) {
+  const line = new Connection(`${worker}#judge`).open(config.id, ({ type, index, message, kind, ...verdict }) => {
+    if (type === 'judging') return on.begun()
+    if (type === 'verdict') return on.verdict(index, verdict)
+    line.close()
+    if (type === 'judged') on.end(null)
+    else on.end(kind === 'silent' ? '' : message)
+  })
+  line.send({ type: 'judge', config, ...addresses })
+  return line.close
 }

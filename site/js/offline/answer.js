@@ -12,8 +12,8 @@ import { isWhole, plain } from './fetching.js'
 import { addressOf, isLasting, pagesFor, pathOf, rangeOf } from './list.js'
 
 /** Milliseconds that a page may take before its stored copy is shown. */
-export const PATIENCE = 3000
-export const OFFLINE = 'offline/index.html'
+const PATIENCE = 3000
+const OFFLINE = 'offline/index.html'
 
 /** Whether a request is for a file of this site. */
 export function isOurs(request, scope) {

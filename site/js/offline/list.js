@@ -6,7 +6,7 @@
  */
 
 export const FILES = 'files.json'
-export const GROUPS = ['shell', 'text', 'rest']
+const GROUPS = ['shell', 'text', 'rest']
 
 /** The most bytes of text that are fetched without asking: a course of some hundred pages, a few MB when compressed. */
 export const MODEST = 16_000_000
@@ -55,7 +55,6 @@ export function pathOf(address, scope) {
   }
 }
 
-/** The address of a path. */
 export function addressOf(path, scope) {
   return new URL(path.split('/').map(encodeURIComponent).join('/'), scope).href
 }

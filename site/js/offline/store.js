@@ -33,7 +33,6 @@ export class Store {
     return this.#scope
   }
 
-  /** The name of its cache. */
   get name() {
     return `${PREFIX}${FORMAT} ${this.#scope}`
   }
@@ -44,7 +43,6 @@ export class Store {
     await Promise.all((await this.#caches.keys()).filter(isObsolete).map((name) => this.#caches.delete(name)))
   }
 
-  /** Remove everything. */
   async remove() {
     this.#cache = this.#lists = null
     await this.#caches.delete(this.name)

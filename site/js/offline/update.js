@@ -24,19 +24,12 @@ const AT_ONCE = 3
  */
 
 /**
- * @typedef {Record<string, any>} Outcome
- * @property {number} here files of the wished groups that are stored
- * @property {number} total files of the wished groups
- * @property {boolean} full whether there was no more room
- * @property {boolean} lost whether the network failed
- */
-
-/**
  * @param {import('./store.js').Store} store
  * @param {import('./fetching.js').Files} files
  * @param {Wish} wish
  * @param {(here: number, total: number) => void} tell reports progress
- * @returns {Promise<Outcome>}
+ * @returns {Promise<{here: number, total: number, full: boolean, lost: boolean}>} how many of the wished files are stored, and of how many;
+ *   whether there was no more room, or the network failed
  */
 export async function update(store, files, wish, tell = () => {}) {
   const outcome = { here: 0, total: 0, full: false, lost: false }

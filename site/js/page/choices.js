@@ -9,7 +9,14 @@ export function openStorage() {
   }
 }
 
-export const readChoice = (key, storage = openStorage()) => storage?.getItem(key) ?? null
+/** A stored choice; `null` if there is none, or storage is blocked. */
+export function readChoice(key, storage = openStorage()) {
+  try {
+    return storage?.getItem(key) ?? null
+  } catch {
+    return null
+  }
+}
 
 /** Store a choice; with `null`, forget it. Where storage is blocked or full, it holds for this page. */
 export function writeChoice(key, choice, storage = openStorage()) {

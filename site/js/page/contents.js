@@ -1,16 +1,7 @@
 /** Marks the current section in the list of contents, and keeps it in sight if the list scrolls. */
 
 /** The index of the last heading at or above `line` (px from the top of the window); -1 above the first. */
-export function currentHeading(tops, line) {
-  let low = 0
-  let high = tops.length
-  while (low < high) {
-    const middle = (low + high) >> 1
-    if (tops[middle] <= line) low = middle + 1
-    else high = middle
-  }
-  return low - 1
-}
+export const currentHeading = (tops, line) => tops.findLastIndex((top) => top <= line)
 
 /**
  * How far a list that scrolls must move so that an entry is in sight, with room for one more on either side.
@@ -35,26 +26,21 @@ export function followContents(document) {
     .filter(({ heading }) => heading)
   if (pairs.length === 0) return () => {}
   let current = null
-  let isPending = false
   const mark = () => {
-    isPending = false
-    const atEnd = innerHeight + scrollY >= document.documentElement.scrollHeight - 2
+    // At the end of a page the last heading in sight counts, however low it stands.
+    const atEnd = scrollY > 0 && innerHeight + scrollY >= document.documentElement.scrollHeight - 2
     const tops = pairs.map(({ heading }) => heading.getBoundingClientRect().top)
-    const index = atEnd && scrollY > 0 ? lastVisible(tops) : currentHeading(tops, innerHeight * 0.25)
-    const link = pairs[index]?.link ?? null
+    const link = pairs[currentHeading(tops, innerHeight * (atEnd ? 1 : 0.25))]?.link ?? null
     if (link === current) return
     current?.removeAttribute('aria-current')
     link?.setAttribute('aria-current', 'location')
     current = link
     keepInSight(link, links[0])
   }
-  const schedule = () => {
-    if (!isPending) requestAnimationFrame(mark)
-    isPending = true
-  }
   const abort = new AbortController()
-  addEventListener('scroll', schedule, { passive: true, signal: abort.signal })
-  addEventListener('resize', schedule, { signal: abort.signal })
+  // Browsers send one of these events for each picture at most.
+  addEventListener('scroll', mark, { passive: true, signal: abort.signal })
+  addEventListener('resize', mark, { signal: abort.signal })
   mark()
   return () => {
     abort.abort()
@@ -68,9 +54,4 @@ function keepInSight(link, anyLink) {
   if (list.scrollHeight <= list.clientHeight || list.querySelector(':focus-visible')) return
   if (link) list.scrollTop += listMove(list.getBoundingClientRect(), link.getBoundingClientRect())
   else list.scrollTop = 0
-}
-
-/** At the end of a page the last heading in sight counts, however low it stands. */
-function lastVisible(tops) {
-  return currentHeading(tops, innerHeight)
 }

@@ -1,11 +1,12 @@
 /** Copy buttons on code, added by script, since they need one to work. */
 
+import { h } from '../lab/page/dom.js'
 import { selectAll } from './select.js'
 
 const SHOWN_FOR = 2000 // ms
 
 /** The code of a listing: all its parts, folded ones too, without its output. */
-export function codeOf(listing) {
+function codeOf(listing) {
   return [...listing.querySelectorAll('pre > code')].map((code) => code.textContent).join('')
 }
 
@@ -13,21 +14,18 @@ export function codeOf(listing) {
 export function addCopyButtons(part, words) {
   for (const target of selectAll(part, '[data-copy]')) {
     const listing = target.closest('.script, .code')
-    const button = document.createElement('button')
-    button.type = 'button'
-    button.className = 'copy'
-    button.textContent = words('code.copy')
-    button.setAttribute('aria-live', 'polite')
-    button.addEventListener('click', async () => {
+    const copy = async () => {
       const isCopied = await copyText(codeOf(listing))
       button.textContent = words(isCopied ? 'code.copied' : 'code.failed')
       setTimeout(() => (button.textContent = words('code.copy')), SHOWN_FOR)
-    })
+    }
+    const button = h('button', { type: 'button', class: 'copy', 'aria-live': 'polite', onclick: copy }, words('code.copy'))
     target.prepend(button)
   }
 }
 
-async function copyText(text) {
+/** Put a text into the clipboard; returns whether that is allowed. */
+export const copyText = async (text) => {
   try {
     await navigator.clipboard.writeText(text)
     return true

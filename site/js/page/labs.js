@@ -4,6 +4,7 @@
  * The event `coursebuild:run` makes a lab load at once and do what its detail lists: labels of buttons, and values by label.
  */
 
+import { h } from '../lab/page/dom.js'
 import { unfold } from './unfold.js'
 import { selectAll } from './select.js'
 
@@ -57,8 +58,5 @@ export function leaveLabs(part) {
 }
 
 function addMessage(lab, text) {
-  const message = lab.ownerDocument.createElement('p')
-  message.className = 'lab-message'
-  message.textContent = text
-  lab.querySelector('.lab-title').after(message)
+  lab.querySelector('.lab-title').after(h('p', { class: 'lab-message' }, text))
 }

@@ -6,6 +6,7 @@
  * marked line instead of all numbers.
  */
 
+import { h } from '../lab/page/dom.js'
 import { decode, unfold } from './unfold.js'
 import { selectAll } from './select.js'
 
@@ -77,12 +78,10 @@ function makeColumn(box, line, words) {
   const first = Number(box.dataset.first)
   const count = box.querySelectorAll('code > [id]').length
   const { stem } = readLines(line.id)
-  const column = box.ownerDocument.createElement('span')
-  column.className = 'lines'
-  column.textContent = Array.from({ length: count }, (_, n) => first + n).join('\n')
-  const values = { role: 'slider', 'aria-orientation': 'vertical', 'aria-label': words('code.mark') }
+  const numbers = Array.from({ length: count }, (_, n) => first + n).join('\n')
   const range = { 'aria-valuemin': first, 'aria-valuemax': first + count - 1, 'aria-valuenow': first }
-  for (const [name, value] of Object.entries({ tabindex: 0, ...values, ...range })) column.setAttribute(name, value)
+  const names = { role: 'slider', 'aria-orientation': 'vertical', 'aria-label': words('code.mark') }
+  const column = h('span', { class: 'lines', tabIndex: 0, ...names, ...range }, numbers)
   let anchor = first
   let end = first
   const select = (next, extend) => {

@@ -5,6 +5,7 @@
  * stored. If the host's page has changed since this one was loaded, a notice says so.
  */
 
+import { h } from '../lab/page/dom.js'
 import { isSparing } from '../offline/list.js'
 import { readChoice, writeChoice } from './choices.js'
 
@@ -59,16 +60,12 @@ export function visit({ location, navigator, performance }, worker, wish, tell) 
 }
 
 /** The site's worker, registered and active. */
-export async function activeWorker(navigator, root) {
-  const registration = await navigator.serviceWorker.register(new URL(WORKER, root), { scope: root.pathname })
-  if (registration.active) return registration.active
-  const worker = registration.installing ?? registration.waiting
-  return new Promise((resolve, fail) => {
-    worker.addEventListener('statechange', () => {
-      if (worker.state === 'activated') resolve(worker)
-      if (worker.state === 'redundant') fail(new Error('the service worker was given up'))
-    })
-  })
+export async function activeWorker({ serviceWorker }, root) {
+  const registration = await serviceWorker.register(new URL(WORKER, root), { scope: root.pathname }) // `ready` may be that of an outer course
+  while (registration.active === null) {
+    await new Promise((resolve) => (registration.installing ?? registration.waiting).addEventListener('statechange', resolve, { once: true }))
+  }
+  return registration.active
 }
 
 /**
@@ -103,13 +100,7 @@ export function keepOffline(window, words) {
 
 function offerReload(document, words) {
   if (document.querySelector('.notice')) return
-  const notice = document.createElement('div')
-  notice.className = 'notice'
-  notice.setAttribute('role', 'status')
-  const button = document.createElement('button')
-  button.type = 'button'
-  button.textContent = words('offline.again')
-  button.addEventListener('click', () => location.reload())
-  document.body.append(notice)
-  notice.append(words('offline.changed'), ' ', button)
+  const notice = h('div', { class: 'notice', role: 'status' })
+  document.body.append(notice) // a live region must exist before its text
+  notice.append(words('offline.changed'), ' ', h('button', { type: 'button', onclick: () => location.reload() }, words('offline.again')))
 }

@@ -3,8 +3,10 @@
  * style sheets cannot. A further section that is closed is not printed, nor is a folded listing of more than sixty lines.
  */
 
+import { h } from '../lab/page/dom.js'
+
 /** A text as a string of CSS. */
-export function cssString(text) {
+function cssString(text) {
   return `"${text.replaceAll(/["\\]/g, '\\$&').replaceAll(/[\n\r\f\0]/g, ' ')}"`
 }
 
@@ -27,26 +29,19 @@ export function openForPrint(window) {
 /** Move the answers of all questions that are printed to a section behind the text. @returns {() => void} puts them back */
 function moveAnswers(document) {
   const text = document.querySelector('.columns > .prose')
-  const section = document.createElement('section')
-  section.className = 'answers'
+  const section = h('section', { class: 'answers' })
   const places = []
   for (const quiz of text?.querySelectorAll('.quiz') ?? []) {
     const answers = [...quiz.querySelectorAll('.question > .answer:not(.is-empty)')]
     if (answers.length === 0 || quiz.closest('.further-text:not([open])') !== null) continue
-    const title = document.createElement('p')
-    title.className = 'quiz-title'
-    title.textContent = quiz.getAttribute('aria-label')
-    const list = document.createElement('ol')
-    for (const answer of answers) {
-      const item = document.createElement('li')
-      item.value = Number(answer.closest('.question').dataset.number)
+    const items = answers.map((answer) => {
+      const { number } = answer.closest('.question').dataset
       const mark = document.createComment('')
       answer.replaceWith(mark)
-      item.append(answer)
-      list.append(item)
       places.push([mark, answer])
-    }
-    section.append(title, list)
+      return h('li', { value: Number(number) }, answer)
+    })
+    section.append(h('p', { class: 'quiz-title' }, quiz.getAttribute('aria-label')), h('ol', {}, ...items))
   }
   if (places.length > 0) text.after(section)
   return () => {

@@ -4,10 +4,8 @@
  * `coursebuildQuizzes`. Until it is loaded, and if it cannot be, the answers are behind folds.
  */
 
+import { loadOnce } from './scripts.js'
 import { selectAll } from './select.js'
-
-const pendingParts = new Set() // parts of the page, each with the function that mounts its quizzes
-let isLoading = false
 
 /**
  * @param {Document | Element} part of the page
@@ -18,26 +16,11 @@ export function mountQuizzes(part, words, progress) {
   if (selectAll(part, '.question[data-question]').length === 0) return
   const mount = () => globalThis.coursebuildQuizzes.mountQuizzes(part, words, progress)
   if (globalThis.coursebuildQuizzes) return mount()
-  pendingParts.add({ part, mount })
-  load()
+  const address = document.getElementById('_words')?.dataset.quizScript
+  if (address) loadOnce(new URL(address, document.baseURI).href).then(() => part.isConnected && mount(), () => {})
 }
 
 /** End the quizzes in a part that was removed from the page. */
 export function leaveQuizzes(part) {
   globalThis.coursebuildQuizzes?.leaveQuizzes(part)
-  for (const pending of pendingParts) if (pending.part === part) pendingParts.delete(pending)
-}
-
-function load() {
-  const address = document.getElementById('_words')?.dataset.quizScript
-  if (isLoading || !address) return
-  isLoading = true
-  const script = document.createElement('script')
-  script.src = new URL(address, document.baseURI).href
-  script.addEventListener('load', () => {
-    for (const { mount } of pendingParts) mount()
-    pendingParts.clear()
-  })
-  script.addEventListener('error', () => (isLoading = false))
-  document.head.append(script)
 }

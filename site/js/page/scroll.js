@@ -6,7 +6,7 @@
 import { selectAll } from './select.js'
 
 /** The sides of a box on which something is hidden: `start`, `end`, `both`, or ''. */
-export function hiddenSides(scrollLeft, clientWidth, scrollWidth) {
+function hiddenSides(scrollLeft, clientWidth, scrollWidth) {
   const position = Math.abs(scrollLeft) // negative where text runs from the right
   const hasBefore = position > 1
   const hasAfter = position + clientWidth < scrollWidth - 1

@@ -3,19 +3,21 @@
  * Its script is loaded only then; the search page loads it at once.
  */
 
+import { h } from '../lab/page/dom.js'
 import { readChoice, writeChoice } from './choices.js'
+import { loadOnce } from './scripts.js'
 
 const KEY = 'coursebuild.shortcuts'
 
 /** Whether shortcuts of a single key are on (WCAG 2.1.4). */
-export const singleKeys = () => readChoice(KEY) !== 'off'
+const singleKeys = () => readChoice(KEY) !== 'off'
 
 const setSingleKeys = (isOn) => writeChoice(KEY, isOn ? null : 'off')
 
 const FIELDS = 'input, textarea, select, [contenteditable]:not([contenteditable="false"]), .lab, dialog[open]'
 
 /** Whether keys belong to something else: a text field, a simulation, another dialog. */
-export const isTaken = (target) => target?.closest?.(FIELDS) != null
+const isTaken = (target) => target?.closest?.(FIELDS) != null
 
 /**
  * What a key means here: `open`, or nothing.
@@ -29,24 +31,6 @@ export function meaning({ key, ctrlKey, metaKey, altKey, isComposing }, { taken,
   return key === '/' && !ctrlKey && !metaKey && !taken && single ? 'open' : null
 }
 
-let loading = null
-
-/** Load the search, once; a failed load is tried again. */
-function load(document, script) {
-  loading ??= new Promise((resolve, reject) => {
-    const element = document.createElement('script')
-    element.src = script
-    element.onload = () => resolve(globalThis.coursebuildSearch)
-    element.onerror = () => {
-      element.remove()
-      loading = null
-      reject(new Error(script))
-    }
-    document.head.append(element)
-  })
-  return loading
-}
-
 let listening = false
 
 /**
@@ -57,14 +41,9 @@ let listening = false
 export function addSearch(document, words) {
   const tools = document.querySelector('[data-tools][data-search]')
   if (!tools || tools.querySelector('.search-open')) return
-  const button = document.createElement('button')
-  button.type = 'button'
-  button.className = 'search-open'
-  button.textContent = words('search.open')
-  button.setAttribute('aria-haspopup', 'dialog')
-  button.setAttribute('aria-keyshortcuts', 'Control+K')
-  button.addEventListener('click', () => start(document, words, 'open'))
-  tools.prepend(button)
+  const open = () => start(document, words, 'open')
+  const attributes = { class: 'search-open', 'aria-haspopup': 'dialog', 'aria-keyshortcuts': 'Control+K' }
+  tools.prepend(h('button', { type: 'button', ...attributes, onclick: open }, words('search.open')))
   if (document.querySelector('[data-search-form]')) start(document, words, 'mount')
   if (!listening) document.addEventListener('keydown', (event) => onKey(event, document, words))
   listening = true
@@ -81,8 +60,8 @@ function onKey(event, document, words) {
 async function start(document, words, action) {
   const { root = '', course = '' } = document.documentElement.dataset
   try {
-    const search = await load(document, document.querySelector('[data-search]').dataset.search)
-    await search[action]({ root: new URL(root || './', document.baseURI).href, course, singleKeys, setSingleKeys })
+    await loadOnce(document.querySelector('[data-search]').dataset.search)
+    await globalThis.coursebuildSearch[action]({ root: new URL(root || './', document.baseURI).href, course, singleKeys, setSingleKeys })
   } catch {
     const button = document.querySelector('.search-open')
     button.textContent = words('search.failed')

@@ -1,5 +1,6 @@
 /** The theme: light, dark or the system's; stored in the reader's browser. */
 
+import { h } from '../lab/page/dom.js'
 import { readChoice, writeChoice } from './choices.js'
 
 const KEY = 'coursebuild.theme'
@@ -27,10 +28,7 @@ export function applyTheme(theme) {
 export function addThemeSwitch(document, words) {
   const tools = document.querySelector('[data-tools]')
   if (!tools) return
-  const label = document.createElement('label')
-  label.className = 'theme'
-  const select = document.createElement('select')
-  for (const theme of THEMES) select.add(new Option(words(`theme.${theme}`), theme))
+  const select = h('select', {}, ...THEMES.map((theme) => new Option(words(`theme.${theme}`), theme)))
   select.value = storedTheme()
   select.addEventListener('change', () => {
     writeChoice(KEY, select.value === 'auto' ? null : select.value)
@@ -41,8 +39,5 @@ export function addThemeSwitch(document, words) {
     select.value = storedTheme()
     applyTheme(select.value)
   })
-  const name = document.createElement('span')
-  name.textContent = words('theme.label')
-  label.append(name, ' ', select)
-  tools.append(label)
+  tools.append(h('label', { class: 'theme' }, h('span', {}, words('theme.label')), ' ', select))
 }

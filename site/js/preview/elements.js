@@ -1,18 +1,24 @@
-/** Makes elements without markup in strings or style attributes, as a strict content security policy demands. */
+/** Parts of the preview's marks and of its panel. */
 
-export function h(tag, attributes = {}, ...children) {
-  const element = document.createElement(tag)
-  for (const [name, value] of Object.entries(attributes)) {
-    if (value === null || value === undefined || value === false) continue
-    if (typeof value === 'function') element.addEventListener(name, value)
-    else element.setAttribute(name, value === true ? '' : value)
-  }
-  element.append(...children.filter((child) => child !== null && child !== undefined))
-  return element
-}
+import { h } from '../lab/page/dom.js'
 
 /** Attributes of messages of the tool, which have no translation. */
 export const OF_THE_TOOL = { lang: 'en', dir: 'ltr' }
+
+/** A button that accepts what the preview offers, and beside it the answer. @param {() => Promise<string>} accept promises why it was not, or nothing */
+export function offerButton(text, say, accept) {
+  const answer = h('span', { class: 'preview-why', role: 'status' })
+  const press = async () => {
+    button.disabled = true
+    answer.textContent = say('written')
+    const refusal = await accept()
+    if (!refusal) return
+    answer.textContent = say('not_written', { reason: refusal })
+    button.disabled = false
+  }
+  const button = h('button', { type: 'button', class: 'preview-accept', onclick: press }, text)
+  return [button, ' ', answer]
+}
 
 /** Show text between backticks as code. */
 export const formatCode = (text) => text.split(/`([^`]*)`/).map((part, index) => (index % 2 ? h('code', {}, part) : part))

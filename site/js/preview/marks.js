@@ -6,7 +6,8 @@
  *   marks.show(news)                          after each piece of news, and after each change of the page
  */
 
-import { formatCode, h, OF_THE_TOOL } from './elements.js'
+import { h } from '../lab/page/dom.js'
+import { formatCode, offerButton, OF_THE_TOOL } from './elements.js'
 import { timesOf } from './times.js'
 
 const SIGNS = { ' ': '\u2007', '-': '−', '+': '+' }
@@ -67,7 +68,7 @@ export class Marks {
   /** What is wrong in the block below; without elements of blocks, as it may stand in a line. */
   markMistakes(element, { mistakes }) {
     const notes = mistakes.map(({ severity, message, help }) => {
-      const note = h('span', { class: `preview-mistake preview-${severity}`, role: 'note', tabindex: '-1' })
+      const note = h('span', { class: `preview-mistake preview-${severity}`, role: 'note', tabIndex: -1 })
       note.append(h('strong', {}, this.say(severity)), ' ', h('span', OF_THE_TOOL, ...formatCode(message)))
       if (help) note.append(h('span', { class: 'preview-help', ...OF_THE_TOOL }, ...formatCode(help)))
       return note
@@ -93,12 +94,9 @@ export class Marks {
   }
 
   markOutput(element, run) {
-    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': this.say('output.label') })
-    box.append(
-      h('p', { class: 'preview-legend' }, `${this.say('output.differs')} `, sign('-'), ` ${this.say('output.recorded')} `, sign('+'), ` ${this.say('output.run')}`),
-      diff(run.rows),
-      this.makeFoot(run, 'output'),
-    )
+    const signs = [sign('-'), ` ${this.say('output.recorded')} `, sign('+'), ` ${this.say('output.run')}`]
+    const legend = h('p', { class: 'preview-legend' }, `${this.say('output.differs')} `, ...signs)
+    const box = this.makeBox('output', legend, diff(run.rows), this.makeFoot(run, 'output'))
     element.classList.add('preview-known', 'preview-drifted')
     element.append(box)
     return [box]
@@ -110,20 +108,16 @@ export class Marks {
       [this.say('output.recorded'), bypassCache(image.src)],
       [this.say('output.run'), figure.drawn],
     ].map(([label, src]) => h('div', { class: 'preview-drawing' }, h('img', { src, alt: `${image.alt} (${label})` }), h('p', {}, label)))
-    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': this.say('figure.label') })
-    box.append(
-      h('p', { class: 'preview-legend' }, this.say('figure.differs', { reason: figure.differs })),
-      h('div', { class: 'preview-drawings' }, ...drawings),
-      this.makeFoot(figure, 'figure'),
-    )
+    const legend = h('p', { class: 'preview-legend' }, this.say('figure.differs', { reason: figure.differs }))
+    const box = this.makeBox('figure', legend, h('div', { class: 'preview-drawings' }, ...drawings), this.makeFoot(figure, 'figure'))
     element.classList.add('preview-drifted')
     element.prepend(box)
     return [box]
   }
 
   markData(element, figure) {
-    const box = h('div', { class: 'preview-drift', role: 'group', 'aria-label': this.say('data.label') })
-    box.append(h('p', { class: 'preview-legend' }, this.say('data.differs', { reason: figure.differs })), this.makeFoot(figure, 'data'))
+    const legend = h('p', { class: 'preview-legend' }, this.say('data.differs', { reason: figure.differs }))
+    const box = this.makeBox('data', legend, this.makeFoot(figure, 'data'))
     element.append(box)
     return [box]
   }
@@ -137,25 +131,14 @@ export class Marks {
     return [box]
   }
 
+  makeBox(kind, ...parts) {
+    return h('div', { class: 'preview-drift', role: 'group', 'aria-label': this.say(`${kind}.label`) }, ...parts)
+  }
+
   /** The button that accepts a change, or the reason why there is none. */
   makeFoot({ offer, refused }, kind) {
-    const foot = h('span', { class: 'preview-foot' })
-    if (!offer) {
-      if (refused) foot.append(h('span', { class: 'preview-why' }, this.say('refused', { reason: refused })))
-      return foot
-    }
-    const answer = h('span', { class: 'preview-why', role: 'status' })
-    const button = h('button', { type: 'button', class: 'preview-accept' }, this.say(`${kind}.accept`))
-    button.addEventListener('click', async () => {
-      button.disabled = true
-      answer.textContent = this.say('written')
-      const refusal = await this.accept(offer)
-      if (!refusal) return
-      answer.textContent = this.say('not_written', { reason: refusal })
-      button.disabled = false
-    })
-    foot.append(button, answer)
-    return foot
+    const reason = refused ? [h('span', { class: 'preview-why' }, this.say('refused', { reason: refused }))] : []
+    return h('span', { class: 'preview-foot' }, ...(offer ? offerButton(this.say(`${kind}.accept`), this.say, () => this.accept(offer)) : reason))
   }
 }
 
@@ -173,7 +156,7 @@ function sign(mark) {
 
 /** The lines of a recorded output and of this run, distinguished by a sign and, for screen readers, by their element. */
 function diff(rows) {
-  const list = h('pre', { class: 'preview-diff', tabindex: '0' })
+  const list = h('pre', { class: 'preview-diff', tabIndex: 0 })
   for (const [mark, pieces] of rows) {
     const line = h({ ' ': 'span', '-': 'del', '+': 'ins' }[mark], { class: 'preview-text' })
     for (const [text, isChanged] of pieces) line.append(isChanged && mark !== ' ' ? h('mark', {}, text) : text)

@@ -5,7 +5,8 @@
  * place.
  */
 
-import { formatCode, h, OF_THE_TOOL } from './elements.js'
+import { h } from '../lab/page/dom.js'
+import { formatCode, offerButton, OF_THE_TOOL } from './elements.js'
 import { showMistake } from './marks.js'
 import { timesOf } from './times.js'
 
@@ -37,11 +38,11 @@ export class Panel {
     this.lost = false
     this.gone = false
     this.open = false
-    this.button = h('button', { type: 'button', class: 'preview-button', 'aria-expanded': 'false', click: () => this.toggle() })
-    this.all = h('button', { type: 'button', class: 'preview-accept preview-all', hidden: true, click: () => this.acceptAll() })
+    this.button = h('button', { type: 'button', class: 'preview-button', 'aria-expanded': 'false', onclick: () => this.toggle() })
+    this.all = h('button', { type: 'button', class: 'preview-accept preview-all', hidden: true, onclick: () => this.acceptAll() })
     this.why = h('p', { class: 'preview-why preview-answer', role: 'status', hidden: true })
     this.status = h('span', { class: 'unseen', role: 'status' })
-    this.list = h('section', { class: 'preview-panel', 'aria-label': say('problems'), tabindex: '-1' })
+    this.list = h('section', { class: 'preview-panel', 'aria-label': say('problems'), tabIndex: -1 })
     this.root = h('div', { class: 'preview-own' }, this.list, this.why, this.all, this.button, this.status)
     this.root.addEventListener('keydown', (event) => {
       if (event.key === 'Escape' && this.open) this.toggle()
@@ -117,7 +118,7 @@ export class Panel {
     const { problems, more, trouble } = this.news
     const here = problems.filter((problem) => problem.here)
     const elsewhere = problems.filter((problem) => !problem.here)
-    const close = h('button', { type: 'button', class: 'preview-close', click: () => this.toggle() }, this.say('close'))
+    const close = h('button', { type: 'button', class: 'preview-close', onclick: () => this.toggle() }, this.say('close'))
     const parts = [h('div', { class: 'preview-head' }, h('p', { class: 'preview-title' }, this.say(here.length ? 'here' : 'wrong')), close)]
     if (trouble) parts.push(h('pre', { class: 'preview-trouble', ...OF_THE_TOOL }, trouble))
     if (here.length) parts.push(this.makeList(here))
@@ -140,7 +141,7 @@ export class Panel {
     if (mark) item.append(h('p', {}, this.makeLink(mark)))
     if (line.trim()) {
       const excerpt = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')
-      item.append(h('pre', { class: 'preview-source', tabindex: '0', dir: 'ltr' }, line.slice(0, start), excerpt, line.slice(Math.max(end, start + 1))))
+      item.append(h('pre', { class: 'preview-source', tabIndex: 0, dir: 'ltr' }, line.slice(0, start), excerpt, line.slice(Math.max(end, start + 1))))
     }
     if (label) item.append(h('p', { class: 'preview-label', ...OF_THE_TOOL }, ...formatCode(label)))
     for (const { text, offer: choice } of choices) item.append(h('p', OF_THE_TOOL, ...formatCode(text)), ...this.makeFix(choice, ''))
@@ -157,22 +158,14 @@ export class Panel {
       this.toggle()
       showMistake(mark)
     }
-    return h('a', { class: 'preview-show', href: `#${mark}`, click: show }, this.say('show'))
+    return h('a', { class: 'preview-show', href: `#${mark}`, onclick: show }, this.say('show'))
   }
 
   /** The line as a fix writes it, and the button that does. */
   makeFix(offer, line) {
-    const answer = h('span', { class: 'preview-why', role: 'status' })
-    const button = h('button', { type: 'button', class: 'preview-accept' }, this.say('fix'))
-    button.addEventListener('click', async () => {
-      button.disabled = true
-      const refusal = await this.accept(offer)
-      if (!refusal) return
-      answer.textContent = this.say('not_written', { reason: refusal })
-      button.disabled = false
-    })
-    const written = h('pre', { class: 'preview-source', tabindex: '0', dir: 'ltr' }, h('ins', {}, line))
-    return line.trim() ? [written, h('p', {}, button, ' ', answer)] : [h('p', {}, button, ' ', answer)]
+    const written = h('pre', { class: 'preview-source', tabIndex: 0, dir: 'ltr' }, h('ins', {}, line))
+    const act = h('p', {}, ...offerButton(this.say('fix'), this.say, () => this.accept(offer)))
+    return line.trim() ? [written, act] : [act]
   }
 
   makePlace(text, rule) {

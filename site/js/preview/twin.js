@@ -10,7 +10,6 @@
  */
 
 import { align } from './align.js'
-import { difference } from './text.js'
 
 /** Elements that are replaced as a whole if anything in them differs. */
 const WHOLE = new Set(['math', 'svg', 'video', 'audio', 'object', 'iframe', 'select', 'template'])
@@ -142,3 +141,18 @@ function updateAttributes(base, next, live) {
   live.classList.remove(...[...base.classList].filter((name) => !next.classList.contains(name)))
   live.classList.add(...[...next.classList].filter((name) => !base.classList.contains(name)))
 }
+
+/** The stretch of `before` to replace, and its replacement: `{start, count, text}`. Surrogate pairs are not split. */
+export function difference(before, after) {
+  const shortest = Math.min(before.length, after.length)
+  let start = 0
+  while (start < shortest && before[start] === after[start]) start++
+  if (start > 0 && isHigh(before, start - 1)) start--
+  let end = 0
+  while (end < shortest - start && before[before.length - 1 - end] === after[after.length - 1 - end]) end++
+  if (end > 0 && isLow(before, before.length - end)) end--
+  return { start, count: before.length - end - start, text: after.slice(start, after.length - end) }
+}
+
+const isHigh = (text, index) => (text.charCodeAt(index) & 0xfc00) === 0xd800
+const isLow = (text, index) => (text.charCodeAt(index) & 0xfc00) === 0xdc00

@@ -2,7 +2,7 @@
 
 import { download, h } from '../lab/page/dom.js'
 import { ImportError, importText } from './exchange.js'
-import { say } from './words.js'
+import { say } from '../page/words.js'
 
 export function addControls(document, words, progress) {
   const control = (name) => document.querySelector(`[data-control="${name}"]`)

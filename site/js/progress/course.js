@@ -4,7 +4,7 @@
  * Entry points: `readQuizzes`, `overview`, `totals`, `markOf`, `nextUp`. All of it is pure.
  */
 
-import { answersByQuiz, matchQuestions } from './match.js'
+import { matchQuestions } from './match.js'
 
 /**
  * Parse the list of a lesson's questions in a page: `ID:KEY,KEY ID:…`, ids percent-encoded.
@@ -19,14 +19,7 @@ export function readQuizzes(text) {
   })
 }
 
-/**
- * @typedef {Record<string, any>} Done
- * @property {boolean} read
- * @property {boolean} begun
- * @property {number} questions
- * @property {number} answered
- * @property {number} right
- */
+/** @typedef {{read: boolean, begun: boolean, questions: number, answered: number, right: number}} Done of a lesson */
 
 /**
  * The state of each lesson, and the stored progress of lessons and questions that no longer exist.
@@ -37,7 +30,7 @@ export function readQuizzes(text) {
  *   question exists, each with the `page` that has it and the present key of the `question`
  */
 export function overview(lessons, answers, storedLessons) {
-  const byQuiz = answersByQuiz(answers)
+  const byQuiz = Map.groupBy(answers, ({ quiz }) => quiz)
   const states = new Map()
   const matchedAnswers = []
   const orphans = { answers: [], lessons: [] }
@@ -66,16 +59,9 @@ export function overview(lessons, answers, storedLessons) {
 
 /** The sums over several lessons. @param {Done[]} lessons */
 export function totals(lessons) {
-  const sum = { lessons: 0, read: 0, begun: 0, questions: 0, answered: 0, right: 0 }
-  for (const { read, begun, questions, answered, right } of lessons) {
-    sum.lessons += 1
-    sum.read += Number(read)
-    sum.begun += Number(begun && !read)
-    sum.questions += questions
-    sum.answered += answered
-    sum.right += right
-  }
-  return sum
+  const sum = (numberOf) => lessons.reduce((total, lesson) => total + Number(numberOf(lesson)), 0)
+  const [questions, answered, right] = ['questions', 'answered', 'right'].map((name) => sum((lesson) => lesson[name]))
+  return { lessons: lessons.length, read: sum(({ read }) => read), begun: sum(({ begun, read }) => begun && !read), questions, answered, right }
 }
 
 /** The mark of a lesson: `right` if all its questions are answered right, `read`, `begun`, or empty. @param {Done} done */

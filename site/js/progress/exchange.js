@@ -4,7 +4,7 @@
  * Entry point: `importText(progress, text)`. A module of its own, since only the page of the reader's progress imports files.
  */
 
-import { decode, merge, StateError, VERSION } from './state.js'
+import { decode, merge, NOTHING, StateError, VERSION } from './state.js'
 
 const SIZE = 32 * 2 ** 20
 
@@ -63,45 +63,37 @@ export function importText(progress, text, { restore = false } = {}) {
 
 /** Restore, with new ticks, what the file has and the state lacks, since it was reset or removed. */
 function restoreMissing(state, file, tick) {
-  const renew = (current, old) => {
-    const entry = { gone: current?.gone ?? 0, values: new Map(current?.values), recalls: current?.recalls ?? [] }
-    for (const [name, value] of old.values) {
-      if (!entry.values.has(name)) entry.values.set(name, { ...value, tick: tick() })
-    }
-    if (!current?.values.size) entry.recalls = old.recalls.map((recall) => ({ ...recall, tick: tick() }))
-    return entry
+  const renew = ({ gone, values, recalls } = NOTHING, old) => {
+    const withNewTick = (value) => ({ ...value, tick: tick() })
+    const all = new Map(values)
+    for (const [name, value] of old.values) if (!all.has(name)) all.set(name, withNewTick(value))
+    return { gone, values: all, recalls: values.size > 0 ? recalls : old.recalls.map(withNewTick) }
   }
-  const answers = new Map(state.answers)
-  for (const [quiz, entries] of file.answers) {
-    const renewed = new Map(answers.get(quiz))
-    for (const [key, entry] of entries) if (isMissing(renewed.get(key), entry)) renewed.set(key, renew(renewed.get(key), entry))
-    answers.set(quiz, renewed)
+  const missing = (entries, current) => {
+    const lost = [...entries].filter(([key, entry]) => isMissing(current?.get(key), entry))
+    return new Map(lost.map(([key, entry]) => [key, renew(current?.get(key), entry)]))
   }
-  const lessons = new Map(state.lessons)
-  for (const [id, entry] of file.lessons) if (isMissing(lessons.get(id), entry)) lessons.set(id, renew(lessons.get(id), entry))
-  return { ...state, answers, lessons }
+  const answers = new Map([...file.answers].map(([quiz, entries]) => [quiz, missing(entries, state.answers.get(quiz))]))
+  return merge(state, { reset: state.reset, answers, lessons: missing(file.lessons, state.lessons) })
 }
 
 /** Whether an entry of a file has a value that the current entry lacks. */
 const isMissing = (current, entry) => [...entry.values.keys()].some((name) => !current?.values.has(name))
 
-/** Count the answers and lessons of a file that a state lacks. */
-function countMissing(state, file) {
-  let count = 0
-  for (const [quiz, entries] of file.answers) {
-    for (const [key, entry] of entries) count += Number(isMissing(state.answers.get(quiz)?.get(key), entry))
+/** The entries of a state: answers or lessons, each with its counterpart in another state, if there is one. */
+function* pairs(state, other) {
+  for (const [quiz, entries] of state.answers) {
+    for (const [key, entry] of entries) yield { kind: 'answers', entry, counterpart: other.answers.get(quiz)?.get(key) }
   }
-  for (const [id, entry] of file.lessons) count += Number(isMissing(state.lessons.get(id), entry))
-  return count
+  for (const [id, entry] of state.lessons) yield { kind: 'lessons', entry, counterpart: other.lessons.get(id) }
 }
 
-/** Count the answers and lessons of a state that are new or changed. */
+/** Count the answers and lessons of a file that a state lacks. */
+const countMissing = (state, file) => [...pairs(file, state)].filter(({ entry, counterpart }) => isMissing(counterpart, entry)).length
+
 function countChanges(state, previous) {
   const counts = { answers: 0, lessons: 0 }
-  for (const [quiz, entries] of state.answers) {
-    for (const [key, entry] of entries) counts.answers += differs(entry, previous.answers.get(quiz)?.get(key))
-  }
-  for (const [id, entry] of state.lessons) counts.lessons += differs(entry, previous.lessons.get(id))
+  for (const { kind, entry, counterpart } of pairs(state, previous)) counts[kind] += differs(entry, counterpart)
   return counts
 }
 

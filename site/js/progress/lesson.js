@@ -2,9 +2,10 @@
 
 import { h } from '../lab/page/dom.js'
 import { currentHeading } from '../page/contents.js'
+import { textWithout } from '../page/select.js'
 import { Reading } from './reading.js'
 import { sign } from './signs.js'
-import { say } from './words.js'
+import { say } from '../page/words.js'
 
 const SECOND = 1000
 const FIRST_NOTE = 5 // seconds before a place is recorded
@@ -34,6 +35,8 @@ export function followLesson(document, id, progress) {
     // The button keeps its meaning under the pointer: who goes to press "Mark as read" would else press its opposite.
     const isAimedAt = document.querySelector('[data-progress="lesson"] button:hover') !== null
     if (reading.isRead && !isAimedAt && !progress.lessons().get(id)?.marked) progress.markLesson(id, true)
+    const detail = { section: sectionOf(headings).anchor, isRead: reading.isRead }
+    document.dispatchEvent(new CustomEvent('coursebuild:reading', { detail })) // for the frame of a learning platform
     if (reading.seconds >= lastSave + SAVE_EVERY) save()
   }
   const timer = setInterval(look, SECOND)
@@ -50,13 +53,7 @@ export function followLesson(document, id, progress) {
 /** The current section: its anchor and title, empty above the first. */
 function sectionOf(headings) {
   const heading = headings[currentHeading(headings.map((element) => element.getBoundingClientRect().top), innerHeight * 0.25)]
-  return heading ? { anchor: heading.id, title: headingText(heading) } : { anchor: '', title: '' }
-}
-
-function headingText(heading) {
-  const copy = heading.cloneNode(true)
-  copy.querySelectorAll('a.anchor, annotation').forEach((part) => part.remove())
-  return copy.textContent.replace(/\s+/g, ' ').trim()
+  return heading ? { anchor: heading.id, title: textWithout(heading, 'a.anchor, annotation') } : { anchor: '', title: '' }
 }
 
 /** Show at the end of a lesson whether it counts as read, with a button to change that; called again after each change. */

@@ -5,9 +5,10 @@
  */
 
 import { h } from '../lab/page/dom.js'
+import { textWithout } from '../page/select.js'
 import { markOf, nextUp, overview, readQuizzes, totals } from './course.js'
 import { sign } from './signs.js'
-import { say } from './words.js'
+import { say } from '../page/words.js'
 
 /** The lessons that a page lists: their rows, in order. */
 export function readRows(part) {
@@ -75,15 +76,8 @@ function showStart(place, lessons, next, words) {
     note.textContent = next === 'all' ? words('progress.map.all_read') : ''
     return
   }
-  const title = `${target.id} ${titleOf(target)}`
+  const title = `${target.id} ${textWithout(target.link, '.number')}`
   button.textContent = say(words, 'progress.map.continue', { title })
   button.setAttribute('href', target.link.getAttribute('href') + (next.section ? `#${encodeURIComponent(next.section)}` : ''))
   note.textContent = next.title ? say(words, 'progress.map.at_section', { section: next.title }) : ''
-}
-
-/** The title of a lesson without its number. */
-export function titleOf({ link }) {
-  const copy = link.cloneNode(true)
-  copy.querySelectorAll('.number').forEach((number) => number.remove())
-  return copy.textContent.trim()
 }

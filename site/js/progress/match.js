@@ -23,23 +23,11 @@ export function matchQuestions(answers, present) {
   return { matched, orphans }
 }
 
-/** Answers by the id of their quiz. @template {{quiz: string}} K @param {K[]} answers @returns {Map<string, K[]>} */
-export function answersByQuiz(answers) {
-  const groups = new Map()
-  for (const answer of answers) {
-    const group = groups.get(answer.quiz)
-    if (group) group.push(answer)
-    else groups.set(answer.quiz, [answer])
-  }
-  return groups
-}
-
 /** Move the answers of the page's quizzes to the present keys of their questions; called before quizzes are mounted. */
 export function rekeyAnswers(document, progress) {
   const quizzes = [...document.querySelectorAll('[data-quiz]')]
   if (quizzes.length === 0) return
-  /** @type {Map<string, any[]>} */
-  const byQuiz = answersByQuiz(progress.all())
+  const byQuiz = Map.groupBy(progress.all(), (/** @type {any} */ { quiz }) => quiz)
   for (const section of quizzes) {
     const { quiz } = section.dataset
     const present = [...section.querySelectorAll('[data-question]')].map(({ dataset: { question, kind, number } }) => ({

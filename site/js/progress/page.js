@@ -8,7 +8,7 @@ import { h } from '../lab/page/dom.js'
 import { overview, totals } from './course.js'
 import { addControls } from './controls.js'
 import { readRows, showMark } from './map.js'
-import { say } from './words.js'
+import { say } from '../page/words.js'
 
 export function showPage(document, { words, progress }) {
   const lessons = readRows(document)

@@ -29,7 +29,6 @@ export class Reading {
     for (let part = start; part < end; part++) this.#looks[part] = Math.min(LOOKS, this.#looks[part] + 1)
   }
 
-  /** The share that was seen. */
   get share() {
     return this.#looks.reduce((sum, looks) => sum + Number(looks === LOOKS), 0) / PARTS
   }

@@ -7,11 +7,14 @@
  * earlier answer. Pages on disk cannot be fetched: then there are links to the questions.
  */
 
-import { h } from '../lab/page/dom.js'
+import { h, textButton } from '../lab/page/dom.js'
+import { memoize } from '../page/scripts.js'
 import { overview } from './course.js'
 import { readRows } from './map.js'
 import { agenda } from './schedule.js'
-import { say } from './words.js'
+import { say } from '../page/words.js'
+
+const PAGES = 50 // that are kept
 
 export function showReview(document, { words, progress, improve = () => {} }) {
   return new Review(document, words, progress, improve).start()
@@ -25,7 +28,7 @@ class Review {
     this.progress = progress
     this.improve = improve
     this.place = document.querySelector('[data-progress="review"]')
-    this.pages = new QuestionPages()
+    this.page = memoize(fetchPage, PAGES)
     this.rows = readRows(document).map((row, number) => ({ ...row, id: row.id || `page ${number}` }))
     this.running = false
   }
@@ -43,7 +46,7 @@ class Review {
     const parts = [...intro, h('p', { class: 'due', role: 'status' }, this.#dueText(due.length, missed))]
     if (due.length && this.document.location.protocol === 'file:') {
       parts.push(h('p', {}, this.say('disk')), h('ul', {}, ...due.map((item) => h('li', {}, this.#link(item)))))
-    } else if (due.length) parts.push(h('p', {}, this.#button(this.say('start'), () => this.#run(due), 'button')))
+    } else if (due.length) parts.push(h('p', {}, textButton(this.say('start'), () => this.#run(due), 'button')))
     const laterTexts = later.map(({ days, count }) => this.say('later', { n: count, days: this.say('days', { n: days }) }))
     if (laterTexts.length) parts.push(h('p', { class: 'later' }, laterTexts.join(' ')))
     const lostCount = lost.due.length + lost.later.reduce((sum, { count }) => sum + count, 0)
@@ -75,8 +78,8 @@ class Review {
     const origin = h('p', { class: 'review-from' }, `${this.say('from')} `, this.#source(row), ' ')
     origin.append(h('span', { class: 'review-box' }, this.say('box', { number: item.box + 1 })))
     const body = h('div', { class: 'review-question', 'aria-busy': 'true' }, h('p', {}, this.say('loading')))
-    const next = this.#button(this.say('skip'), () => this.#leave(body, due, index + 1), 'quiet')
-    const end = this.#button(this.say('end'), () => this.#leave(body, due, due.length), 'quiet')
+    const next = textButton(this.say('skip'), () => this.#leave(body, due, index + 1), 'quiet')
+    const end = textButton(this.say('end'), () => this.#leave(body, due, due.length), 'quiet')
     this.place.replaceChildren(heading, origin, body, h('p', { class: 'review-actions' }, next, ' ', end))
     heading.focus()
     const content = await this.#load(item, row)
@@ -88,7 +91,8 @@ class Review {
 
   async #load(item, row) {
     try {
-      const result = await this.pages.question(row.link.href, item.quiz, item.question, this.say('lab'))
+      const { href } = row.link
+      const result = takeQuestion(await this.page(href), href, item.quiz, item.question, this.say('lab'))
       if (result) return { part: result.section, question: result.question }
       return { part: h('p', {}, this.say('moved')), question: null }
     } catch {
@@ -136,10 +140,6 @@ class Review {
 
   // --- pieces
 
-  #button(text, onclick, name) {
-    return h('button', { type: 'button', class: name, onclick }, text)
-  }
-
   #source(row) {
     return h('a', { href: row.link.href }, row.link.textContent)
   }
@@ -151,35 +151,24 @@ class Review {
   }
 }
 
-/** Pages of the site, each fetched once. */
-class QuestionPages {
-  #pages = new Map()
-
-  /**
-   * A question that this page can show: alone in its quiz, with its addresses resolved, and with links to the lesson in place of
-   * simulations.
-   * @param {string} address of the lesson's page
-   * @param {string} lab the text of that link
-   * @returns {Promise<{section: HTMLElement, question: HTMLElement} | null>} `null` if the page has no such question
-   */
-  async question(address, quiz, key, lab) {
-    const page = await this.#page(address)
-    const source = [...page.querySelectorAll('[data-quiz]')].find((section) => section.dataset.quiz === quiz)
-    const original = [...(source?.querySelectorAll('[data-question]') ?? [])].find((candidate) => candidate.dataset.question === key)
-    if (!original) return null
-    const question = document.importNode(original, true)
-    resolveAddresses(question, address)
-    for (const element of question.querySelectorAll('[data-lab]')) {
-      element.replaceWith(h('p', {}, h('a', { href: `${address}#${encodeURIComponent(question.id)}` }, lab)))
-    }
-    const list = h('ol', { class: 'questions' }, question)
-    return { section: h('section', { class: 'quiz', 'data-quiz': quiz }, list), question }
+/**
+ * A question that this page can show: alone in its quiz, with its addresses resolved, and with links to the lesson in place of
+ * simulations.
+ * @param {Document} page of the lesson @param {string} address its address
+ * @param {string} lab the text of that link
+ * @returns {{section: HTMLElement, question: HTMLElement} | null} `null` if the page has no such question
+ */
+function takeQuestion(page, address, quiz, key, lab) {
+  const source = [...page.querySelectorAll('[data-quiz]')].find((section) => section.dataset.quiz === quiz)
+  const original = [...(source?.querySelectorAll('[data-question]') ?? [])].find((candidate) => candidate.dataset.question === key)
+  if (!original) return null
+  const question = document.importNode(original, true)
+  resolveAddresses(question, address)
+  for (const element of question.querySelectorAll('[data-lab]')) {
+    element.replaceWith(h('p', {}, h('a', { href: `${address}#${encodeURIComponent(question.id)}` }, lab)))
   }
-
-  #page(address) {
-    if (!this.#pages.has(address)) this.#pages.set(address, fetchPage(address))
-    return this.#pages.get(address)
-  }
+  const list = h('ol', { class: 'questions' }, question)
+  return { section: h('section', { class: 'quiz', 'data-quiz': quiz }, list), question }
 }
 
 async function fetchPage(address) {
@@ -188,7 +177,6 @@ async function fetchPage(address) {
   return new DOMParser().parseFromString(await response.text(), 'text/html')
 }
 
-/** Resolve the addresses in a part of another page. */
 function resolveAddresses(part, address) {
   for (const name of ['href', 'src', 'data-config', 'data-script']) {
     for (const element of part.querySelectorAll(`[${name}]`)) {

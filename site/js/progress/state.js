@@ -37,7 +37,6 @@ export function emptyState() {
   return { reset: 0, answers: new Map(), lessons: new Map() }
 }
 
-/** The latest tick in a state. */
 export function latest(state) {
   let tick = state.reset
   for (const entry of entriesOf(state)) {
@@ -75,7 +74,7 @@ function joinMaps(first = new Map(), second = new Map(), mergeValues) {
 }
 
 /** Merge two entries, given the time of a reset; `undefined` if nothing is left. */
-export function mergeEntries(first = NOTHING, second = NOTHING, reset = 0) {
+function mergeEntries(first = NOTHING, second = NOTHING, reset = 0) {
   const removedAt = Math.max(first.gone, second.gone)
   const cutoff = Math.max(removedAt, reset)
   const gone = removedAt > reset ? removedAt : 0
@@ -113,53 +112,23 @@ export function latestRecalls(recalls) {
 
 /** JSON with the keys of objects in order: equal values have equal texts. */
 export function canonical(value) {
-  if (Array.isArray(value)) return `[${value.map(canonical).join(',')}]`
-  if (value === null || typeof value !== 'object') return JSON.stringify(value)
-  const keys = Object.keys(value).sort()
-  return `{${keys.map((key) => `${JSON.stringify(key)}:${canonical(value[key])}`).join(',')}}`
+  const sorted = (item) => Object.fromEntries(Object.entries(item).sort(([a], [b]) => (a < b ? -1 : 1)))
+  return JSON.stringify(value, (_, item) => (isObject(item) ? sorted(item) : item))
 }
 
-const texts = new WeakMap()
+const plainMap = (map, plain) => Object.fromEntries([...map].map(([key, value]) => [key, plain(value)]))
 
-/** The text of a map, cached while the map is in use, so that of a large state only changes are written anew. */
-function mapText(map, textOf) {
-  let text = texts.get(map)
-  if (text === undefined) {
-    const keys = [...map.keys()].sort()
-    text = `{${keys.map((key) => `${JSON.stringify(key)}:${textOf(map.get(key))}`).join(',')}}`
-    texts.set(map, text)
-  }
-  return text
-}
-
-/** The same as `canonical`, but faster for answers, the most frequent values. */
-function valueText(name, value) {
-  if (name !== 'answer') return canonical(value)
-  const { at, given, hints, kind, lesson, number, right, tick, tries } = value
-  const texts = [at, kind, lesson].map((text) => JSON.stringify(text))
-  const start = `{"at":${texts[0]},"given":${canonical(given)},"hints":${hints},"kind":${texts[1]},"lesson":${texts[2]}`
-  return `${start},"number":${number},"right":${right},"tick":${tick},"tries":${tries}}`
-}
-
-function entryText(entry) {
-  let text = texts.get(entry)
-  if (text === undefined) {
-    const fields = [...entry.values].map(([name, value]) => `${JSON.stringify(name)}:${valueText(name, value)}`).sort()
-    if (entry.gone) fields.push(`"gone":${entry.gone}`)
-    if (entry.recalls.length) {
-      fields.push(`"recalls":[${entry.recalls.map(({ tick, right, at }) => `[${tick},${Number(right)},${at}]`).join(',')}]`)
-    }
-    text = `{${fields.join(',')}}`
-    texts.set(entry, text)
-  }
-  return text
+function plainEntry({ gone, values, recalls }) {
+  const fields = Object.fromEntries(values)
+  if (gone) fields.gone = gone
+  if (recalls.length) fields.recalls = recalls.map(({ tick, right, at }) => [tick, Number(right), at])
+  return fields
 }
 
 /** A state as text: equal states have equal texts. */
-export function encode(state, course) {
-  const head = `{"coursebuild":"progress","version":${VERSION},"course":${JSON.stringify(course)},"reset":${state.reset}`
-  const answers = mapText(state.answers, (entries) => mapText(entries, entryText))
-  return `${head},\n"answers":${answers},\n"lessons":${mapText(state.lessons, entryText)}}\n`
+export function encode({ reset, answers, lessons }, course) {
+  const plain = { answers: plainMap(answers, (entries) => plainMap(entries, plainEntry)), lessons: plainMap(lessons, plainEntry) }
+  return `${canonical({ coursebuild: 'progress', version: VERSION, course, reset, ...plain })}\n`
 }
 
 /**

@@ -11,7 +11,7 @@
  *    so. A damaged text is backed up before anything is written; its valid parts are taken over.
  */
 
-import { openStorage } from '../page/choices.js'
+import { openStorage, readChoice, writeChoice } from '../page/choices.js'
 import { PREFIX } from './storage.js'
 import { changesSchedule } from './schedule.js'
 import { answerOf, canonical, emptyState, encode, isTime, latest, latestRecalls, merge, NOTHING } from './state.js'
@@ -163,7 +163,6 @@ class Progress {
     this.#setLesson(id, 'place', placeOf({ section: anchor, title: title.slice(0, 300), share, at: time }))
   }
 
-  /** Record whether a lesson is read. */
   markLesson(id, read) {
     this.#setLesson(id, 'read', readOf({ value: read, at: new Date(this.#now()).toISOString() }))
   }
@@ -245,19 +244,11 @@ class Progress {
 
   /** The backup of a damaged text, or `null`. */
   damagedText() {
-    try {
-      return this.#storage?.getItem(`${this.#name}.damaged`) ?? null
-    } catch {
-      return null
-    }
+    return readChoice(`${this.#name}.damaged`, this.#storage)
   }
 
   dropDamaged() {
-    try {
-      this.#storage?.removeItem(`${this.#name}.damaged`)
-    } catch {
-      // The storage is blocked: there is nothing to drop.
-    }
+    writeChoice(`${this.#name}.damaged`, null, this.#storage)
   }
 
   // --- inner

@@ -1,13 +1,13 @@
 /** Questions with options: one right (`mcq`), all that are right (`several`), and predictions. */
 
+import { textWithout } from '../page/select.js'
 import { gradeChoice } from './grade.js'
 import { copyOf, fill, h, keysIn, shape } from './parts.js'
 
 /** Name an option that is only a formula by its TeX, as not every screen reader takes a name from MathML. */
 function nameFormula(input, text) {
   const formulas = [...text.querySelectorAll('math')]
-  const words = [text.textContent, ...formulas.map((formula) => formula.textContent)].reduce((rest, part) => rest.replace(part, ''))
-  if (formulas.length === 0 || words.trim()) return
+  if (formulas.length === 0 || textWithout(text, 'math') !== '') return
   const texOf = (formula) => formula.querySelector('annotation')?.textContent ?? formula.textContent
   input.setAttribute('aria-label', formulas.map(texOf).join(' '))
 }
@@ -46,13 +46,6 @@ export class Choices {
     const keys = Array.isArray(entry) ? entry : []
     for (const { key, input } of this.options) input.checked = keys.includes(key)
     return this.entry() !== null
-  }
-
-  clear() {
-    for (const { input } of this.options) {
-      input.checked = false
-      input.disabled = false
-    }
   }
 
   focus() {

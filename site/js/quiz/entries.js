@@ -46,10 +46,6 @@ class Entry {
     return this.entry() !== null
   }
 
-  clear() {
-    this.input.value = ''
-  }
-
   focus() {
     this.input.focus()
   }
@@ -138,11 +134,6 @@ export class Open {
     this.input.value = typeof entry?.text === 'string' ? entry.text : ''
     for (const radio of this.radios) radio.checked = radio.value === entry?.mark
     return this.entry() !== null
-  }
-
-  clear() {
-    this.input.value = ''
-    for (const radio of this.radios) radio.checked = false
   }
 
   focus() {

@@ -4,9 +4,9 @@
  * An item that has the focus or the pointer is never moved in the document, since it would lose both: the other items are.
  */
 
+import { textWithout } from '../page/select.js'
 import { gradeOrder } from './grade.js'
-import { moveBy, placeAt, moveTo, restoreOrder } from './order.js'
-import { fill, h, keysIn, shape, spokenText } from './parts.js'
+import { fill, h, keysIn, shape } from './parts.js'
 
 export class Ordering {
   constructor(question) {
@@ -50,13 +50,8 @@ export class Ordering {
   }
 
   show(entry) {
-    if (!Array.isArray(entry)) return false
     this.#arrange(restoreOrder(entry, this.initialOrder))
-    return true
-  }
-
-  clear() {
-    this.#arrange(this.initialOrder)
+    return Array.isArray(entry)
   }
 
   focus() {
@@ -83,7 +78,7 @@ export class Ordering {
   }
 
   #announce(key) {
-    const item = spokenText(this.items.get(key).text)
+    const item = textWithout(this.items.get(key).text, 'annotation, annotation-xml') // as it is read aloud
     this.status.textContent = fill(this.words('quiz.live.moved'), { item, place: this.order.indexOf(key) + 1, all: this.order.length })
   }
 
@@ -143,4 +138,35 @@ export class Ordering {
     grip.addEventListener('pointerup', end)
     grip.addEventListener('pointercancel', end)
   }
+}
+
+// --- orders, as lists of keys
+
+/** Move an item by some places; it stops at the ends. */
+export function moveBy(order, key, steps) {
+  return moveTo(order, key, order.indexOf(key) + steps)
+}
+
+export function moveTo(order, key, place) {
+  return order.filter((item) => item !== key).toSpliced(Math.max(place, 0), 0, key)
+}
+
+/**
+ * Adapt a stored order to the present items: removed ones are left out, new ones come at the end.
+ * @param {unknown} storedOrder
+ * @param {string[]} present
+ */
+export function restoreOrder(storedOrder, present) {
+  if (!Array.isArray(storedOrder)) return [...present]
+  const valid = [...new Set(storedOrder)].filter((key) => present.includes(key))
+  return [...valid, ...present.filter((key) => !valid.includes(key))]
+}
+
+/**
+ * The place for a dragged item: the number of other items whose middle is above the pointer.
+ * @param {number} y of the pointer
+ * @param {number[]} middles of the other items, in their order
+ */
+export function placeAt(y, middles) {
+  return middles.filter((middle) => middle < y).length
 }

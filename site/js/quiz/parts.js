@@ -1,7 +1,7 @@
 /** Small parts that all kinds of questions share. */
 
 import { h, pictogram } from '../lab/page/dom.js'
-import { fill } from '../lab/page/words.js'
+import { fill } from '../page/words.js'
 
 export { fill, h }
 
@@ -23,10 +23,6 @@ export function shape(name) {
   return svg
 }
 
-export function button(text, properties = {}) {
-  return h('button', { type: 'button', class: 'quiz-button', ...properties }, text)
-}
-
 /** Show or hide an element; if it has the focus, hand it on to `next`. */
 export function setHidden(element, hidden, next) {
   if (hidden && element.contains(document.activeElement)) next?.focus()
@@ -38,13 +34,6 @@ export function copyOf(element) {
   const copy = element.cloneNode(true)
   for (const child of copy.querySelectorAll('[id]')) child.removeAttribute('id')
   return copy.childNodes
-}
-
-/** The text of an element as it is read aloud: without the source of its formulas. */
-export function spokenText(element) {
-  const copy = element.cloneNode(true)
-  for (const source of copy.querySelectorAll('annotation, annotation-xml')) source.remove()
-  return copy.textContent.replace(/\s+/g, ' ').trim()
 }
 
 /** The keys in a data attribute. */

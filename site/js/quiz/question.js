@@ -5,16 +5,17 @@
  * explanation, the feedback to options) move into the verdict when they are due, and back. Nothing is copied, so that no id occurs
  * twice.
  *
- * The control of a kind has `body`, `entry()`, `show(entry)`, `clear()`, `focus()`, `grade(entry)`, `mark(result)` and the text of
+ * The control of a kind has `body`, `entry()`, `show(entry)` (nothing, if it is null), `focus()`, `grade(entry)`, `mark(result)` and the text of
  * its button, `submit`. A result is `{ state, right, line, more, nodes, feedback, solution, finished }`: `line` replaces the verdict's
  * usual sentence, `more` is added to it, `nodes` come below; `feedback` lists the options whose feedback is shown, and `solution` says
  * whether the solution is.
  */
 
+import { textButton } from '../lab/page/dom.js'
 import { Choices } from './choices.js'
 import { Numeric, Open, Output } from './entries.js'
 import { Ordering } from './ordering.js'
-import { button, fill, h, setHidden, shape } from './parts.js'
+import { fill, h, setHidden, shape } from './parts.js'
 
 const KINDS = { mcq: Choices, several: Choices, predict: Choices, numeric: Numeric, output: Output, open: Open, order: Ordering }
 
@@ -55,7 +56,6 @@ export class Question {
 
   /** Show a stored answer, without storing it again. @returns {boolean} whether there was anything to show */
   restore({ given: entry, tries, hints, at }) {
-    this.control.clear()
     if (!this.control.show(entry)) return false
     this.savedAt = at
     this.tries = Number.isFinite(tries) ? tries : 1
@@ -69,7 +69,7 @@ export class Question {
 
   /** Reset the question to its state before any answer. */
   empty() {
-    this.control.clear()
+    this.control.show(null)
     this.tries = 0
     this.savedAt = ''
     this.dirty = false
@@ -114,7 +114,7 @@ export class Question {
   }
 
   retry() {
-    this.control.clear()
+    this.control.show(null)
     this.dirty = false
     this.#set(null)
     this.control.focus()
@@ -135,8 +135,8 @@ export class Question {
     const { element, control } = this
     this.verdict = h('div', { class: 'verdict', role: 'status', 'aria-atomic': 'false' })
     this.checking = h('button', { type: 'submit', class: 'quiz-button quiz-check' }, control.submit)
-    this.revealing = button(this.words('quiz.live.reveal'), { hidden: true, onclick: () => this.reveal() })
-    this.retrying = button(this.words('quiz.live.again'), { hidden: true, onclick: () => this.retry() })
+    this.revealing = textButton(this.words('quiz.live.reveal'), () => this.reveal(), 'quiz-button')
+    this.retrying = textButton(this.words('quiz.live.again'), () => this.retry(), 'quiz-button')
     const submit = (event) => {
       event.preventDefault()
       this.check()

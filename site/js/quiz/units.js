@@ -4,13 +4,16 @@
  *   readUnit('kg·m²')[0]                     → { scale: 1, offset: 0, powers: { kg: 1, m: 2 } }
  *   relation(readUnit('g cm^2'), readUnit('kg m^2'))  → { factor: 1e-7, offset: 0 }
  *
- * The units are those of the course's checks, in `unit-table.js`. An angle is no dimension, but treating it as one reveals mistakes: `rad`
+ * The units and their names are those of the course's checks: of each symbol the scale, the powers of the base units, whether it takes
+ * prefixes, and where its scale begins (K). An angle is no dimension, but treating it as one reveals mistakes: `rad`
  * and `deg` may be omitted or added, but hertz count cycles and are not taken for radians per second.
  */
 
 import { normalise } from './numbers.js'
-import { UNITS } from './unit-table.js'
+import table from './unit-table.json' with { type: 'json' }
 
+/** @type {Record<string, any>} */
+const UNITS = table.units
 const PREFIXES = {
   Q: 30, R: 27, Y: 24, Z: 21, E: 18, P: 15, T: 12, G: 9, M: 6, k: 3, h: 2, da: 1,
   d: -1, c: -2, m: -3, μ: -6, u: -6, n: -9, p: -12, f: -15, a: -18, z: -21, y: -24, r: -27, q: -30,
@@ -19,18 +22,11 @@ const ONE = { scale: 1, offset: 0, powers: {} }
 const ANGLE = 'rad'
 const CYCLES = 'cycle'
 
-/** Other ways to write a unit. */
+/** Other ways to write a unit: the names of the table, and slips. */
 const NAMES = {
-  "'": '′', degF: '°F', fahrenheit: '°F', kelvins: 'K',
-  deg: '°', degree: '°', degrees: '°', arcmin: "'", radian: 'rad', radians: 'rad', degC: '°C', celsius: '°C',
-  grad: '°', Grad: '°', grado: '°', grados: '°', degré: '°', degrés: '°',
-  rev: 'turn', revs: 'turn', turns: 'turn', revolution: 'turn', revolutions: 'turn', RPM: 'rpm',
-  meter: 'm', meters: 'm', metre: 'm', metres: 'm', kilogram: 'kg', kilograms: 'kg', gram: 'g', grams: 'g', kelvin: 'K',
-  secs: 's', second: 's', seconds: 's', minute: 'min', minutes: 'min', hour: 'h', hours: 'h', hr: 'h', day: 'd', days: 'd',
-  newton: 'N', newtons: 'N', joule: 'J', joules: 'J', watt: 'W', watts: 'W', pascal: 'Pa', pascals: 'Pa', hertz: 'Hz',
-  volt: 'V', volts: 'V', ampere: 'A', amperes: 'A', coulomb: 'C', coulombs: 'C', tesla: 'T', ohms: 'Ω', litre: 'l', liter: 'l',
-  inch: 'in', inches: 'in', foot: 'ft', feet: 'ft', mile: 'mi', miles: 'mi', pound: 'lb', pounds: 'lb',
-  litres: 'l', liters: 'l', percent: '%', Kg: 'kg', KG: 'kg', hz: 'Hz', HZ: 'Hz', Rad: 'rad', Deg: '°', Nm: 'N m',
+  ...table.names,
+  "'": '′', grad: '°', Deg: '°', degré: '°', degrés: '°', revs: 'rev', Kg: 'kg', KG: 'kg', kilogram: 'kg', kilograms: 'kg',
+  hz: 'Hz', HZ: 'Hz', Rad: 'rad', Nm: 'N m',
 }
 
 /**

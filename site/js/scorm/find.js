@@ -3,55 +3,29 @@
 const DEPTH = 50 // the most nested frames that are searched
 
 /**
- * The platform's API: in this window or a parent of it, else in the window that opened this one or a parent of that; else `null`.
- * Windows of other hosts are passed over.
+ * The platform's API: in this window or a parent of it, else in the window that opened this one, or of which this one is a frame, or in a
+ * parent of that; else `null`. Windows of other hosts are passed over.
  * @param {Window} window
  */
 export function findApi(window) {
-  return findAbove(window) ?? findAbove(openerOf(window)) ?? openersOfTop(window)
+  return findAbove(window) ?? findAbove(read(window, 'opener')) ?? findAbove(read(read(window, 'top'), 'opener'))
 }
 
 function findAbove(window) {
   for (let depth = 0; window && depth < DEPTH; depth++) {
-    const api = apiOf(window)
+    const api = read(window, 'API')
     if (api) return api
-    const parent = parentOf(window)
+    const parent = read(window, 'parent')
     if (parent === window) return null
     window = parent
   }
   return null
 }
 
-/** A platform may open a window of which this one is a frame: then the top window has the opener. */
-function openersOfTop(window) {
-  let top = window
-  for (let depth = 0; depth < DEPTH; depth++) {
-    const parent = parentOf(top)
-    if (!parent || parent === top) break
-    top = parent
-  }
-  return top === window ? null : findAbove(openerOf(top))
-}
-
-function apiOf(window) {
+/** A property of a window; `null` where another host forbids to read it. */
+function read(window, name) {
   try {
-    return window.API ?? null
-  } catch {
-    return null
-  }
-}
-
-function parentOf(window) {
-  try {
-    return window.parent ?? null
-  } catch {
-    return null
-  }
-}
-
-function openerOf(window) {
-  try {
-    return window?.opener ?? null
+    return window?.[name] ?? null
   } catch {
     return null
   }

@@ -1,9 +1,5 @@
 /** Follows the lesson's pages in the frame: their questions, answers, and how far they are read. */
 
-import { Reading } from '../progress/reading.js'
-
-const SECOND = 1000
-
 /**
  * Follow the pages in a frame.
  * @param {HTMLIFrameElement} frame
@@ -12,9 +8,7 @@ const SECOND = 1000
  * @param {() => void} onChange called after each change
  */
 export function followFrame(frame, lesson, visit, onChange) {
-  let timer = 0
   const begin = () => {
-    clearInterval(timer)
     const { document } = frame.contentWindow
     document.addEventListener('coursebuild:answered', ({ detail: { quiz, key, answer } }) => {
       visit.answered(quiz, key, answer)
@@ -22,7 +16,12 @@ export function followFrame(frame, lesson, visit, onChange) {
     })
     if (document.querySelector('main')?.dataset.lesson !== lesson) return
     visit.shows(questionsOf(document))
-    timer = watchReading(frame.contentWindow, visit, onChange)
+    document.addEventListener('coursebuild:reading', ({ detail: { section, isRead } }) => {
+      visit.isAt(section)
+      if (!isRead) return
+      visit.wasRead()
+      onChange()
+    })
     onChange()
   }
   frame.addEventListener('load', begin)
@@ -43,22 +42,4 @@ export function questionsOf(document) {
     return { quiz, key, kind, parts, answer: kind === 'open' ? null : answer ?? null }
   })
   return [...questions, ...exercises]
-}
-
-function watchReading(window, visit, onChange) {
-  const text = window.document.querySelector('.prose')
-  if (!text) return 0
-  const reading = new Reading()
-  const headings = [...text.querySelectorAll(':is(h2, h3)[id]')]
-  const look = () => {
-    if (window.document.visibilityState !== 'visible') return
-    const { top, height } = text.getBoundingClientRect()
-    reading.look(-top / height, (window.innerHeight - top) / height)
-    const passedHeadings = headings.filter((heading) => heading.getBoundingClientRect().top <= window.innerHeight / 4)
-    visit.isAt(passedHeadings.at(-1)?.id ?? '')
-    if (!reading.isRead) return
-    visit.wasRead()
-    onChange()
-  }
-  return setInterval(look, SECOND)
 }

@@ -61,7 +61,6 @@ class Session {
     return true
   }
 
-  /** Record an answer. */
   answer(question, answer) {
     if (!this.#open || !this.records || this.#recorded >= MOST || !this.#supported.interactions.includes('id')) return
     const prefix = `cmi.interactions.${this.#interactionCount}.`

@@ -8,6 +8,8 @@
  * 3. Each answer goes to the platform at once, with the new points and status.
  */
 
+import { readChoice, writeChoice } from '../page/choices.js'
+import { hashOf } from '../page/hash.js'
 import { grade, nameOf } from './answers.js'
 import { pack, unpack } from './suspend.js'
 
@@ -50,7 +52,6 @@ export class Visit {
     this.#report()
   }
 
-  /** A question was answered. */
   answered(quiz, key, answer) {
     if (answer.lesson !== this.#lesson) return
     this.#answers.set(nameOf(quiz, key), { quiz, key, ...answer })
@@ -59,7 +60,6 @@ export class Visit {
     this.#report()
   }
 
-  /** The lesson was read. */
   wasRead() {
     if (this.#read) return
     this.#read = true
@@ -71,7 +71,6 @@ export class Visit {
     this.location = anchor
   }
 
-  /** The visit ends. */
   ends() {
     this.#report()
     this.#session.finish()
@@ -94,19 +93,8 @@ export class Visit {
 /** Whether this browser's progress belongs to another learner; from now on it belongs to this one. */
 function changesLearner(learner, course, storage) {
   const name = `${LEARNER}${course}`
-  const mark = digest(learner)
-  try {
-    if (storage?.getItem(name) === mark) return false
-    storage?.setItem(name, mark)
-    return true // also if it belongs to nobody that a platform has named
-  } catch {
-    return true // unknown
-  }
-}
-
-/** A digest that distinguishes learners without storing their names: FNV-1a, 32 bits (G. Fowler, L. Noll, K. Vo). */
-function digest(text) {
-  let hash = 0x811c9dc5
-  for (const byte of new TextEncoder().encode(text)) hash = Math.imul(hash ^ byte, 0x01000193) >>> 0
-  return hash.toString(16)
+  const mark = hashOf(learner).toString(16) // a name is not stored
+  if (readChoice(name, storage) === mark) return false
+  writeChoice(name, mark, storage)
+  return true // also if it belongs to nobody that a platform has named, or that is unknown
 }

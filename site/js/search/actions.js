@@ -2,8 +2,8 @@
  * The actions of a page: commands made from its elements, and lessons by their number.
  */
 
+import { fill } from '../page/words.js'
 import { termsOf } from './words.js'
-import { fillIn } from './view.js'
 
 /** The commands of a page, each with an id and a title; `href` is its target, `run` does it and may return a message. */
 export function pageActions(document, strings) {
@@ -17,7 +17,7 @@ function* pageLinks(document, strings) {
   ]) {
     const link = document.querySelector(`.pager a[rel="${rel}"]`)
     const title = link?.querySelector('.pager-title') ?? link
-    if (link) yield { id: rel, title: fillIn(text, { title: plain(title) }), href: link.href }
+    if (link) yield { id: rel, title: fill(text, { title: plain(title) }), href: link.href }
   }
 }
 
@@ -39,7 +39,7 @@ function* commands(document, strings) {
       themes.value = option.value
       themes.dispatchEvent(new Event('change', { bubbles: true }))
     }
-    yield { id: `theme-${option.value}`, title: fillIn(strings.command_theme, { theme: option.text }), run }
+    yield { id: `theme-${option.value}`, title: fill(strings.command_theme, { theme: option.text }), run }
   }
 }
 
@@ -55,9 +55,9 @@ function* menuPages(document) {
 const plain = (node) => node.textContent.replace(/\s+/g, ' ').trim()
 
 /** The address of the current section. */
-export function hereAddress(document) {
+function hereAddress(document) {
   const headings = [...document.querySelectorAll('main :is(h2, h3, h4, h5, h6)[id]')]
-  const current = headings.filter((heading) => heading.getBoundingClientRect().top <= innerHeight * 0.25).pop()
+  const current = headings.findLast((heading) => heading.getBoundingClientRect().top <= innerHeight * 0.25)
   return document.baseURI.split('#')[0] + (current ? `#${encodeURIComponent(current.id)}` : '')
 }
 

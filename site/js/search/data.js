@@ -3,8 +3,7 @@
  * scripts from disk, but no other data.
  */
 
-/** A file could not be loaded. */
-export class DataError extends Error {}
+import { loadScript } from '../page/scripts.js'
 
 const arrivals = new WeakMap() // script element → its value
 
@@ -13,36 +12,9 @@ export function take(kind, name, value) {
   arrivals.set(document.currentScript, value)
 }
 
-/** Load the value of a file. */
-export function loadFile(address) {
-  return new Promise((resolve, reject) => {
-    const script = document.createElement('script')
-    script.src = address
-    script.onload = () => {
-      script.remove()
-      if (arrivals.has(script)) resolve(arrivals.get(script))
-      else reject(new DataError(address))
-    }
-    script.onerror = () => {
-      script.remove()
-      reject(new DataError(address))
-    }
-    document.head.append(script)
-  })
-}
-
-/** A function that caches its last results, promises, by its argument; rejected ones are dropped. */
-export function memoize(make, limit) {
-  const cache = new Map()
-  return (key) => {
-    let promise = cache.get(key)
-    cache.delete(key)
-    if (promise === undefined) {
-      promise = make(key)
-      promise.catch(() => cache.get(key) === promise && cache.delete(key))
-    }
-    cache.set(key, promise)
-    if (cache.size > limit) cache.delete(cache.keys().next().value)
-    return promise
-  }
+export async function loadFile(address) {
+  const script = await loadScript(address)
+  script.remove()
+  if (!arrivals.has(script)) throw new Error(address)
+  return arrivals.get(script)
 }

@@ -3,9 +3,11 @@
  * an option, Enter opens it, Escape closes the dialog, and the focus returns to where it was.
  */
 
+import { h } from '../lab/page/dom.js'
+import { fill } from '../page/words.js'
 import { matchActions, pagesByNumber, pageActions } from './actions.js'
 import { forgetQueries, noteQuery, recentQueries } from './recent.js'
-import { address, element, fillIn, hitParts, pageTitle, summary } from './view.js'
+import { address, hitParts, pageTitle, summary } from './view.js'
 
 const PAGES = 8
 const ACTIONS = 3 // beside results
@@ -32,27 +34,27 @@ class SearchDialog {
   }
 
   build() {
-    this.input = element('input', {
+    this.input = h('input', {
       id: '_search-field',
       class: 'search-input',
       type: 'text',
-      inputmode: 'search',
-      enterkeyhint: 'go',
+      inputMode: 'search',
+      enterKeyHint: 'go',
       role: 'combobox',
       'aria-autocomplete': 'list',
       'aria-expanded': 'false',
       'aria-controls': '_search-list',
       autocomplete: 'off',
       autocapitalize: 'off',
-      spellcheck: 'false',
-      maxlength: '200',
+      spellcheck: false,
+      maxLength: 200,
     })
-    this.closeButton = element('button', { type: 'button', class: 'search-close' }, 'Esc')
-    this.status = element('p', { class: 'search-status', role: 'status' })
-    this.list = element('div', { id: '_search-list', class: 'search-list', role: 'listbox' })
-    this.foot = element('div', { class: 'search-foot' })
-    const bar = element('div', { class: 'search-bar' }, this.input, this.closeButton)
-    this.dialog = element('dialog', { class: 'search-dialog' }, bar, this.status, this.list, this.foot)
+    this.closeButton = h('button', { type: 'button', class: 'search-close' }, 'Esc')
+    this.status = h('p', { class: 'search-status', role: 'status' })
+    this.list = h('div', { id: '_search-list', class: 'search-list', role: 'listbox' })
+    this.foot = h('div', { class: 'search-foot' })
+    const bar = h('div', { class: 'search-bar' }, this.input, this.closeButton)
+    this.dialog = h('dialog', { class: 'search-dialog' }, bar, this.status, this.list, this.foot)
     document.body.append(this.dialog)
     this.closeButton.addEventListener('click', () => this.close())
     this.dialog.addEventListener('click', (event) => event.target === this.dialog && this.close())
@@ -110,7 +112,7 @@ class SearchDialog {
     if (query.trim() === '') return this.render(this.suggestions(actions), '')
     if (query.trimStart().startsWith('>')) {
       const matches = matchActions(actions, query.trimStart().slice(1))
-      const status = matches.length > 0 ? '' : fillIn(this.strings.none, { query: query.trim() })
+      const status = matches.length > 0 ? '' : fill(this.strings.none, { query: query.trim() })
       return this.render([this.actionGroup(matches)], status)
     }
     let result
@@ -168,7 +170,7 @@ class SearchDialog {
     const href = (anchor) => address(this.context.root, page.path, anchor)
     const places = page.hits.filter(({ anchor }) => anchor !== '')
     const lead = page.hits.find(({ anchor }) => anchor === '')
-    const top = [element('span', { class: 'found-title' }, ...pageTitle(page, this.strings)), ...(lead ? hitParts(lead) : [])]
+    const top = [h('span', { class: 'found-title' }, ...pageTitle(page, this.strings)), ...(lead ? hitParts(lead) : [])]
     const options = [
       { parts: top, href: href('') },
       ...places.map((hit) => ({ parts: hitParts(hit), href: href(hit.anchor), inner: true })),
@@ -192,8 +194,8 @@ class SearchDialog {
       ...visibleGroups.map(({ name, hidden, options }) => {
         const elements = options.map((option) => this.optionElement(option, number++))
         if (name === null) return elements[0]
-        const group = element('div', { role: 'group', 'aria-label': name, class: 'search-group' })
-        if (!hidden) group.append(element('div', { class: 'search-label', 'aria-hidden': 'true' }, name))
+        const group = h('div', { role: 'group', 'aria-label': name, class: 'search-group' })
+        if (!hidden) group.append(h('div', { class: 'search-label', 'aria-hidden': 'true' }, name))
         group.append(...elements)
         return group
       }),
@@ -207,8 +209,8 @@ class SearchDialog {
 
   optionElement({ parts, href, inner, quiet }, number) {
     const kind = ['search-option', inner && 'search-inner', quiet && 'search-quiet'].filter(Boolean).join(' ')
-    const attributes = { role: 'option', id: `_search-${number}`, class: kind, tabindex: '-1', 'data-at': number, 'aria-selected': 'false' }
-    return href ? element('a', { ...attributes, href }, ...parts) : element('div', attributes, ...parts)
+    const attributes = { role: 'option', id: `_search-${number}`, class: kind, tabIndex: -1, 'data-at': number, 'aria-selected': 'false' }
+    return href ? h('a', { ...attributes, href }, ...parts) : h('div', attributes, ...parts)
   }
 
   // --- choice
@@ -279,21 +281,21 @@ class SearchDialog {
   }
 
   shortcutSwitch() {
-    const box = element('input', { type: 'checkbox' })
+    const box = h('input', { type: 'checkbox' })
     box.checked = this.context.singleKeys()
     box.addEventListener('change', () => this.context.setSingleKeys(box.checked))
-    return element('label', { class: 'search-keys' }, box, ' ', this.strings.slash)
+    return h('label', { class: 'search-keys' }, box, ' ', this.strings.slash)
   }
 }
 
 function hint(strings) {
-  const text = fillIn(strings.hint, { up: '↑', down: '↓', enter: '↵', escape: 'Esc' })
-  return element('p', { 'aria-hidden': 'true' }, text)
+  const text = fill(strings.hint, { up: '↑', down: '↓', enter: '↵', escape: 'Esc' })
+  return h('p', { 'aria-hidden': 'true' }, text)
 }
 
 /** Show a message for a moment. */
 function say(text) {
-  const note = element('p', { class: 'search-said', role: 'status' })
+  const note = h('p', { class: 'search-said', role: 'status' })
   document.body.append(note)
   // A live region must exist before its text.
   setTimeout(() => (note.textContent = text), 50)

@@ -4,8 +4,8 @@
  * Entry point: `openSearch(load)`.
  */
 
+import { memoize } from '../page/scripts.js'
 import { pageFile, readShard, shardFile } from './index.js'
-import { memoize } from './data.js'
 import { byRank, findPages } from './pages.js'
 import { excerpt, findSections, markWords, openPage, phraseFactor, trail } from './sections.js'
 import { lexicon } from './spelling.js'
@@ -60,7 +60,6 @@ export async function openSearch(load) {
   return { listing, find }
 }
 
-/** A page as a result. */
 function makeResult(listing, number, page, words, score) {
   const [path, kind, title, name] = listing.pages[number]
   const result = { path, kind: listing.kinds[kind], name, title: markWords(title, words), score, hits: [] }

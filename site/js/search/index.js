@@ -6,7 +6,8 @@
  * times 4 plus how often the term occurs (0 once, 1 up to three times, 2 up to nine, 3 more).
  */
 
-import { hashOf, shelfOf } from './words.js'
+import { hashOf } from '../page/hash.js'
+import { shelfOf } from './words.js'
 
 const DIGITS = '0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_'
 const VALUE = Object.fromEntries([...DIGITS].map((digit, value) => [digit, value]))

@@ -1,7 +1,8 @@
 /** The search page: a form, and below it the results as a list. */
 
+import { h } from '../lab/page/dom.js'
 import { noteQuery } from './recent.js'
-import { address, element, hitParts, pageTitle, summary } from './view.js'
+import { address, hitParts, pageTitle, summary } from './view.js'
 
 const STEP = 15 // pages at a time
 const WAIT = 200 // ms after the last key
@@ -11,9 +12,9 @@ export async function mountPage(context) {
   const form = document.querySelector('[data-search-form]')
   const input = form.querySelector('input')
   const place = document.querySelector('[data-search-results]')
-  const status = element('p', { class: 'search-status', role: 'status' })
-  const list = element('ol', { class: 'found-pages' })
-  const moreButton = element('button', { type: 'button', class: 'search-more', hidden: true })
+  const status = h('p', { class: 'search-status', role: 'status' })
+  const list = h('ol', { class: 'found-pages' })
+  const moreButton = h('button', { type: 'button', class: 'search-more', hidden: true })
   place.replaceChildren(status, list, moreButton)
   let lastRequest = 0
   let limit = STEP
@@ -64,19 +65,19 @@ export async function mountPage(context) {
 }
 
 function pageItem(page, root, strings) {
-  const link = element('a', { href: address(root, page.path) }, ...pageTitle(page, strings))
+  const link = h('a', { href: address(root, page.path) }, ...pageTitle(page, strings))
   const lead = page.hits.find(({ anchor }) => anchor === '')
   const places = page.hits.filter(({ anchor }) => anchor !== '')
-  return element(
+  return h(
     'li',
     {},
-    element('h2', { class: 'found-title' }, link),
-    lead ? element('p', {}, ...hitParts(lead)) : null,
-    places.length > 0 ? element('ul', {}, ...places.map((hit) => placeItem(hit, page.path, root))) : null,
+    h('h2', { class: 'found-title' }, link),
+    lead ? h('p', {}, ...hitParts(lead)) : null,
+    places.length > 0 ? h('ul', {}, ...places.map((hit) => placeItem(hit, page.path, root))) : null,
   )
 }
 
 function placeItem(hit, path, root) {
   const [trail, ...rest] = hitParts(hit)
-  return element('li', {}, element('a', { href: address(root, path, hit.anchor) }, trail), ...rest)
+  return h('li', {}, h('a', { href: address(root, path, hit.anchor) }, trail), ...rest)
 }

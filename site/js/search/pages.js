@@ -49,7 +49,7 @@ export async function findPages(query, source) {
 }
 
 /** A query without the TeX for the look of a formula, and with subscripts as in plain text. */
-export const plainQuery = (query) =>
+const plainQuery = (query) =>
   query
     .replace(/\\(?:math[a-z]+|text[a-z]*|boldsymbol|bm|left|right|operatorname)(?![a-z])/g, ' ')
     .replace(/([A-Za-z0-9])_\{(\w+)\}/g, '$1_$2')

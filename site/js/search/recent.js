@@ -23,7 +23,6 @@ export function noteQuery(course, query, storage) {
   writeChoice(key(course), JSON.stringify([trimmed, ...rest].slice(0, MOST)), storage)
 }
 
-/** Forget all queries. */
 export function forgetQueries(course, storage) {
   writeChoice(key(course), null, storage)
 }

@@ -197,10 +197,3 @@ export function isFuzzy(term) {
   const length = [...term].length
   return length >= 3 && length <= 24 && !term.includes('.') && !isDigit(term[0]) && !ROW.test(term)
 }
-
-/** FNV-1a of a text in UTF-8, 32 bits. */
-export function hashOf(text) {
-  let value = 0x811c9dc5
-  for (const byte of new TextEncoder().encode(text)) value = Math.imul(value ^ byte, 0x01000193) >>> 0
-  return value
-}

@@ -88,7 +88,7 @@ def fill_in_values(export: Export, values: Mapping[int, float | str]) -> str:
 def _literal(value: float | str) -> str:
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
-    return str(int(value)) if value == int(value) and abs(value) < 1e15 else repr(value)
+    return str(int(value)) if abs(value) < 1e15 and value == int(value) else repr(value)
 
 
 def initial_values(lab: Lab) -> dict[int, float | str]:

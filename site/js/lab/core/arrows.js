@@ -6,6 +6,8 @@
  * The data must be up to date and are only read, so that drawing arrows changes no bit of the motion.
  */
 
+import { cross, toLocal, toWorld } from './vectors.js'
+
 const PART = 0.3 // length of a typical arrow, in heights of the picture
 const THICK = 0.009 // radius of an arrow, in heights of the picture
 const AXIS = 0.42 // how far an axis reaches to either side, in the same
@@ -18,7 +20,6 @@ const INNER = 0.84 // place of a double arrow's second head, in lengths of the a
 const COLOURS = { momentum: [0, 0.45, 0.7, 1], angularMomentum: [0.84, 0.37, 0, 1], axis: [0.62, 0.34, 0.6, 1] }
 
 const add = (a, b, k = 1) => a.map((x, i) => x + k * b[i])
-const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 const norm = (a) => Math.hypot(...a)
 const vectorAt = (array, i) => Array.from(array.subarray(3 * i, 3 * i + 3))
 
@@ -54,8 +55,8 @@ function motionOf(model, data, id) {
   const offset = add(place, vectorAt(data.subtree_com, model.body_rootid[id]), -1)
   const velocity = add(vectorAt(data.cvel, 2 * id + 1), cross(rate, offset))
   const R = data.ximat.subarray(9 * id, 9 * id + 9)
-  const local = vectorAt(model.body_inertia, id).map((I, j) => I * (R[j] * rate[0] + R[3 + j] * rate[1] + R[6 + j] * rate[2]))
-  const spin = [0, 1, 2].map((i) => R[3 * i] * local[0] + R[3 * i + 1] * local[1] + R[3 * i + 2] * local[2])
+  const local = toLocal(R, rate)
+  const spin = toWorld(R, vectorAt(model.body_inertia, id).map((I, j) => I * local[j]))
   return { id, mass: model.body_mass[id], place, velocity, rate, spin }
 }
 

@@ -2,19 +2,18 @@
  * Real time, kept by whole timesteps.
  *
  * The clock owes the simulation the time that has passed, times the speed. `stepsDue` says how many whole steps that is;
- * `countSteps` subtracts those that were made. The timestep itself is never changed. At most `catchUp` seconds are made up for,
+ * `countSteps` subtracts those that were made. The timestep itself is never changed. At most `CATCH_UP` seconds are made up for,
  * so that a lab which was slow for a moment does not race afterwards; `ratio` says how far behind it runs.
  *
  * Pure: the caller brings the time, in seconds.
  */
 
 const WINDOW = 1 // s of real time that `ratio` looks back on
+const CATCH_UP = 0.1 // s of real time, the most that is made up for
 const EPSILON = 1e-9 // of a step: rounding must not cost one
 
 export class Clock {
-  /** @param {{catchUp?: number}} [options] catchUp: the most real time (s) that is made up for */
-  constructor({ catchUp = 0.1 } = {}) {
-    this.catchUp = catchUp
+  constructor() {
     this.speed = 1
     this.stop()
   }
@@ -33,7 +32,7 @@ export class Clock {
     if (!(speed > 0) || !Number.isFinite(speed)) throw new RangeError(`a speed of ${speed} is not possible`)
     this.speed = speed
     this.marks = []
-    this.debt = Math.min(this.debt, this.catchUp * speed)
+    this.debt = Math.min(this.debt, CATCH_UP * speed)
   }
 
   /**
@@ -47,8 +46,8 @@ export class Clock {
     if (this.last !== null && now > this.last) {
       const due = (now - this.last) * this.speed
       this.target += due
-      // A step may be longer than `catchUp`; it must become due all the same.
-      this.debt = Math.min(this.debt + due, Math.max(this.catchUp * this.speed, timestep))
+      // A step may be longer than `CATCH_UP`; it must become due all the same.
+      this.debt = Math.min(this.debt + due, Math.max(CATCH_UP * this.speed, timestep))
     }
     this.last = now
     return Math.floor(this.debt / timestep + EPSILON)

@@ -26,22 +26,10 @@ export class Controls {
     this.values = this.data.map(initialValue)
   }
 
-  applyParams() {
-    this.applyWhere((control) => control.param != null)
-  }
-
-  applyOnce() {
-    this.applyWhere((control) => control.param == null && !control.init)
-  }
-
-  applyInit() {
-    this.applyWhere((control) => control.param == null && control.init)
-  }
-
-  /** Apply the controls that `accepts` admits and that have a value. @param {(control: any) => boolean} [accepts] */
-  applyWhere(accepts = () => true) {
+  /** Apply the controls of a kind, or all, that have a value. @param {'param' | 'init' | 'once'} [kind] */
+  applyAll(kind) {
     this.data.forEach((control, i) => {
-      if (accepts(control)) this.apply(i)
+      if (kind === undefined || kind === kindOf(control)) this.apply(i)
     })
   }
 
@@ -86,6 +74,12 @@ export class Controls {
     this.check(i)
     call(['controls', i, 'run'], () => this.code[i].run(this.env))
   }
+}
+
+/** When a control is applied. */
+function kindOf(control) {
+  if (control.param != null) return 'param'
+  return control.init ? 'init' : 'once'
 }
 
 /** The value with which a control starts; `null`: none until it is used. */

@@ -49,7 +49,7 @@ function fairShare(parts, most) {
 }
 
 /** A mesh with at most so many triangles: of the vertices in each cell of a grid only their mean is left. */
-export function coarsen(mesh, most) {
+function coarsen(mesh, most) {
   const low = /** @type {[number, number, number]} */ ([Infinity, Infinity, Infinity])
   const high = [-Infinity, -Infinity, -Infinity]
   mesh.vertices.forEach((x, i) => {

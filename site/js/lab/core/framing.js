@@ -14,6 +14,8 @@
  * Coordinates are those of the camera: to the right, up, and into the picture.
  */
 
+import { dot, toLocal } from './vectors.js'
+
 const ASPECT = 1.6 // width of a view over its height
 const MARGIN = 0.9 // part of the view that the motion may fill
 const SURROUNDINGS = 0.3 // in sizes of the motion: what stands still and is nearer than this belongs in the picture
@@ -56,11 +58,9 @@ export class Framing {
     const planes = visible.filter((i) => model.geom_type[i] === this.kinds.PLANE)
     this.tilted = planes.some((i) => data.geom_xmat[9 * i + 8] < LEVEL)
     this.planes = planes.map((i) => data.geom_xpos[3 * i + 2])
-    this.trees = new Map() // the geoms of each body that may fall, with all that it carries
-    for (const i of this.movingGeoms) {
-      const root = model.body_rootid[model.geom_bodyid[i]]
-      if (model.body_mocapid[root] < 0) this.trees.set(root, [...(this.trees.get(root) ?? []), i])
-    }
+    const rootOf = (i) => model.body_rootid[model.geom_bodyid[i]]
+    const fallible = this.movingGeoms.filter((i) => model.body_mocapid[rootOf(i)] < 0)
+    this.trees = Map.groupBy(fallible, rootOf) // the geoms of each body that may fall, with all that it carries
     this.bottom = null // the depth of what the scene stands on, once a moment was observed
     this.fallen = new Map() // heights of the bodies that have fallen out of the scene
     this.runs = []
@@ -68,7 +68,6 @@ export class Framing {
     this.stillReaches = []
   }
 
-  /** Begin a run. */
   begin() {
     this.runs.push([])
   }
@@ -129,7 +128,7 @@ export class Framing {
   /** How far a geom reaches in a direction. */
   support(model, data, i, d) {
     const m = data.geom_xmat.subarray(9 * i, 9 * i + 9)
-    const local = [0, 1, 2].map((j) => m[j] * d[0] + m[3 + j] * d[1] + m[6 + j] * d[2])
+    const local = toLocal(m, d)
     const [a, b, c] = model.geom_size.subarray(3 * i, 3 * i + 3)
     const centre = dot(data.geom_xpos.subarray(3 * i, 3 * i + 3), d)
     const { SPHERE, CAPSULE, ELLIPSOID, CYLINDER } = this.kinds
@@ -199,7 +198,6 @@ export class Framing {
   }
 }
 
-export const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 const furthest = (moments) => moments[0].map((_, i) => Math.max(...moments.map((moment) => moment[i])))
 const sizeOf = (reach) => Math.max(...[0, 2, 4].map((i) => reach[i] + reach[i + 1]))
 const rows = (array, start, count) => Array.from({ length: count }, (_, i) => array.subarray(3 * (start + i), 3 * (start + i) + 3))

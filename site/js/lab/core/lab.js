@@ -80,16 +80,16 @@ export class Lab {
   /** Start with every control at its initial value. Controls without `init` are applied here and not at a reset. */
   start() {
     this.controls.restart()
-    this.controls.applyParams()
+    this.controls.applyAll('param')
     this.toKeyframe()
-    this.controls.applyOnce()
+    this.controls.applyAll('once')
     this.prepare()
   }
 
   /** The keyframe, the parameters, `setup`, then the controls with `init`. */
   reset() {
     this.queue = []
-    this.controls.applyParams()
+    this.controls.applyAll('param')
     this.toKeyframe()
     this.prepare()
   }
@@ -105,7 +105,7 @@ export class Lab {
 
   prepare() {
     if (this.code.setup) call(['setup'], () => this.code.setup(this.env))
-    this.controls.applyInit()
+    this.controls.applyAll('init')
     this.forget()
     this.settle()
   }
@@ -155,7 +155,6 @@ export class Lab {
     return this.controls.values
   }
 
-  /** Set a slider or a list to a value. */
   setControl(i, value) {
     this.act([i, value], () => {
       this.controls.take(i, value)
@@ -166,7 +165,6 @@ export class Lab {
     })
   }
 
-  /** Press a button. */
   press(i) {
     this.act([i], () => {
       this.engine.mj.mj_forward(this.model, this.data)
@@ -205,16 +203,13 @@ export class Lab {
 
   /** Set the control signal of an actuator. It stays until code or the reader sets another, or the simulation is reset. */
   actuate(i, value) {
-    const { model, data } = this
-    if (!(i >= 0 && i < model.nu && Number.isFinite(value))) throw new RangeError(`actuator ${i} cannot be set to ${value}`)
-    data.ctrl[i] = value
+    this.data.ctrl[i] = value
     this.leaveControls()
     this.settle()
   }
 
   /** Begin a new run at a keyframe, without the lab's own start. */
   startAt(key) {
-    if (!(key >= 0 && key < this.model.nkey)) throw new RangeError(`the model has no keyframe ${key}`)
     this.toKeyframe(key)
     this.forget()
     this.leaveControls()
@@ -422,7 +417,7 @@ export class Lab {
     values.forEach((value, i) => {
       if (value !== null) this.controls.take(i, value)
     })
-    this.controls.applyWhere()
+    this.controls.applyAll()
     this.reset()
     if (physics === null) return
     this.physics.write(physics)

@@ -48,7 +48,7 @@ const DENSE = [
  */
 
 /** A solution: polynomials, one for each step. */
-export class Solution {
+class Solution {
   constructor({ start, states }) {
     this.size = states.length
     this.start = this.end = start

@@ -22,7 +22,8 @@ export class Panel {
   /** @param {import('./lab.js').Lab} lab */
   constructor(lab) {
     this.lab = lab
-    this.part = null // of the model, whose numbers are read: {kind, index}
+    /** @type {{kind: string, index: number} | null} the part of the model whose numbers are read with each frame */
+    this.part = null
     this.names = Object.fromEntries(PREFIXES.map((prefix) => [prefix, namesOf(lab.model, prefix)]))
     this.driven = new Uint8Array(lab.model.nu)
     this.before = new Float64Array(lab.model.nu)
@@ -73,14 +74,6 @@ export class Panel {
       for (let i = 0; i < model.body_geomnum[body]; i++) add('geom', GEOM, model.body_geomadr[body] + i, depth + 1)
     }
     return parts
-  }
-
-  /** Read a part of the model with each frame, or none. @param {{kind: string, index: number} | null} part */
-  choose(part) {
-    const { nbody, njnt, ngeom } = this.lab.model
-    const count = part === null ? 0 : { body: nbody, joint: njnt, geom: ngeom }[part.kind]
-    if (part !== null && !(part.index >= 0 && part.index < count)) throw new RangeError(`the model has no ${part.kind} ${part.index}`)
-    this.part = part
   }
 
   /** The numbers of the chosen part in mjModel, then in mjData, under MuJoCo's names. @returns {[string, Float64Array][] | null} copies */

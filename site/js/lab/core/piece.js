@@ -17,8 +17,13 @@ export class LabError extends Error {
   }
 }
 
-/** The entry whose code runs now, and the entry that is being tried; still known after the engine was stopped from outside. */
-export const current = { entry: null, trying: null }
+/**
+ * The entry whose code runs now, and the entry that is being tried; still known after the engine was stopped from outside. `after` is called
+ * with each entry once its code has run.
+ *
+ * @type {{entry: any, trying: any, after: (entry: (string | number)[]) => void}}
+ */
+export const current = { entry: null, trying: null, after: () => {} }
 
 /** Call `code` for `entry`; what it throws becomes a LabError. */
 export function call(entry, code) {
@@ -32,6 +37,7 @@ export function call(entry, code) {
     throw new LabError(kind, entry, error instanceof Error ? `${error.name}: ${error.message}` : String(error))
   } finally {
     current.entry = outer
+    current.after(entry)
   }
 }
 

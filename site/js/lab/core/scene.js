@@ -34,12 +34,8 @@ export function describeScene(engine, { model, displayData: data }, config, came
     floor: fits ? (config.floor ?? null) : null,
     center: Array.from(stat.center),
     extent: stat.extent,
-    visual: visual(vis),
-    bodies: list(model.nbody, (i) => ({
-      name: name(k.obj.BODY, i),
-      parent: model.body_parentid[i],
-      movable: model.body_weldid[i] !== 0 || model.body_mocapid[i] >= 0,
-    })),
+    visual: { headlight: headlight(vis.headlight), znear: vis.map.znear, zfar: vis.map.zfar },
+    bodies: list(model.nbody, (i) => ({ movable: model.body_weldid[i] !== 0 || model.body_mocapid[i] >= 0 })),
     geoms: list(model.ngeom, (i) => ({
       name: name(k.obj.GEOM, i),
       type: model.geom_type[i],
@@ -49,24 +45,16 @@ export function describeScene(engine, { model, displayData: data }, config, came
       data: model.geom_dataid[i],
       level: levelOf(k, model, i),
     })),
-    sites: list(model.nsite, (i) => ({
-      name: name(k.obj.SITE, i),
-      type: model.site_type[i],
-      body: model.site_bodyid[i],
-      group: model.site_group[i],
-      material: model.site_matid[i],
-    })),
-    joints: list(model.njnt, (i) => ({ name: name(k.obj.JOINT, i), type: model.jnt_type[i], body: model.jnt_bodyid[i] })),
+    sites: list(model.nsite, (i) => ({ type: model.site_type[i], group: model.site_group[i], material: model.site_matid[i] })),
     springs: list(model.njnt, (i) => spring(k, model, i)).filter((shape) => shape !== null),
     pins: list(model.njnt, (i) => pin(k, model, data, i)).filter((shape) => shape !== null),
     materials: list(model.nmat, (i) => material(model, i, name(k.obj.MATERIAL, i))),
     textures: list(model.ntex, (i) => texture(model, i, name(k.obj.TEXTURE, i))),
     meshes: list(model.nmesh, (i) => mesh(model, i, name(k.obj.MESH, i))),
-    hfields: list(model.nhfield, (i) => hfield(model, i, name(k.obj.HFIELD, i))),
-    lights: list(model.nlight, (i) => light(model, i, name(k.obj.LIGHT, i))),
-    cameras: list(model.ncam, (i) => ({ name: name(k.obj.CAMERA, i), projection: model.cam_projection[i] })),
+    hfields: list(model.nhfield, (i) => hfield(model, i)),
+    lights: list(model.nlight, (i) => light(model, i)),
     flexes: list(model.nflex, (i) => flex(model, i, name(k.obj.FLEX, i))),
-    skins: list(model.nskin, (i) => skin(model, i, name(k.obj.SKIN, i))),
+    skins: list(model.nskin, (i) => skin(model, i)),
   }
 }
 
@@ -113,20 +101,8 @@ function freeCamera(mj, model, settings, camera) {
   }
 }
 
-function visual({ headlight, map, rgba, scale }) {
-  return {
-    headlight: {
-      ambient: Array.from(headlight.ambient),
-      diffuse: Array.from(headlight.diffuse),
-      specular: Array.from(headlight.specular),
-      active: headlight.active !== 0,
-    },
-    znear: map.znear,
-    zfar: map.zfar,
-    fog: { start: map.fogstart, end: map.fogend, rgba: Array.from(rgba.fog) },
-    haze: { size: map.haze, rgba: Array.from(rgba.haze) },
-    framewidth: scale.framewidth,
-  }
+function headlight({ ambient, diffuse, specular, active }) {
+  return { ambient: Array.from(ambient), diffuse: Array.from(diffuse), specular: Array.from(specular), active: active !== 0 }
 }
 
 function material(model, i, name) {
@@ -152,7 +128,7 @@ function texture(model, i, name) {
   const height = model.tex_height[i]
   const channels = model.tex_nchannel[i]
   const data = part(model.tex_data, Number(model.tex_adr[i]), width * height * channels)
-  return { name, type: model.tex_type[i], width, height, channels, srgb: model.tex_colorspace[i] === 2, data }
+  return { name, type: model.tex_type[i], width, height, channels, data }
 }
 
 /** Each corner of a face has its own index of vertex, normal and texture coordinate. */
@@ -172,28 +148,22 @@ function mesh(model, i, name) {
 }
 
 /** `size`: half-lengths in x and y, height of 1, thickness below 0; `data` by rows, from -y to y, in [0, 1]. */
-function hfield(model, i, name) {
+function hfield(model, i) {
   const rows = model.hfield_nrow[i]
   const columns = model.hfield_ncol[i]
   const data = part(model.hfield_data, model.hfield_adr[i], rows * columns)
-  return { name, rows, columns, size: row(model.hfield_size, i, 4), data }
+  return { rows, columns, size: row(model.hfield_size, i, 4), data }
 }
 
-function light(model, i, name) {
+function light(model, i) {
   return {
-    name,
-    body: model.light_bodyid[i],
     type: model.light_type[i],
     castshadow: model.light_castshadow[i] !== 0,
     ambient: row(model.light_ambient, i, 3),
     diffuse: row(model.light_diffuse, i, 3),
     specular: row(model.light_specular, i, 3),
-    attenuation: row(model.light_attenuation, i, 3),
     cutoff: model.light_cutoff[i],
     exponent: model.light_exponent[i],
-    intensity: model.light_intensity[i],
-    range: model.light_range[i],
-    bulbradius: model.light_bulbradius[i],
   }
 }
 
@@ -218,11 +188,10 @@ function flex(model, i, name) {
   }
 }
 
-function skin(model, i, name) {
+function skin(model, i) {
   const count = model.skin_vertnum[i]
   const start = model.skin_texcoordadr[i]
   return {
-    name,
     faces: part(model.skin_face, 3 * model.skin_faceadr[i], 3 * model.skin_facenum[i]),
     texcoords: start >= 0 ? part(model.skin_texcoord, 2 * start, 2 * count) : null,
     start: model.skin_vertadr[i],

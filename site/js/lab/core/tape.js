@@ -165,7 +165,6 @@ export class Tape {
     this.repeat(state, state.step + Math.floor((time - state.time) / timestep + TOLERANCE))
   }
 
-  /** Go to a step. */
   go(step) {
     const state = this.states.findLast((item) => item.step <= step) ?? this.states[0]
     if (state === undefined) return

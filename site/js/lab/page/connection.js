@@ -4,8 +4,7 @@
  *   const line = connection(workerUrl).open(id, receive)
  *   line.send({ type: 'play' }); line.close()
  *
- * A lab with a `#` in the address of its worker has a dedicated worker, which ends with the lab, or when it does not answer for too
- * long.
+ * With a `#` in its address a worker is dedicated: it ends with its lab, or when it does not answer for too long.
  */
 
 const BEAT = 5000 // ms between two pings to a dedicated worker
@@ -49,12 +48,6 @@ export class Connection {
     }
   }
 
-  /** Fetch and start the engine before a lab needs it. */
-  warm(wasm) {
-    if (this.worker === null) this.begin()
-    this.worker.postMessage({ type: 'warm', wasm })
-  }
-
   begin() {
     this.worker = this.start(this.url)
     this.silence = 0
@@ -64,13 +57,16 @@ export class Connection {
       this.lines.get(data.lab)?.(data)
       if (data.type === 'error' && data.fatal) this.fail('the engine has ended', data.lab)
     }
-    this.worker.onerror = (event) => this.fail(event.message ?? 'the worker does not start')
+    this.worker.onerror = (event) => {
+      event.preventDefault?.() // it is told in the page
+      this.fail(event.message ?? 'the worker does not start')
+    }
     this.worker.onmessageerror = () => this.fail('a message of the worker cannot be read')
   }
 
   /** Check that the worker still answers. */
   ask() {
-    if (this.silence === MISSED) this.fail('it takes too long, or too much memory')
+    if (this.silence === MISSED) this.fail('it takes too long, or too much memory', null, 'silent')
     this.silence += 1
     this.worker?.postMessage({ type: 'ping' })
   }
@@ -82,11 +78,11 @@ export class Connection {
   }
 
   // The engine's memory is lost with the worker: every lab gets an error, and the next one starts a new worker.
-  fail(message, notifiedId = null) {
+  fail(message, notifiedId = null, kind = 'worker') {
     this.end()
     for (const [id, receive] of [...this.lines]) {
       if (id === notifiedId) continue
-      receive({ type: 'error', message, entry: [], kind: 'worker', fatal: true })
+      receive({ type: 'error', message, entry: [], kind, fatal: true })
     }
   }
 }

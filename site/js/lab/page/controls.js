@@ -1,6 +1,6 @@
 /** The controls of a lab: sliders, lists, buttons, and which overlays are drawn. */
 
-import { freshId, h, textButton } from './dom.js'
+import { freshId, h, onInput, textButton } from './dom.js'
 import { digitsOfStep, formatNumber, withUnit } from './numbers.js'
 
 const USUAL = 9 // characters of a value, for which there is room at first (lab-live.css)
@@ -44,25 +44,15 @@ function slider({ label, unit, min, max, step, digits }, set) {
   Object.assign(field, { min: String(min), max: String(max), step: String(step ?? (max - min) / STEPS) })
   // Reserve the width of the widest value, so that nothing moves while the slider does.
   output.style.minWidth = `${Math.max(text(min).length, text(max).length)}ch`
-  let value = null
-  let queued = false
   const show = (now) => {
-    value = now
     field.value = String(now ?? min)
     output.textContent = now === null || now === undefined ? '–' : text(now)
     field.setAttribute('aria-valuetext', output.textContent)
   }
-  field.addEventListener('input', () => {
-    show(Number(field.value))
-    if (queued) return
-    queued = true // at most one message per refresh of the screen
-    requestAnimationFrame(() => {
-      queued = false
-      set(value)
-    })
-  })
+  field.addEventListener('input', () => show(Number(field.value)))
+  const isQueued = onInput(field, () => set(Number(field.value)))
   const element = h('div', { class: 'lab-slider' }, h('label', { for: id }, label), output, field)
-  return { element, field, show: (now) => queued || show(now) }
+  return { element, field, show: (now) => isQueued() || show(now) }
 }
 
 function list({ label, unit, options }, set) {

@@ -72,6 +72,21 @@ export function draw(tag, attributes = {}) {
   return element
 }
 
+/** Call a listener of a field's input at most once per refresh of the screen; returns whether it is still to be called. */
+export function onInput(field, act) {
+  let isQueued = false
+  field.addEventListener('input', () => {
+    if (!isQueued) {
+      requestAnimationFrame(() => {
+        isQueued = false
+        act()
+      })
+    }
+    isQueued = true
+  })
+  return () => isQueued
+}
+
 let count = 0
 
 /** A new id, for a reference to an element. */

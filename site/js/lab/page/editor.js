@@ -6,7 +6,7 @@
  *   editor.fail("Schema violation: unrecognized attribute: 'foo'\nElement 'geom', line 3")
  */
 
-import { freshId, h, textButton } from './dom.js'
+import { freshId, h, onInput, textButton } from './dom.js'
 import { LONGEST_MODEL } from './share.js'
 
 const ROWS = 22 // at most; what is longer scrolls
@@ -38,13 +38,9 @@ export class Editor {
       'aria-describedby': errorId,
       'aria-keyshortcuts': 'Control+Enter Meta+Enter',
     })
-    let request = 0 // pasting many lines may fire an event for each of them
-    this.field.addEventListener('input', () => {
-      cancelAnimationFrame(request)
-      request = requestAnimationFrame(() => {
-        this.numberLines()
-        this.labelBackButton()
-      })
+    onInput(this.field, () => {
+      this.numberLines()
+      this.labelBackButton()
     })
     this.field.addEventListener('scroll', () => (this.numbers.scrollTop = this.field.scrollTop))
     this.field.addEventListener('keydown', (event) => {

@@ -13,7 +13,7 @@ export function fillScript(text, values) {
 /**
  * The curves of a lab as a table, comma-separated as RFC 4180 says.
  *
- * @param {{ylabel: string, labels: string[], across?: string[], columns: Float64Array[]}[]} curves of each plot: what its axis says, the
+ * @param {{ylabel: string, labels: string[], across?: string[], columns: ArrayLike<number>[]}[]} curves of each plot: what its axis says, the
  *   names of its lines, that of its horizontal axis unless it is the time, and its samples: the same times in all, then one column for each
  *   of these, NaN for a gap
  * @returns {string} a header, then one row for each time

@@ -19,6 +19,7 @@ import {
   PlaneGeometry,
   SphereGeometry,
 } from 'three'
+import { cross } from '../core/vectors.js'
 
 /** mjtGeom */
 export const GEOM = Object.freeze({
@@ -207,7 +208,7 @@ const SMOOTH = 0.8 // cosine of the largest angle between the normals of vertex 
 function sharpen(position, normal, offset) {
   const side = (k) => [0, 1, 2].map((j) => position[offset + 3 * k + j] - position[offset + j])
   const [a, b] = [side(1), side(2)]
-  const face = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+  const face = cross(a, b)
   const length = Math.hypot(...face)
   if (length === 0) return
   for (let corner = offset; corner < offset + 9; corner += 3) {

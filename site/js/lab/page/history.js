@@ -1,5 +1,5 @@
 /**
- * The samples of a plot in typed arrays, or the poses of a picture: of a window of some seconds, or of the whole run.
+ * The samples of a plot, or the poses of a picture: of a window of some seconds, or of the whole run.
  *
  * With a window, samples that have left it are dropped. Without one, every second sample is dropped whenever there are too many. No DOM.
  */
@@ -9,66 +9,50 @@ const MOST = 4000 // samples of a plot that shows all of its run
 export class History {
   /** @param {number} traces how many values a sample has @param {number | null} window s; null: everything @param {number} [most] samples without one */
   constructor(traces, window, most = MOST) {
+    this.traces = traces
     this.window = window
     this.most = most
-    this.columns = Array.from({ length: traces + 1 }, () => new Float64Array(Math.min(1024, most + 1)))
     this.clear()
   }
 
   clear() {
-    this.start = 0
-    this.end = 0
+    /** @type {number[][]} the times, then a column for each trace */
+    this.columns = Array.from({ length: this.traces + 1 }, () => [])
     this.stride = 1
     this.counter = 0
   }
 
   get length() {
-    return this.end - this.start
+    return this.columns[0].length
   }
 
   /** The time of the last sample, or 0. */
   get last() {
-    return this.end > this.start ? this.columns[0][this.end - 1] : 0
+    return this.columns[0].at(-1) ?? 0
   }
 
   /** Add a sample: its time, and the values from `offset` on. */
   push(time, values, offset) {
     if (this.counter++ % this.stride !== 0) return
-    if (this.end === this.columns[0].length) this.makeRoom()
-    this.columns[0][this.end] = time
-    for (let i = 1; i < this.columns.length; i++) this.columns[i][this.end] = values[offset + i - 1]
-    this.end += 1
-    if (this.window !== null) {
-      // One sample before the window stays, so that the line reaches its edge.
-      while (this.start + 1 < this.end && this.columns[0][this.start + 1] < time - this.window) this.start += 1
-    } else if (this.length > this.most) this.thin()
+    this.columns.forEach((column, i) => column.push(i === 0 ? time : values[offset + i - 1]))
+    if (this.window === null) {
+      if (this.length > this.most) this.thin()
+      return
+    }
+    // One sample before the window stays, so that the line reaches its edge.
+    const early = this.columns[0].findIndex((at) => at >= time - this.window) - 1
+    if (early > 0) for (const column of this.columns) column.splice(0, early)
   }
 
   /** Drop the samples after a time (s); without any left, a new run begins. */
   cut(time) {
-    while (this.end > this.start && this.columns[0][this.end - 1] > time) this.end -= 1
-    if (this.length === 0) this.clear()
-  }
-
-  makeRoom() {
-    if (this.start > this.end / 2) {
-      for (const column of this.columns) column.copyWithin(0, this.start, this.end)
-      this.end -= this.start
-      this.start = 0
-      return
-    }
-    this.columns = this.columns.map((column) => {
-      const larger = new Float64Array(2 * column.length)
-      larger.set(column)
-      return larger
-    })
+    const count = this.columns[0].findLastIndex((at) => at <= time) + 1
+    for (const column of this.columns) column.length = count
+    if (count === 0) this.clear()
   }
 
   thin() {
-    const count = Math.ceil(this.length / 2)
-    for (const column of this.columns) for (let i = 0; i < count; i++) column[i] = column[this.start + 2 * i]
-    this.start = 0
-    this.end = count
+    this.columns = this.columns.map((column) => column.filter((_, i) => i % 2 === 0))
     this.stride *= 2
     this.counter = 1
   }
@@ -76,20 +60,15 @@ export class History {
   /** Take the samples of another history from a time (s) on. */
   refill(other, from) {
     this.clear()
-    for (let i = other.start; i < other.end; i++) {
-      const [time, ...values] = other.columns.map((column) => column[i])
-      if (time >= from) this.push(time, values, 0)
-    }
-  }
-
-  /** The samples as they are: times, then one column for each trace. */
-  table() {
-    return this.columns.map((column) => column.subarray(this.start, this.end))
+    other.columns[0].forEach((time, i) => {
+      const sample = other.columns.map((column) => column[i])
+      if (time >= from) this.push(time, sample, 1)
+    })
   }
 
   /** The values at a time (s). @returns {number[]} */
   at(time) {
-    const [times, ...columns] = this.table()
+    const [times, ...columns] = this.columns
     return valuesAt(times, columns, time)
   }
 }
@@ -113,7 +92,7 @@ export class Samples {
     this.whole = config.window === null ? this.recent : new History(count, null)
     /** @type {{time: number, resting: boolean, marks: {time: number, label: string}[]}} */
     this.now = PLAYING
-    /** @type {Float64Array[] | null} the samples of an earlier run */
+    /** @type {number[][] | null} the samples of an earlier run */
     this.kept = null
     this.dirty = false
   }
@@ -142,7 +121,7 @@ export class Samples {
 
   /** Keep the run, so that its lines stay behind those of the next; or keep none. */
   keep(on) {
-    this.kept = on && this.whole.length > 0 ? this.whole.table().map((column) => column.slice()) : null
+    this.kept = on && this.whole.length > 0 ? this.whole.columns.map((column) => column.slice()) : null
     this.dirty = true
   }
 

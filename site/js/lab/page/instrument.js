@@ -7,6 +7,7 @@
  * `progress` stores a reached goal (progress/store.js), or is null; `openEditor` is that of workbench.js, which needs this module.
  */
 
+import { copyText } from '../../page/copy.js'
 import { buildControls, buildOverlays, buildReadouts, switchButton } from './controls.js'
 import { download, h, icon, textButton } from './dom.js'
 import { curvesText, fillScript } from './export.js'
@@ -46,7 +47,6 @@ export class Instrument extends Shell {
     this.starter = config.controls.findIndex(({ label }) => config.start && label === config.start) // the button that Play presses
     this.playRequested = false
     this.hasStarted = false // whether it has played, or the reader has stepped
-    this.pendingAction = null // to be done when the lab is ready
     /** @type {History | null} the poses of the run, as its pictures showed them */
     this.poses = null
     this.keptPoses = null
@@ -191,10 +191,8 @@ export class Instrument extends Shell {
     this.reason.textContent = [this.config.still, said].filter(Boolean).join(' ')
     this.reason.hidden = this.reason.textContent === ''
     this.update(values)
-    const { pendingAction, playRequested: pressed } = this
-    this.pendingAction = null
+    const { playRequested: pressed } = this
     this.playRequested = false
-    pendingAction?.()
     if (pressed) this.begin()
   }
 
@@ -316,7 +314,7 @@ export class Instrument extends Shell {
     this.notices.say(this.words('lab.live.said_reset'))
   }
 
-  /** Go to the state of a link, now or when the lab is ready, and offer a button that replays the motion that led to it. */
+  /** Go to the state of a link, and offer a button that replays the motion that led to it. */
   restore(state) {
     const { log } = state
     if (state.text !== undefined && this.config.source && this.openEditor) return void this.edit(state)
@@ -324,21 +322,21 @@ export class Instrument extends Shell {
     const button = textButton(this.words('lab.live.motion'), replay)
     this.motion.replaceChildren(button)
     this.motion.hidden = !log
-    this.whenReady(() => this.simulation.restore(state))
+    this.leaveEditor()
+    this.simulation.restore(state)
   }
 
   /** Reset the controls, then press the buttons and set the controls that `steps` lists by their labels, and play. */
   run(steps) {
-    this.whenReady(() => {
-      const { simulation, config } = this
-      const control = (label) => config.controls.findIndex((item) => item.label === label)
-      simulation.restore({ values: config.controls.map(({ value }) => value ?? null) })
-      if (steps.length === 0) simulation.play()
-      for (const step of steps) {
-        if (typeof step === 'string') simulation.press(control(step), config.controls[control(step)].play)
-        else for (const [label, value] of Object.entries(step)) simulation.set(control(label), value, true)
-      }
-    })
+    const { simulation, config } = this
+    const control = (label) => config.controls.findIndex((item) => item.label === label)
+    this.leaveEditor()
+    simulation.restore({ values: config.controls.map(({ value }) => value ?? null) })
+    if (steps.length === 0) simulation.play()
+    for (const step of steps) {
+      if (typeof step === 'string') simulation.press(control(step), config.controls[control(step)].play)
+      else for (const [label, value] of Object.entries(step)) simulation.set(control(label), value, true)
+    }
   }
 
   /** Let the reader edit the model, in place of this lab. @param {Record<string, any> | null} [state] of a link to an edited model */
@@ -372,13 +370,6 @@ export class Instrument extends Shell {
     this.view.element.focus({ preventScroll: true })
   }
 
-  whenReady(act) {
-    this.leaveEditor()
-    if (this.state !== 'loading' && this.state !== 'asleep') return act()
-    this.pendingAction = act
-    this.simulation.wake()
-  }
-
   /** The label (a key) and the action of the button for a link. */
   shareAction() {
     return ['link', () => this.save((state) => this.share(state))]
@@ -392,13 +383,10 @@ export class Instrument extends Shell {
 
   /** For the preview: a button that copies what the author has done, as the `log` of a goal. */
   makeLogButton() {
-    const copy = ({ log }) => {
+    const copy = async ({ log }) => {
       const text = log ? writeLog(log, this.config.controls) : ''
-      const copying = text ? navigator.clipboard.writeText(text) : Promise.reject(new Error(this.words('lab.live.no_log')))
-      copying.then(
-        () => this.notices.show(this.words('lab.live.log_copied'), 'note'),
-        (error) => this.notices.show(text || error.message, 'warning'),
-      )
+      if (text && (await copyText(text))) this.notices.show(this.words('lab.live.log_copied'), 'note')
+      else this.notices.show(text || this.words('lab.live.no_log'), 'warning')
     }
     return this.makeButton('copy_log', () => this.save(copy))
   }
@@ -408,7 +396,7 @@ export class Instrument extends Shell {
       ylabel: config.ylabel,
       labels: config.traces.map(({ label }) => label),
       across: config.x ? [config.xlabel] : [],
-      columns: whole.table(),
+      columns: whole.columns,
     }))
     download(`${this.config.id}.csv`, curvesText(curves), 'text/csv')
   }

@@ -91,9 +91,9 @@ export class Trail {
     this.count = 0
   }
 
-  /** @param {[number, number, number]} rgb in [0, 1] */
-  paint(rgb) {
-    this.material.color.setRGB(...rgb)
+  /** @param {string} colour of CSS */
+  paint(colour) {
+    this.material.color.setStyle(colour)
   }
 
   update(frame, count) {

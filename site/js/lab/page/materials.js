@@ -194,24 +194,26 @@ function rgba({ width, channels, data }, firstRow, rows) {
   return target
 }
 
+/** Add code to the shaders of three.js, behind some of the chunks of which they are made. @param {Record<string, Record<string, string>>} additions */
+export function extend(shader, additions) {
+  for (const [kind, chunks] of Object.entries(additions)) {
+    for (const [name, code] of Object.entries(chunks)) shader[kind] = shader[kind].replace(`#include <${name}>`, `#include <${name}>\n${code}`)
+  }
+}
+
 /** Let a material look up a cube texture by the direction from the geom's centre, in the unit shape or, if `uniform`, in the geom's size. */
 function wrapCube(material, texture, uniform) {
   const size = { value: [1, 1, 1] }
   material.onBeforeCompile = (shader) => {
     shader.uniforms.labCube = { value: texture }
     shader.uniforms.labSize = size
-    shader.vertexShader = shader.vertexShader
-      .replace(
-        '#include <common>',
-        '#include <common>\nattribute vec3 direction;\nvarying vec3 vLabDirection;\nuniform vec3 labSize;',
-      )
-      .replace('#include <begin_vertex>', '#include <begin_vertex>\nvLabDirection = direction * labSize;')
-    shader.fragmentShader = shader.fragmentShader
-      .replace('#include <common>', '#include <common>\nvarying vec3 vLabDirection;\nuniform samplerCube labCube;')
-      .replace(
-        '#include <map_fragment>',
-        'vec4 labTexel = textureCube(labCube, vLabDirection);\ndiffuseColor *= labTexel;\ntotalEmissiveRadiance *= labTexel.rgb;',
-      )
+    extend(shader, {
+      vertexShader: { common: 'attribute vec3 direction; varying vec3 vLabDirection; uniform vec3 labSize;', begin_vertex: 'vLabDirection = direction * labSize;' },
+      fragmentShader: {
+        common: 'varying vec3 vLabDirection; uniform samplerCube labCube;',
+        map_fragment: 'vec4 labTexel = textureCube(labCube, vLabDirection); diffuseColor *= labTexel; totalEmissiveRadiance *= labTexel.rgb;',
+      },
+    })
   }
   material.userData.shader = 'lab-cube'
   material.customProgramCacheKey = () => 'lab-cube'

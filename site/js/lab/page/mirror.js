@@ -10,6 +10,7 @@
 
 import { Matrix4, PerspectiveCamera, Vector2, Vector3, Vector4, WebGLRenderTarget } from 'three'
 import { GEOM } from './geometry.js'
+import { extend } from './materials.js'
 
 const SOFT = 0.5 // texels for each pixel, without a graphics processor
 
@@ -126,20 +127,15 @@ function addReflection(material, uniforms) {
   material.onBeforeCompile = (shader, renderer) => {
     onBeforeCompile.call(material, shader, renderer)
     Object.assign(shader.uniforms, uniforms)
-    shader.vertexShader = shader.vertexShader
-      .replace('#include <common>', '#include <common>\nvarying float vLabTop;')
-      .replace('#include <begin_vertex>', '#include <begin_vertex>\nvLabTop = step(0.5, normal.z);')
-    shader.fragmentShader = shader.fragmentShader
-      .replace(
-        '#include <common>',
-        '#include <common>\nvarying float vLabTop;\nuniform sampler2D labMirror;\nuniform vec2 labScreen;\nuniform float labReflectance;',
-      )
-      .replace(
-        '#include <opaque_fragment>',
-        `#include <opaque_fragment>
-        vec2 labAt = gl_FragCoord.xy * labScreen;
-        gl_FragColor.rgb += labReflectance * vLabTop * texture2D(labMirror, vec2(1.0 - labAt.x, labAt.y)).rgb;`,
-      )
+    extend(shader, {
+      vertexShader: { common: 'varying float vLabTop;', begin_vertex: 'vLabTop = step(0.5, normal.z);' },
+      fragmentShader: {
+        common: 'varying float vLabTop; uniform sampler2D labMirror; uniform vec2 labScreen; uniform float labReflectance;',
+        opaque_fragment: `
+          vec2 labAt = gl_FragCoord.xy * labScreen;
+          gl_FragColor.rgb += labReflectance * vLabTop * texture2D(labMirror, vec2(1.0 - labAt.x, labAt.y)).rgb;`,
+      },
+    })
   }
   material.customProgramCacheKey = () => name
 }

@@ -3,22 +3,19 @@
 import { holdPlace, inSight } from '../../page/place.js'
 import { h } from './dom.js'
 import { readLink } from './share.js'
-import { fill } from './words.js'
+import { fill } from '../../page/words.js'
 
 /**
  * Put a live instrument in place of a lab's static form, which stays if the lab cannot run.
  *
  * @param {HTMLElement} element has `data-config`, the address of the lab's JSON
  * @param {(key: string) => string} texts of the interface
- * @param {() => string | null} missing the key of what is said of a feature that the browser lacks
  * @param {(config: Record<string, any>, base: string, words: (key: string, values?: Record<string, any>) => string) => any} make
  *   makes the instrument, given the lab's JSON and the address to which its addresses are relative
  */
-export async function mount(element, texts, missing, make) {
+export async function mount(element, texts, make) {
   const words = (key, values) => fill(texts(key), values)
   try {
-    const lack = missing()
-    if (lack !== null) throw new Error(words(lack))
     const base = new URL(element.dataset.config, document.baseURI).href
     const response = await fetch(base)
     if (!response.ok) throw new Error(words('lab.live.not_found', { status: response.status }))

@@ -76,7 +76,6 @@ function scientific(size, digits) {
 
 const SUPERSCRIPTS = '⁰¹²³⁴⁵⁶⁷⁸⁹'
 
-/** An exponent in superscript digits. */
 export function superscript(exponent) {
   const digits = [...String(Math.abs(exponent))].map((digit) => SUPERSCRIPTS[digit]).join('')
   return exponent < 0 ? `⁻${digits}` : digits

@@ -53,7 +53,7 @@ export class Plot extends Samples {
       return { times, x: config.x ? traces.pop() : times, traces }
     }
     this.chart.draw({
-      ...curves(history.table()),
+      ...curves(history.columns),
       ghost: kept && curves(kept),
       across: config.x ? null : this.timeRange(),
       at: resting ? time : Infinity,

@@ -3,10 +3,11 @@
  *
  * TEXT is base64url of a deflated content: JSON on one line (`v` the values of the controls, `n` the steps since the reset, `t` the
  * time in s; `l` the log: the values of the controls at the reset, and the events since), and after the end of the line the whole
- * physics as 64-bit floats. If all this is too long for a link, the log is left out, then the physics. A browser that cannot deflate
- * writes `s=TEXT`, with the content as it is; in older links that has the physics in the JSON, as base64 (`p`). A model that the
- * reader has written is in the JSON, as `x`.
+ * physics as 64-bit floats. If all this is too long for a link, the log is left out, then the physics. A model that the reader has
+ * written is in the JSON, as `x`.
  */
+
+import { copyText } from '../../page/copy.js'
 
 /** The most characters of a link: all browsers keep so many in an address, and most programs that pass it on. */
 export const LONGEST = 16_000
@@ -30,10 +31,10 @@ export async function writeLink(id, { values, steps, time, physics, text, log = 
   /** @type {[Record<string, any>, 'state' | null][]} */
   const forms = [[motion, null], [state, motion === state ? null : 'state']]
   for (const [head, only] of forms) {
-    const whole = await field(content(head, physics))
+    const whole = await field(head, physics)
     if (whole.length <= LONGEST) return { link: link(whole), only }
   }
-  return { link: link(await field(content(state, []))), only: 'controls' }
+  return { link: link(await field(state, [])), only: 'controls' }
 }
 
 /** Put a link into the address bar and, if allowed, the clipboard; returns the key of the message. */
@@ -41,25 +42,12 @@ export async function copyLink(link) {
   const address = new URL(window.location.href)
   address.hash = link
   window.history.replaceState(null, '', address)
-  return navigator.clipboard.writeText(address.href).then(
-    () => 'lab.live.link_copied',
-    () => 'lab.live.link_shown',
-  )
+  return (await copyText(address.href)) ? 'lab.live.link_copied' : 'lab.live.link_shown'
 }
 
-function content(head, physics) {
-  const line = new TextEncoder().encode(`${JSON.stringify(head)}\n`)
-  const floats = new Uint8Array(Float64Array.from(physics).buffer)
-  const bytes = new Uint8Array(line.length + floats.length)
-  bytes.set(line)
-  bytes.set(floats, line.length)
-  return bytes
-}
-
-async function field(bytes) {
-  return typeof CompressionStream === 'function'
-    ? `z=${toBase64(await pipe(bytes, new CompressionStream('deflate-raw')))}`
-    : `s=${toBase64(bytes)}`
+async function field(head, physics) {
+  const content = new Blob([`${JSON.stringify(head)}\n`, Float64Array.from(physics)])
+  return `z=${toBase64(await pipe(content, new CompressionStream('deflate-raw')))}`
 }
 
 /**
@@ -74,9 +62,7 @@ export async function readLink(fragment) {
   const fields = new URLSearchParams(fragment.slice(1))
   const id = fields.get('lab')
   try {
-    const [deflated, plain] = [fields.get('z'), fields.get('s')]
-    if (deflated) return { id, state: parse(await pipe(fromBase64(deflated), new DecompressionStream('deflate-raw'))) }
-    return { id, state: plain ? parse(fromBase64(plain)) : null }
+    return { id, state: parse(await pipe(fromBase64(fields.get('z')), new DecompressionStream('deflate-raw'))) }
   } catch {
     return { id, state: null }
   }
@@ -84,9 +70,9 @@ export async function readLink(fragment) {
 
 function parse(bytes) {
   const end = bytes.includes(LINE_END) ? bytes.indexOf(LINE_END) : bytes.length
-  const { v, n, t, p, x, l } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(0, end)))
+  const { v, n, t, x, l } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(0, end)))
   if (!Array.isArray(v)) return null
-  const floats = typeof p === 'string' ? fromBase64(p) : bytes.slice(end + 1)
+  const floats = bytes.slice(end + 1)
   const physics = floats.length > 0 ? new Float64Array(floats.buffer) : null
   const state = { values: v, steps: Number.isInteger(n) && n >= 0 ? n : 0, time: Number(t) || 0, physics }
   if (isLog(l)) state.log = { values: l[0], events: l[1], end: state.time }
@@ -112,7 +98,7 @@ function isLog(value) {
   return value[1].length <= MOST_EVENTS && value[0].every((item) => item === null || isValue(item)) && value[1].every((event) => Array.isArray(event) && isEvent(event))
 }
 
-/** Deflate or inflate bytes by a stream, to at most so many. */
+/** Deflate or inflate by a stream, to at most so many bytes. @param {BlobPart} bytes */
 export async function pipe(bytes, stream, most = LARGEST, tooMuch = new RangeError('the link unfolds to too much')) {
   const chunks = []
   let size = 0

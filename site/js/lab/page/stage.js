@@ -10,6 +10,7 @@
  */
 
 import { ColorManagement, LinearSRGBColorSpace, PCFShadowMap, WebGLRenderer } from 'three'
+import { h } from './dom.js'
 
 const SHARPEST = 3 // device pixels per CSS pixel
 const STILL = 2 // device pixels per CSS pixel, at least, of a picture at rest without a graphics processor
@@ -32,8 +33,7 @@ export class Stage {
   /** Start WebGL; throws if there is none. */
   start() {
     if (this.renderer !== null) return
-    const canvas = document.createElement('canvas')
-    canvas.className = 'lab-canvas'
+    const canvas = h('canvas', { class: 'lab-canvas' })
     const software = drawsInSoftware()
     this.renderer = new WebGLRenderer({ canvas, antialias: !software, alpha: true, stencil: true, powerPreference: 'low-power' })
     this.renderer.outputColorSpace = LinearSRGBColorSpace
@@ -62,7 +62,6 @@ export class Stage {
     if (this.views.size === 0 && this.renderer !== null) this.renderer.renderLists.dispose()
   }
 
-  /** Set whether a view moves. */
   setMoving(view, isMoving) {
     if (isMoving) this.movingViews.add(view)
     else if (this.movingViews.delete(view)) this.invalidate(view) // to draw it finer
@@ -126,7 +125,7 @@ export class Stage {
 }
 
 function drawsInSoftware() {
-  const gl = document.createElement('canvas').getContext('webgl2')
+  const gl = h('canvas').getContext('webgl2')
   if (gl === null) throw new Error('this browser has no WebGL 2')
   const info = gl.getExtension('WEBGL_debug_renderer_info')
   const name = info === null ? '' : String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL))

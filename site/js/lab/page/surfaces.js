@@ -3,75 +3,13 @@
 import {
   BufferAttribute, BufferGeometry, DynamicDrawUsage, InstancedMesh, Mesh, Sphere, Vector3,
 } from 'three' // prettier-ignore
+import { cross } from '../core/vectors.js'
 import { ropePieces } from './geometry.js'
 
 const EVERYWHERE = new Sphere(new Vector3(), Infinity)
 const SHOWN_GROUPS = 3
 
 const dynamic = (array, width) => new BufferAttribute(array, width).setUsage(DynamicDrawUsage)
-
-/** A skin: points and normals of its vertices are in the frame. */
-export class Skin {
-  constructor(parent, materials, info, layout) {
-    this.offset = layout.skin + 6 * info.start
-    this.count = info.count
-    this.rgba = info.rgba
-    this.geometry = new BufferGeometry()
-    this.position = dynamic(new Float32Array(3 * info.count), 3)
-    this.normal = dynamic(new Float32Array(3 * info.count), 3)
-    this.geometry.setAttribute('position', this.position).setAttribute('normal', this.normal)
-    if (info.texcoords !== null) this.geometry.setAttribute('uv', new BufferAttribute(Float32Array.from(info.texcoords), 2))
-    this.geometry.setIndex(Array.from(info.faces))
-    this.geometry.boundingSphere = EVERYWHERE
-    const material = materials.makeMaterial(info.material, { doubleSided: true })
-    if (info.texcoords !== null) materials.applyTexture(material, info.material, true)
-    materials.paint(material, ...colourOf(info, materials))
-    this.mesh = new Mesh(this.geometry, material)
-    this.mesh.visible = info.group < SHOWN_GROUPS
-    this.mesh.castShadow = this.mesh.receiveShadow = true
-    parent.add(this.mesh)
-  }
-
-  update(frame) {
-    for (let i = 0, offset = this.offset; i < this.count; i++, offset += 6) {
-      this.position.array.set(frame.subarray(offset, offset + 3), 3 * i)
-      this.normal.array.set(frame.subarray(offset + 3, offset + 6), 3 * i)
-    }
-    this.position.needsUpdate = this.normal.needsUpdate = true
-  }
-
-  dispose() {
-    this.mesh.removeFromParent()
-    this.geometry.dispose()
-  }
-}
-
-/** A flex: a surface whose normals follow from its points, or the ropes of one of dimension 1. */
-export class Flex {
-  constructor(parent, materials, info, layout) {
-    this.offset = layout.flex + 3 * info.start
-    this.count = info.count
-    const material = materials.makeMaterial(info.material, { doubleSided: info.dim > 1 })
-    material.flatShading = info.dim > 1 && info.flat
-    materials.paint(material, ...colourOf(info, materials))
-    this.part = info.dim === 1 ? new Ropes(material, info) : new Cloth(material, info)
-    for (const mesh of this.part.meshes) {
-      mesh.visible = info.group < SHOWN_GROUPS
-      mesh.castShadow = mesh.receiveShadow = true
-      mesh.frustumCulled = false
-      parent.add(mesh)
-    }
-  }
-
-  update(frame) {
-    this.part.update(frame.subarray(this.offset, this.offset + 3 * this.count))
-  }
-
-  dispose() {
-    for (const mesh of this.part.meshes) mesh.removeFromParent()
-    this.part.dispose()
-  }
-}
 
 class Cloth {
   constructor(material, { count, elements }) {
@@ -91,6 +29,57 @@ class Cloth {
 
   dispose() {
     this.geometry.dispose()
+  }
+}
+
+/** A skin: points and normals of its vertices are in the frame. */
+export class Skin extends Cloth {
+  constructor(parent, materials, info, layout) {
+    const material = materials.makeMaterial(info.material, { doubleSided: true })
+    super(material, { count: info.count, elements: info.faces })
+    this.offset = layout.skin + 6 * info.start
+    this.count = info.count
+    this.normal = dynamic(new Float32Array(3 * info.count), 3)
+    this.geometry.setAttribute('normal', this.normal)
+    if (info.texcoords !== null) {
+      this.geometry.setAttribute('uv', new BufferAttribute(Float32Array.from(info.texcoords), 2))
+      materials.applyTexture(material, info.material, true)
+    }
+    addSurface(parent, this, material, materials, info)
+  }
+
+  update(frame) {
+    for (let i = 0, offset = this.offset; i < this.count; i++, offset += 6) {
+      this.position.array.set(frame.subarray(offset, offset + 3), 3 * i)
+      this.normal.array.set(frame.subarray(offset + 3, offset + 6), 3 * i)
+    }
+    this.position.needsUpdate = this.normal.needsUpdate = true
+  }
+
+  dispose() {
+    this.meshes[0].removeFromParent()
+    super.dispose()
+  }
+}
+
+/** A flex: a surface whose normals follow from its points, or the ropes of one of dimension 1. */
+export class Flex {
+  constructor(parent, materials, info, layout) {
+    this.offset = layout.flex + 3 * info.start
+    this.count = info.count
+    const material = materials.makeMaterial(info.material, { doubleSided: info.dim > 1 })
+    material.flatShading = info.dim > 1 && info.flat
+    this.part = info.dim === 1 ? new Ropes(material, info) : new Cloth(material, info)
+    addSurface(parent, this.part, material, materials, info)
+  }
+
+  update(frame) {
+    this.part.update(frame.subarray(this.offset, this.offset + 3 * this.count))
+  }
+
+  dispose() {
+    for (const mesh of this.part.meshes) mesh.removeFromParent()
+    this.part.dispose()
   }
 }
 
@@ -135,8 +124,19 @@ export function writeTubeMatrix(out, offset, points, a, b, radius) {
   const s = Math.abs(z[2]) < 0.9 ? [-z[1], z[0], 0] : [0, -z[2], z[1]]
   const n = radius / Math.hypot(...s)
   const x = s.map((value) => n * value)
-  const y = [0, 1, 2].map((i) => z[(i + 1) % 3] * x[(i + 2) % 3] - z[(i + 2) % 3] * x[(i + 1) % 3])
+  const y = cross(z, x)
   out.set([...x, 0, ...y, 0, ...half, 0, ...[0, 1, 2].map((i) => (points[a + i] + points[b + i]) / 2), 1], offset)
+}
+
+/** Paint a surface, and put its meshes into the picture. */
+function addSurface(parent, { meshes }, material, materials, info) {
+  materials.paint(material, ...colourOf(info, materials))
+  for (const mesh of meshes) {
+    mesh.visible = info.group < SHOWN_GROUPS
+    mesh.castShadow = mesh.receiveShadow = true
+    mesh.frustumCulled = false
+    parent.add(mesh)
+  }
 }
 
 /** The colour of a skin or flex; one left at MuJoCo's default is that of the material. */

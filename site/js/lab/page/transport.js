@@ -1,6 +1,6 @@
 /** The rows under the picture: play and pause, a step, reset, speed, time, full screen; and the run as a bar. */
 
-import { h, icon, iconButton } from './dom.js'
+import { h, icon, iconButton, onInput } from './dom.js'
 import { formatLabel, formatRough, formatTime } from './numbers.js'
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5]
@@ -76,15 +76,7 @@ export function buildTape(words, stopAt, { seek, step }) {
   let [earlier, later] = [0, 0] // times of the events before and after
   const previous = iconButton('previous', words('lab.live.previous_event'), () => seek(earlier))
   const next = iconButton('next', words('lab.live.next_event'), () => seek(later))
-  let queued = false
-  field.addEventListener('input', () => {
-    if (queued) return
-    queued = true // at most one message per refresh of the screen
-    requestAnimationFrame(() => {
-      queued = false
-      seek(Number(field.value))
-    })
-  })
+  const isQueued = onInput(field, () => seek(Number(field.value)))
   field.addEventListener('keydown', (event) => {
     const jump = { PageDown: previous, PageUp: next }[event.key]
     if (jump) event.preventDefault()
@@ -103,7 +95,7 @@ export function buildTape(words, stopAt, { seek, step }) {
       const first = end > start ? start : 0 // a run that is not kept has its time shown, and cannot be gone through
       field.min = String(first)
       field.max = String(Math.max(stopAt ?? first + USUAL, end))
-      if (!queued) field.value = String(time)
+      if (!isQueued()) field.value = String(time)
       const labels = events.filter((event) => Math.abs(event.time - time) < NEAR).map(({ label }) => label)
       field.setAttribute('aria-valuetext', [`${formatTime(time)} s`, ...labels].join(', '))
       const times = [start, ...events.map((event) => event.time), end]

@@ -8,7 +8,6 @@ import { PerspectiveCamera } from 'three'
 import { ModelCamera, OrbitCamera } from './camera.js'
 import { h, outline } from './dom.js'
 import { formatRough } from './numbers.js'
-import { channels, resolve, watchTheme } from './palette.js'
 import { stage } from './stage.js'
 import { STUDIO_LAYER, roundLength } from './studio.js'
 import { World, aim } from './world.js'
@@ -68,8 +67,7 @@ export class View {
     stage.add(this)
     this.world?.dispose()
     this.world = new World(description)
-    const { azimuth, elevation, distance, target, fovy } = description.camera
-    this.camera = this.freeCamera = new OrbitCamera({ azimuth, elevation, distance, target: [...target], fovy })
+    this.camera = this.freeCamera = new OrbitCamera(description.camera)
     this.frame = null
     this.colour()
   }
@@ -88,7 +86,11 @@ export class View {
 
   /** Apply the page's colours. */
   colour() {
-    this.world?.trail?.paint(channels(resolve(this.element, 'var(--trace-2)')))
+    const probe = h('span', { hidden: true }) // style sheets do not apply to a canvas
+    probe.style.color = 'var(--trace-2)'
+    this.element.append(probe)
+    this.world?.trail?.paint(getComputedStyle(probe).color)
+    probe.remove()
     this.invalidate()
   }
 
@@ -130,7 +132,6 @@ export class View {
     return this.world.mirror?.draw(stage, this.scene, this.lens, this.width, this.height) ?? false
   }
 
-  /** Take the stage's canvas. */
   takeCanvas(canvas) {
     canvas.setAttribute('role', 'img')
     canvas.setAttribute('aria-label', this.label)
@@ -208,5 +209,21 @@ class ScaleBar {
     if (text === this.length.textContent) return
     this.length.textContent = text
     this.element.setAttribute('aria-label', this.words('lab.scale', { length: text }))
+  }
+}
+
+/**
+ * Call `callback` when the page changes between light and dark.
+ *
+ * @returns {() => void} stops it
+ */
+function watchTheme(callback) {
+  const media = window.matchMedia('(prefers-color-scheme: dark)')
+  const observer = new MutationObserver(callback)
+  observer.observe(document.documentElement, { attributes: true, attributeFilter: ['data-theme'] })
+  media.addEventListener('change', callback)
+  return () => {
+    observer.disconnect()
+    media.removeEventListener('change', callback)
   }
 }

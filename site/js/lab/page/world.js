@@ -29,8 +29,7 @@ export class World {
     this.scene = new Scene()
     this.materials = new Materials(description)
     this.lights = new Lights(description, this.scene)
-    this.meshes = description.meshes.map(() => null)
-    this.hfields = description.hfields.map(() => null)
+    this.shapes = new Map() // geometries of meshes and height fields
     // A floor with a grid takes the place of a plane without a colour of its own.
     this.ground = description.lights.length > 0 ? null : description.floor
     const isShown = ({ group, level }) => group < SHOWN_GROUPS && (level === null || level !== this.ground)
@@ -67,7 +66,7 @@ export class World {
   }
 
   solid({ type, material, data = -1 }) {
-    const geometry = type === GEOM.MESH || type === GEOM.SDF ? this.mesh(data) : type === GEOM.HFIELD ? this.hfield(data) : null
+    const geometry = this.geometry(type, data)
     const wrapped = geometry !== null && this.description.meshes[data]?.texcoords != null && type !== GEOM.HFIELD
     return new Solid(this.scene, this.materials, { type, material, geometry, wrapped, extent: this.description.extent })
   }
@@ -83,18 +82,14 @@ export class World {
     return surfaces.length > 0 ? new Mirror(surfaces) : null
   }
 
-  mesh(id) {
-    const info = this.description.meshes[id]
+  /** The geometry of a mesh or a height field, made once; null for any other shape. */
+  geometry(type, id) {
+    const isField = type === GEOM.HFIELD
+    if (!isField && type !== GEOM.MESH && type !== GEOM.SDF) return null
+    const info = this.description[isField ? 'hfields' : 'meshes'][id]
     if (info === undefined) return null
-    this.meshes[id] ??= meshGeometry(info)
-    return this.meshes[id]
-  }
-
-  hfield(id) {
-    const info = this.description.hfields[id]
-    if (info === undefined) return null
-    this.hfields[id] ??= hfieldGeometry(info)
-    return this.hfields[id]
+    if (!this.shapes.has(info)) this.shapes.set(info, isField ? hfieldGeometry(info) : meshGeometry(info))
+    return this.shapes.get(info)
   }
 
   /** The pose in a frame: its part that holds the geoms. */
@@ -159,7 +154,7 @@ export class World {
   }
 
   decoration(type, data) {
-    const geometry = type === GEOM.MESH ? this.mesh(data >> 1) : null
+    const geometry = this.geometry(type, data >> 1)
     const solid = new Solid(this.scene, this.materials, { type, geometry, model: false, extent: this.description.extent })
     for (const mesh of solid.meshes) mesh.castShadow = mesh.receiveShadow = false
     // A box of inertia may coincide with the faces of a geom: draw the decoration in front.
@@ -200,7 +195,7 @@ export class World {
     this.mirror?.dispose()
     this.edges.dispose()
     this.floor?.dispose()
-    for (const thing of [...this.meshes, ...this.hfields, ...this.skins, ...this.flexes, ...this.coils, ...this.pins, this.trail]) thing?.dispose()
+    for (const thing of [...this.shapes.values(), ...this.skins, ...this.flexes, ...this.coils, ...this.pins, this.trail]) thing?.dispose()
     for (const solid of [...this.geoms, ...this.sites, ...this.ghosts, ...[...this.decorations.values()].flat()]) solid?.remove()
     this.scene.clear()
   }

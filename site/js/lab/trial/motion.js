@@ -8,9 +8,9 @@
  * less than a hundredth of the picture's height counts as standing. The rectangles around the others are added up, on a grid.
  */
 
-import { cameraAxes, dot, Framing, isShown } from '../core/framing.js'
-import { packed } from './base64.js'
-import { withSmallTextures } from './record.js'
+import { cameraAxes, Framing, isShown } from '../core/framing.js'
+import { dot } from '../core/vectors.js'
+import { packed, withSmallTextures } from './record.js'
 
 const SECONDS = 3
 const MOMENTS = 60 // at which a run is looked at

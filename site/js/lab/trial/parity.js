@@ -6,7 +6,7 @@
  * and of every `stride`-th step the numbers themselves.
  */
 
-import { packed } from './base64.js'
+import { packed } from './record.js'
 
 const MOST_NUMBERS = 200_000 // of recorded states
 const MOST_WRITES = 1_000_000

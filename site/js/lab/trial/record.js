@@ -4,6 +4,19 @@ import { resize } from '../core/detail.js'
 import { nameOf } from '../core/names.js'
 import { LabError } from '../core/piece.js'
 
+const KINDS = { Float32Array: 'f32', Float64Array: 'f64', Int32Array: 'i32', Uint8Array: 'u8', Uint32Array: 'u32' }
+
+/** A value for JSON: arrays of numbers in it become {type: 'f32' | 'f64' | 'i32' | 'u32' | 'u8', data: base64}. */
+export function packed(value) {
+  if (ArrayBuffer.isView(value)) {
+    const bytes = /** @type {any} */ (new Uint8Array(value.buffer, value.byteOffset, value.byteLength))
+    return { type: KINDS[value.constructor.name], data: bytes.toBase64() } // which V8 has
+  }
+  if (Array.isArray(value)) return value.map(packed)
+  if (value === null || typeof value !== 'object') return value
+  return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, packed(item)]))
+}
+
 const POINTS = 1000 // of a recorded trace, at most
 const INFINITE = new Map([[Infinity, '∞'], [-Infinity, '−∞']])
 

@@ -51,13 +51,11 @@ import { Lab } from '../core/lab.js'
 import { LabError, call, current, curveEntry, numeric, plottable, readable } from '../core/piece.js'
 import { Framing } from '../core/framing.js'
 import { act, controlActs, describe } from './acts.js'
-import { packed } from './base64.js'
 import { deepContact } from './deep.js'
 import { Motion } from './motion.js'
 import { ParityRecorder } from './parity.js'
-import { fallenBodies, film, picture, record, widen, withSmallTextures } from './record.js'
+import { fallenBodies, film, packed, picture, record, widen, withSmallTextures } from './record.js'
 import { resetDiffers } from './reset.js'
-import { watchedCode } from './watched.js'
 
 const SECONDS = 5 // of simulated time, unless the lab says otherwise
 const STEPS = 20_000 // at most, unless the lab says for how long
@@ -175,16 +173,16 @@ class Trial {
   }
 
   /** Do something with a fresh lab whose failures are known: they are not noted again, nor under another attempt. */
-  fresh(config, action, code = this.code) {
-    const { code: ownCode, failures, reportedKeys, during } = this
-    const lab = new Lab(this.engine, this.bytes, config, code)
+  fresh(config, action) {
+    const { failures, reportedKeys, during } = this
+    const lab = new Lab(this.engine, this.bytes, config, this.code)
     try {
-      Object.assign(this, { code, failures: [], reportedKeys: new Set() })
+      Object.assign(this, { failures: [], reportedKeys: new Set() })
       lab.start()
       return action(lab)
     } finally {
       lab.dispose()
-      Object.assign(this, { code: ownCode, failures, reportedKeys, during })
+      Object.assign(this, { failures, reportedKeys, during })
     }
   }
 
@@ -239,16 +237,23 @@ class Trial {
 
   /** The entry whose code changes what labs share, if it does so again. */
   findGuilty(action) {
-    const { entry } = this.during
-    const watched = watchedCode(this.code, this.guard, this.config)
+    let guilty = null
+    const { after } = current
+    current.after = (entry) => {
+      if (guilty !== null || this.guard.changes().length === 0) return
+      guilty = entry
+      this.guard.repair()
+      throw new Ended()
+    }
     try {
-      this.fresh(this.config, action, watched.code)
+      this.fresh(this.config, action)
     } catch {
-      // The watched code throws as soon as it is known.
+      // That is how it ends.
     } finally {
+      current.after = after
       this.guard.repair()
     }
-    return watched.entry() ?? entry
+    return guilty ?? this.during.entry
   }
 
   /** Note divergence and warnings of the lab. */
@@ -389,12 +394,8 @@ class Trial {
   // --- claims and the goal
 
   claims() {
-    const groups = new Map()
-    this.config.expect.forEach((claim, i) => {
-      const key = JSON.stringify(claim.after)
-      groups.set(key, [...(groups.get(key) ?? []), { ...claim, i }])
-    })
-    for (const claims of groups.values()) {
+    const numbered = this.config.expect.map((claim, i) => ({ ...claim, i }))
+    for (const claims of Map.groupBy(numbered, ({ after }) => JSON.stringify(after)).values()) {
       claims.sort((a, b) => a.t - b.t)
       this.attempt(['expect', claims[0].i], describe(claims[0].after), (lab) => this.checkClaims(lab, claims))
     }

@@ -42,7 +42,6 @@ export class Host {
 
   /** Handle a message of the page. */
   receive(message) {
-    if (message.type === 'warm') return void this.start(message.wasm).catch(() => {}) // a lab that needs it will report the failure
     if (message.type === 'load') return void this.load(message)
     const id = message.lab
     if (message.type === 'ping') return void this.services.post({ type: 'pong', lab: id }, [])

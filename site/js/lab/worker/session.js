@@ -4,10 +4,9 @@
  * Frames are sent only while the page gives their buffers back, so that a page which cannot follow slows nothing but itself. An
  * exception of lab code pauses the lab and is reported with its entry.
  *
- * Messages have a `type` and, except for `warm`, the `lab` that they are about. Those that arrive while a lab is loading are kept, and
+ * Messages have a `type`, and the `lab` that they are about. Those that arrive while a lab is loading are kept, and
  * handled afterwards. To the worker:
  *
- *   warm {wasm}                       start to fetch and compile the engine (an address)
  *   load {config, module, mjb, wasm, own}  fetch what is missing and start the lab; `module`, `mjb` and `wasm` are absolute addresses. A
  *                                     model in `config.xml` replaces `mjb`, and may name the files of `own`, `{main, files}`, where it lies
  *                                     at the path `main`, and with `config.isOther` is none to which the lab's camera belongs; without a `module` the lab has no code but a start from the first keyframe
@@ -282,7 +281,7 @@ const HANDLERS = {
     session.stale = true
   },
   examine(session, { part }) {
-    session.lab.panel?.choose(part)
+    if (session.lab.panel !== null) session.lab.panel.part = part
     session.stale = true
   },
   actuate: (session, { index, value, play }) => session.act((lab) => lab.actuate(index, value), play),
