@@ -202,7 +202,7 @@ class BackgroundRebuild:
                 static=True,
                 addresses=addresses,
                 known_runs=known_runs,
-                other_runs=session.runs.other_runs(),
+                other_runs=session.runs.other_runs(course),
             )
         except BaseException:
             session.runs.is_all_due |= is_all_due
@@ -252,10 +252,12 @@ class BackgroundRebuild:
             return session.edits != self._edits or self._failure is not None
 
         with session.condition:
-            course, doubtful_paths = session.runs.course, session.runs.doubtful_paths()
-            extractions = () if course is None else extract(course).value
+            course = session.runs.course
+            if course is None or session.code != "run":
+                return
+            doubtful_paths, extractions = session.runs.doubtful_paths(course), extract(course).value
             scripts = [e for e in extractions if e.path in doubtful_paths and not e.script.once]
-            if course is None or not scripts or session.code != "run":
+            if not scripts:
                 return
             if session.condition.wait_for(is_due, IDLE):
                 raise SupersededError

@@ -173,6 +173,16 @@ def test_what_cannot_be_recorded_is_not_offered(make: Make) -> None:
         assert number["label"] == "the nearest printed value is 1.975"
 
 
+def test_output_of_an_edited_script_is_not_taken_for_another_run_of_it(make: Make) -> None:
+    """An output that differs is printed once more, unless the script has changed since."""
+    folder = make("## Mass\n\n" + block("mass.py", "print('kg', 7)", "kg 1"))
+    with serve_preview(folder) as preview:
+        preview.wait_for_line("checked: still 1 error")  # it has run once more
+        folder.replace(folder.lesson(), "'kg', 7", "'kg', 8")
+        preview.wait_for_line("this run printed 8")
+        assert not [line for line in preview.lines if "output-unstable" in line]
+
+
 def test_one_click_accepts_an_output_and_all_numbers_at_their_addresses(make: Make) -> None:
     """Not the nearest number, which is another quantity; also those of another lesson."""
     code = "print('period', 2.95, 's')\nprint('half', 1.975, 's')"
