@@ -325,7 +325,7 @@ def new_output(
     The first is of the output, the others of numbers that are bound to it.
     """
     run = library.runs[verdict.recording.script or ""]
-    unstable_output = find_instability(verdict, run, session.runs.other_runs(course))
+    unstable_output = find_instability(verdict, run, session.runs.other_runs())
     if unstable_output is not None:
         return unstable_output
     documents, addresses = [d for _, d in course.shown_texts], dict(session.runs.addresses)

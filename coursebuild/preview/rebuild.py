@@ -186,7 +186,7 @@ class BackgroundRebuild:
             # What is accepted while scripts run may be called otherwise from then on.
             addresses = known_addresses(course.records) | session.runs.addresses
             session.runs.addresses = addresses
-            if is_all_due:  # what else was printed may have been so for another reason
+            if not known_runs:  # what else was printed was so for another reason, or by other code
                 session.runs.repeats.clear()
         keys = script_keys(course)
         options = replace(
@@ -202,15 +202,16 @@ class BackgroundRebuild:
                 static=True,
                 addresses=addresses,
                 known_runs=known_runs,
-                other_runs=session.runs.other_runs(course),
+                other_runs=session.runs.other_runs(),
             )
         except BaseException:
             session.runs.is_all_due |= is_all_due
             raise
         finally:
             session.runs.running.clear()
-        options = options.for_course(course)
-        results, _ = with_downloads(course, verification.results, options, only_known=True)
+        results, _ = with_downloads(
+            course, verification.results, options.for_course(course), only_known=True
+        )
         verification = replace(verification, results=results)
         self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once
         session.take_results(course, verification, addresses)
@@ -252,12 +253,10 @@ class BackgroundRebuild:
             return session.edits != self._edits or self._failure is not None
 
         with session.condition:
-            course = session.runs.course
-            if course is None or session.code != "run":
-                return
-            doubtful_paths, extractions = session.runs.doubtful_paths(course), extract(course).value
+            course, doubtful_paths = session.runs.course, session.runs.doubtful_paths()
+            extractions = () if course is None else extract(course).value
             scripts = [e for e in extractions if e.path in doubtful_paths and not e.script.once]
-            if not scripts:
+            if course is None or not scripts or session.code != "run":
                 return
             if session.condition.wait_for(is_due, IDLE):
                 raise SupersededError

@@ -46,8 +46,8 @@ class RunHistory:
         self.last_results = Results((), (), (), (), engine_version())
         self._runs: dict[str, tuple[ScriptKey, ScriptRun]] = {}
         """The last run of each script, by path, with the key of the script that ran."""
-        self.repeats: dict[str, tuple[ScriptKey, ScriptRun, ScriptRun]] = {}
-        """Of scripts that ran once more, by path: the script, the run before, and the new one."""
+        self.repeats: dict[str, tuple[ScriptRun, ScriptRun]] = {}
+        """Of scripts that ran once more, by path: the run before, and the new one."""
         self.noise: tuple[Diagnostic, ...] = ()
         """Recorded digits that do not hold, of scripts whose initial states were moved."""
         self.addresses: Addresses = {}
@@ -97,23 +97,20 @@ class RunHistory:
         """Take the runs of scripts that ran once more, in the place of those before."""
         for run in runs:
             key, before = self._runs[run.path]
-            self.repeats[run.path] = key, before, run
+            self.repeats[run.path] = before, run
             self._runs[run.path] = key, run
 
-    def other_runs(self, course: Course) -> dict[str, ScriptRun]:
-        """The runs before the last ones, by path, of a course's scripts that ran once more."""
-        keys = script_keys(course)
+    def other_runs(self) -> dict[str, ScriptRun]:
+        """The runs before the last ones, by path, of scripts that ran once more."""
         return {
             path: before
-            for path, (key, before, now) in self.repeats.items()
-            if keys.get(path) == key
-            and path in self._runs
-            and self._runs[path][1].stdout == now.stdout
+            for path, (before, now) in self.repeats.items()
+            if path in self._runs and self._runs[path][1].stdout == now.stdout
         }
 
-    def doubtful_paths(self, course: Course) -> dict[str, bool]:
+    def doubtful_paths(self) -> dict[str, bool]:
         """The scripts of which one run does not say enough, with whether it was recorded."""
-        other_runs = self.other_runs(course)
+        other_runs = self.other_runs()
         return {
             line.path: line.unrepeated
             for line in self.script_lines
