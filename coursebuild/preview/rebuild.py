@@ -186,7 +186,7 @@ class BackgroundRebuild:
             # What is accepted while scripts run may be called otherwise from then on.
             addresses = known_addresses(course.records) | session.runs.addresses
             session.runs.addresses = addresses
-            if is_all_due:  # what else was printed may have been so for another reason
+            if not known_runs:  # what else was printed was so for another reason, or by other code
                 session.runs.repeats.clear()
         keys = script_keys(course)
         options = replace(
@@ -209,8 +209,9 @@ class BackgroundRebuild:
             raise
         finally:
             session.runs.running.clear()
-        options = options.for_course(course)
-        results, _ = with_downloads(course, verification.results, options, only_known=True)
+        results, _ = with_downloads(
+            course, verification.results, options.for_course(course), only_known=True
+        )
         verification = replace(verification, results=results)
         self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once
         session.take_results(course, verification, addresses)

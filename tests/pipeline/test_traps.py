@@ -52,6 +52,7 @@ def test_every_command_is_tried() -> None:
 def test_no_trap_runs(traps: TrapFolder, command: tuple[str, ...]) -> None:
     result = run(traps, tool(*command))
     assert (traps.marks(), "Traceback" in result.stderr) == ([], False), result.stderr
+    assert result.returncode < 2, "the command was not understood"
     if command[0] in ("build", "check") and "--against" not in command:
         assert result.stdout.endswith("everything holds\n")  # all that a course needs was started
 

@@ -54,7 +54,7 @@ COMMANDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "new": (("new", "lesson", "1.2", "B"), ("new", "feature", "x"), ("new", "model", "y")),
     "rename": (("rename", "1.1", "1.2"),),
     "schema": (("schema", "course"),),
-    "stability": (("stability", "box", "--quick"),),
+    "stability": (("stability", "projectile"),),
     "undo": (("undo",),),
     "update": (("update",),),
 }
