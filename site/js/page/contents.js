@@ -25,7 +25,10 @@ export function listMove(list, entry) {
   return 0
 }
 
-/** Follow the reader's scrolling; returns a function that ends it. */
+/**
+ * Follow the reader's scrolling, and unfold the lists where they stand beside the text. (Style sheets show them there even if they
+ * are folded, but a tool that asks what can be reached believes the fold.) Returns a function that ends it.
+ */
 export function followContents(document) {
   const page = document.querySelector('.level-nav [aria-current="page"]')
   if (page) keepInSight(page, page)
@@ -35,9 +38,7 @@ export function followContents(document) {
     .filter(({ heading }) => heading)
   if (pairs.length === 0) return () => {}
   let current = null
-  let isPending = false
   const mark = () => {
-    isPending = false
     const atEnd = innerHeight + scrollY >= document.documentElement.scrollHeight - 2
     const tops = pairs.map(({ heading }) => heading.getBoundingClientRect().top)
     const index = atEnd && scrollY > 0 ? lastVisible(tops) : currentHeading(tops, innerHeight * 0.25)
@@ -48,13 +49,15 @@ export function followContents(document) {
     current = link
     keepInSight(link, links[0])
   }
-  const schedule = () => {
-    if (!isPending) requestAnimationFrame(mark)
-    isPending = true
-  }
   const abort = new AbortController()
-  addEventListener('scroll', schedule, { passive: true, signal: abort.signal })
-  addEventListener('resize', schedule, { signal: abort.signal })
+  const wide = matchMedia('(width >= 75rem)')
+  const open = () => {
+    for (const list of document.querySelectorAll('.beside details')) list.open = wide.matches
+  }
+  open()
+  wide.addEventListener('change', open, { signal: abort.signal })
+  addEventListener('scroll', mark, { signal: abort.signal })
+  addEventListener('resize', mark, { signal: abort.signal })
   mark()
   return () => {
     abort.abort()
