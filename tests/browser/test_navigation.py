@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from support.axe import violations
 from support.built_sites import Site
 from support.lab_page import becomes, until, wait_for_condition
 
@@ -101,6 +102,7 @@ def test_a_long_contents_list_follows_the_reader(page: Page, base: str) -> None:
     page.goto(base + FORMULAS)
     toc = page.locator(".toc")
     becomes(page, lambda: toc.evaluate("node => node.scrollHeight > node.clientHeight"), True)
+    assert violations(page, ".beside") == []
     for part in ("Part 20", "Part 26.1", "Part 2"):
         page.get_by_role("heading", name=part).first.evaluate("node => node.scrollIntoView()")
         expect(current(page)).to_have_text(re.compile(f"^{re.escape(part)}"))

@@ -16,7 +16,10 @@ export function listMove(list, entry) {
   return 0
 }
 
-/** Follow the reader's scrolling; returns a function that ends it. */
+/**
+ * Follow the reader's scrolling, and unfold the lists where they stand beside the text. (Style sheets show them there even if they
+ * are folded, but a tool that asks what can be reached believes the fold.) Returns a function that ends it.
+ */
 export function followContents(document) {
   const page = document.querySelector('.level-nav [aria-current="page"]')
   if (page) keepInSight(page, page)
@@ -38,6 +41,12 @@ export function followContents(document) {
     keepInSight(link, links[0])
   }
   const abort = new AbortController()
+  const wide = matchMedia('(width >= 75rem)')
+  const open = () => {
+    for (const list of document.querySelectorAll('.beside details')) list.open = wide.matches
+  }
+  open()
+  wide.addEventListener('change', open, { signal: abort.signal })
   // Browsers send one of these events for each picture at most.
   addEventListener('scroll', mark, { passive: true, signal: abort.signal })
   addEventListener('resize', mark, { signal: abort.signal })

@@ -1,5 +1,5 @@
 /**
- * Prepares for print: sets the running title, puts the answers of questions behind the text, and opens folds for browsers in which
+ * Prepares for print: sets the running title, puts answers and solutions behind the text, and opens folds for browsers in which
  * style sheets cannot. A further section that is closed is not printed, nor is a folded listing of more than sixty lines.
  */
 
@@ -26,26 +26,32 @@ export function openForPrint(window) {
   })
 }
 
-/** Move the answers of all questions that are printed to a section behind the text. @returns {() => void} puts them back */
+/** Move what answers questions, exercises and tasks, where it is printed, to a list behind the text. @returns {() => void} puts it back */
 function moveAnswers(document) {
   const text = document.querySelector('.columns > .prose')
-  const section = h('section', { class: 'answers' })
-  const places = []
-  for (const quiz of text?.querySelectorAll('.quiz') ?? []) {
-    const answers = [...quiz.querySelectorAll('.question > .answer:not(.is-empty)')]
-    if (answers.length === 0 || quiz.closest('.further-text:not([open])') !== null) continue
-    const items = answers.map((answer) => {
-      const { number } = answer.closest('.question').dataset
-      const mark = document.createComment('')
-      answer.replaceWith(mark)
-      places.push([mark, answer])
-      return h('li', { value: Number(number) }, answer)
-    })
-    section.append(h('p', { class: 'quiz-title' }, quiz.getAttribute('aria-label')), h('ol', {}, ...items))
+  const list = h('ol', { class: 'answers' })
+  text?.after(list)
+  const add = (content) => {
+    const item = h('li', {}, content)
+    list.append(item)
+    return item
   }
-  if (places.length > 0) text.after(section)
+  const places = []
+  let last
+  for (const answer of text?.querySelectorAll('.answer:not(.is-empty), .callout-solution') ?? []) {
+    if (answer.closest('.further-text:not([open])')) continue
+    const asked = answer.closest('.quiz, .exercise')
+    if (asked && asked !== last) add(asked.ariaLabel).className = 'quiz-title'
+    last = asked
+    const number = answer.closest('.question')?.dataset.number
+    const mark = document.createComment('')
+    answer.replaceWith(mark)
+    const item = add(answer)
+    if (number) item.value = number
+    places.push([mark, answer])
+  }
   return () => {
     for (const [mark, answer] of places) mark.replaceWith(answer)
-    section.remove()
+    list.remove()
   }
 }
