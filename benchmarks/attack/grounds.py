@@ -120,19 +120,20 @@ class Victim:
         self.grounds = grounds
         self.template = grounds.folder("template")
         self.template.fill([LESSON, SECOND], grounds.stores)
-        self._build(self.template)
+        self._run(self.template, "build")
         self.old = site(self.template)
         self.template.write(self.template.lesson(), EDITED_LESSON)
+        self._run(self.template, "update")  # writes what its outputs were recorded with
         self.folder = self.restore()
-        self._build(self.folder)
+        self._run(self.folder, "build")
         self.new = site(self.folder)
 
     def restore(self) -> Folder:
         self.folder = self.grounds.copy(self.template, "victim")
         return self.folder
 
-    def _build(self, folder: Folder) -> None:
-        result = folder.run("build", "-q")
+    def _run(self, folder: Folder, command: str) -> None:
+        result = folder.run(command, "-q")
         if result.status != 0:
             raise SystemExit(result.out + result.err)
 
