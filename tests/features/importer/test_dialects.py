@@ -83,7 +83,8 @@ def test_code_that_docusaurus_imports_and_colours(tmp_path: Path) -> None:
     text = (
         "# One\n\nimport Src from '!!raw-loader!./gas.py';\n\n"
         '<CodeBlock language="python" title="gas.py">{Src}</CodeBlock>\n\n'
-        "```python\n# highlight-next-line\nx = 1\n```\n"
+        "```python\n# highlight-next-line\nx = 1\n```\n\n"
+        "- A\n\n  ```sh\n  # error-start\n  a\n  ```\n"
     )
     files = {
         "docs/gas.py": "print('gas')\n",
@@ -92,7 +93,8 @@ def test_code_that_docusaurus_imports_and_colours(tmp_path: Path) -> None:
     course = convert_files(tmp_path, {"docs/a.mdx": text, **files})
     assert 'title = "Heat"' in course.files["content/course.toml"].decode()
     assert course.files["content/lessons/1.1-a.md"].decode() == (
-        "**gas.py**\n\n```python\nprint('gas')\n```\n\n```python\nx = 1\n```\n"
+        "**gas.py**\n\n```python\nprint('gas')\n```\n\n```python\nx = 1\n```\n\n"
+        "- A\n\n  ```sh\n  a\n  ```\n"
     )
 
 
