@@ -39,11 +39,6 @@ _MAX_DEPTH = 20
 _DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
 _TITLE = re.compile(r"\b(?:title|tab|filename|lst-cap|name)=(?:\"([^\"]*)\"|'([^']*)')")
 _TAB = "tab", "a title in bold, and what it holds: pages show one tab below the other"
-_HIGHLIGHT = re.compile(
-    r"^[ \t]*(?:#|//|--|%|/\*|<!--|\{/\*)[ \t]*highlight-(?:next-line|start|end)\b.*\n?",
-    re.MULTILINE,
-)
-"""A comment by which Docusaurus colours lines."""
 _CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
 _QUOTED_KIND = re.compile(
@@ -68,6 +63,12 @@ def _convert(segment: Segment, context: LessonContext) -> str:
     if segment.kind == "prose":
         text = rewrite_prose(without_jsx(text, context) if context.is_mdx else text, context)
         return name_callouts(text)
+    if form := re.search(r"\.content-(visible|hidden).*?(when|unless)-format=\W?(\w+)", head):
+        is_visible = (form[1] == "visible") == (form[2] == "when")
+        if is_visible != ("html" in form[3]):
+            words = " ".join(text.split()).replace("`", "")
+            context.leave("division", f"what is for other forms than a site: `{words}`")
+            return ""
     if language := language_of(segment):
         return write_other_cell(segment, language, context)
     if segment.kind == "cell":
@@ -85,7 +86,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             return _write_tab(head, text, context)
         case "!" | "?":
             names, _, title = head.partition('"')
-            name = names.split()[0]
+            name = (names.split() or ["details"])[0]
             is_folded = segment.mark == "???"
             title = title.rpartition('"')[0] or " ".join(names.split()[1:])
             title = "" if title in ("inline", "inline end", "end") else title
@@ -134,12 +135,6 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         title += f" {{#{label[1]}:{to_anchor(label[2])}}}" if label else ""
         is_folded = kind == "details" or re.search(r"collapse=\"?true", head) is not None
         return _write_callout(kind, title, text, context, is_folded)
-    if condition := re.search(r"content-(visible|hidden).*?(when|unless)-format=\W?(\w+)", head):
-        is_visible = (condition[1] == "visible") == (condition[2] == "when")
-        if is_visible != ("html" in condition[3]):
-            words = " ".join(text.split()).replace("`", "")
-            context.leave("division", f"what is for other forms than a site: `{words}`")
-            return ""
     if re.fullmatch(r"[A-Za-z_]\w*(?:\.\w+)+", head):
         context.leave("division", f"documentation that its tool makes from the code of `{head}`")
         return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
@@ -210,9 +205,8 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         text = code_for_readers(text)
         caption = options.get("fig-cap") or options.get("lst-cap") or ""
         head += f' title="{caption}"' if caption else ""
-    change = "dropped: its tool colours the lines beside it"
-    text = context.files.account.replace(text, _HIGHLIGHT, "", "comment in code", change)
-    words = re.sub(r"(\$[^$]+\$)|(?<!\\)([][_*`{}<])", _escape, find_group(_TITLE, head))
+    signs = r"(\$[^$]+\$)|(?<!\\)([][_*`{}<])"
+    words = re.sub(signs, lambda sign: sign[1] or f"\\{sign[2]}", find_group(_TITLE, head))
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
     kind = f"block of `{language}`" if language else "block without a kind"
@@ -221,10 +215,6 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
     new = marks.fence(f"{language or 'text' * bool(label)}{label}", text)
     context.files.account.convert(kind, "without what its tool adds", head, lambda: language)
     return (f"**{words}**\n\n" if words else "") + new
-
-
-def _escape(match: re.Match[str]) -> str:
-    return match[1] or f"\\{match[2]}"
 
 
 def _convert_nested(text: str, context: LessonContext, title: re.Pattern[str] | None = None) -> str:

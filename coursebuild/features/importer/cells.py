@@ -15,7 +15,7 @@ from coursebuild.core.scripts.figures import prepare_figure
 from coursebuild.features.importer.anchors import figure_of
 from coursebuild.features.importer.context import LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.source_files import Segment, read_yaml
+from coursebuild.features.importer.source_files import Segment, find_group, read_yaml
 
 _OPTION = re.compile(
     r"\s*(?:(?:#|//|%%)(?:[ ](?=\|[ ]+[\w-]+:[ ]))?\|(.*)|:([\w-]+):[ \t]*(.*))(?:\n|\Z)"
@@ -30,7 +30,7 @@ _WINDOW = re.compile(
 """What opens a window where there is none."""
 _DISPLAY = re.compile(r"^([ \t]*)display\(", re.MULTILINE)
 """What Jupyter shows without an import."""
-_ESCAPE = re.compile(r"\x1b\[[0-9;]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
+_ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
 _MAGIC = re.compile(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
@@ -57,7 +57,10 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
         blocks = [marks.fence(language, shown_code)] if shown_code else []
         return "\n\n".join((*blocks, *write_outputs(cell, context)))
     code, figure = _with_new_paths(code, context), ""
+    options = read_options(cell.text)[0]
+    label = find_group(r"\A(fig-.*)", options.get("label", ""))
     draws = _find_drawing(code, context.drawing)
+    draws |= bool(label) and code.endswith(";")  # a figure that is no value was drawn
     if _SAVED.search(code):
         code, figure = _take_saved_figures(cell, code, context)
     elif draws if cell.picture is None else cell.picture[1]:
@@ -70,9 +73,9 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     word = " part" if context.parts else ""
     context.parts.append(code)
     context.change("cell", "a part of the lesson's script")
-    options = read_options(cell.text)[0]
-    title = caption_of_code(options, context, ("lst-cap", "tbl-cap"))
-    label = re.sub("^lst-", "", options.get("lst-label", ""))
+    names = ("lst-cap", "tbl-cap", *(() if figure else ("fig-cap",)))
+    title = caption_of_code(options, context, names, "" if figure else label)
+    label = options.get("lst-label", "").removeprefix("lst-")
     word += how_shown(options, cell.head, begins=not word)
     word += f" {{#lst:{to_anchor(label)}}}" if label else ""
     head, end = f"python file={context.script_path}{word}", f"\n{_END} {len(context.parts)}"
@@ -345,12 +348,13 @@ def plain_output(text: str) -> str:
 
 
 def caption_of_code(
-    options: Mapping[str, str], context: LessonContext, names: Sequence[str]
+    options: Mapping[str, str], context: LessonContext, names: Sequence[str], label: str
 ) -> list[str]:
-    """Return the caption that one of these options gives, as a paragraph, if any does."""
+    """Return the anchor that a label sets, and the caption that one of these options gives."""
     captions = (options.get(name) for name in names)
     words = " ".join(next(filter(None, captions), "").split())
-    return [f"**{rewrite_prose(words, context)}**"] if words else []
+    anchor = [f'<a id="{to_anchor(label)}"></a>'] if label else []
+    return [*anchor, f"**{rewrite_prose(words, context)}**"] if words else anchor
 
 
 def how_shown(options: Mapping[str, str], tags: str, *, begins: bool) -> str:

@@ -214,14 +214,13 @@ class LessonContext(Struct, frozen=True, kw_only=True):
 
     def resolve_formula(self, label: str) -> str:
         """Return the address of a formula by its label; empty where no text has it."""
-        return self.resolve_anchor(f"eq:{formula_anchor(label)}")
+        return self.resolve_anchor(f"eq:{label_anchor(label)}")
 
     def resolve_path(self, path: str) -> str:
         """Return a path that the lesson names, relative to the folder that is imported."""
         path = unquote(path.removeprefix("@site"))
-        resolved = posixpath.normpath(posixpath.join(posixpath.dirname(self.path), path))
-        if path.startswith("/"):
-            resolved = posixpath.normpath(path.lstrip("/"))
+        folder = "" if path.startswith("/") else posixpath.dirname(self.path)
+        resolved = posixpath.normpath(posixpath.join(folder, path.lstrip("/")))
         if file := self.files.find(resolved):
             return file
         if stem_of(resolved) in self.targets:
@@ -299,14 +298,9 @@ def script_path_of(document: str) -> str:
     return f"examples/{'' if words and words[0].isalpha() else 'l'}{'_'.join(words)}.py"
 
 
-def formula_anchor(label: str) -> str:
-    """Return the anchor of a formula, without the `eq` that other tools put before its name."""
-    return to_anchor(re.sub(r"^eq[-:._]", "", label))
-
-
 def label_anchor(label: str) -> str:
-    """Return the anchor of a figure or table, without what other tools put before its name."""
-    return to_anchor(re.sub(r"^(?:fig|tab|tbl)[-:._]", "", label))
+    """Return the anchor of what has a number, without what other tools put before its name."""
+    return to_anchor(re.sub(r"^(?:eq|fig|tab|tbl)[-:._]", "", label))
 
 
 def to_anchor(name: str) -> str:

@@ -260,6 +260,11 @@ def _read_file(
             source = number_examples(source)
         if text.file.endswith(".qmd"):  # there a tag need not be apart from a block
             source = _TAG_BESIDE_BLOCK.sub(r"\g<0>\n", source)
+        word = "[a-z]+" if files.docusaurus else "highlight"  # its settings name others
+        comment = re.compile(_COLOURING.format(word), re.MULTILINE)
+        source = files.account.replace(
+            source, comment, "", "comment in code", "dropped: its tool colours the lines beside it"
+        )
         visible_text = without_hidden_lines(source, files.hidden_marks)
         if visible_text != source:
             files.change("hidden lines of code", "dropped: readers did not see them")
@@ -299,6 +304,10 @@ def _read_file(
     )
 
 
+_COLOURING = (
+    r"^[ \t]*(?:#|//|--|%|/\*|<!--|\{{/\*)[ \t]*{}-(?:next-line|start|end)\b[^\w\n]*(?:\n|\Z)"
+)
+"""A comment by which Docusaurus colours lines, with a word that tells how."""
 _TAG_BESIDE_BLOCK = re.compile(
     r"^[ \t]*</?[a-z][^<>\n]*>[ \t]*\n(?=[ \t]*`{3})|^[ \t]*`{3,}[ \t]*\n(?=[ \t]*</)", re.MULTILINE
 )

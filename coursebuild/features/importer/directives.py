@@ -155,8 +155,8 @@ def _write(directive: Directive, context: LessonContext) -> str:
         case "tab-item" | "tabbed" | "grid-item-card" | "card":
             return _write_card(directive, context)
         case "iframe" | "youtube" | "video" | "button-link" | "button-ref":
-            words = " ".join(text.split()) or argument.strip()
             address = argument.strip()
+            words = " ".join(text.split()) or address
             if name == "youtube":
                 address = f"https://www.youtube.com/watch?v={address}"
             return rewrite_prose(f"[{words}]({address})", context)

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from coursebuild.features.importer.context import formula_anchor
+from coursebuild.features.importer.context import label_anchor
 from coursebuild.features.importer.source_files import find_group, value_at
 
 WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
@@ -92,7 +92,7 @@ def define_operators(text: str) -> str:
 
 def display_formula(tex: str, label: str) -> str:
     """Return a displayed formula in Markdown."""
-    return f"$$\n{_align(tex).strip()}\n$$" + (f" {{#eq:{formula_anchor(label)}}}" if label else "")
+    return f"$$\n{_align(tex).strip()}\n$$" + (f" {{#eq:{label_anchor(label)}}}" if label else "")
 
 
 def _align(tex: str) -> str:
@@ -123,7 +123,7 @@ def _label_formula(match: re.Match[str]) -> str:
     if mark := _MARGIN.match(line):  # which the lines that go on may lack
         margin = "[ \t]*>" if ">" in mark[0] else mark[0]
         tex = re.sub(rf"\n(?!{margin})", f"\n{mark[0]}", tex)
-    braces = f" {{#eq:{formula_anchor(label)}}}" if label else ""
+    braces = f" {{#eq:{label_anchor(label)}}}" if label else ""
     return f"{opening}$${tex}$${braces}{closing}"
 
 

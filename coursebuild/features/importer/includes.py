@@ -26,7 +26,7 @@ _MARK = re.compile(
     r"|(?P<escape>\\)?\{\{[ ]*#(?P<command>include|rustdoc_include|playground|title)[ ]+"
     r"(?P<mdbook>[^{}\s][^{}]*?)[ ]*\}\}"
     r"|\{\{<[ ]*include[ ]+(?P<quarto>\S+)[ ]*>\}\}"
-    r"|\{%-?[ ]*include(?:-markdown)?[ ]+[\"'](?P<markdown>[^\"'\n]+)[\"'][^%]*%\}"
+    r"|\{%-?\s*include(?:-markdown)?\s+[\"'](?P<markdown>[^\"'\n]+)[\"'][^%]*%\}"
     r"|^\{\*[ ]*(?P<listing>[^\s{}]+)[^{}\n]*\*\}[ \t]*$"
     r"|\{!>?[ \t]*(?P<inclusion>[^{}!\s]+)[^{}!\n]*!\}"
     r"|^(?P<indent>[ \t]*)-{1,}8<-{1,}[ \t]+[\"'](?P<mkdocs>[^\"'\n]+)[\"'][ \t]*$",

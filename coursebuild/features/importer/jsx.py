@@ -18,7 +18,8 @@ _STATEMENT = (
     r"|export[ ](?:const|let|function|default)\b)"
     r"[^\n]*(?:\n(?!</)[^\n]+)*\n?"  # not the end of a script element
 )
-_MDX = re.compile(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
+MDX = re.compile(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
+"""What only MDX can hold."""
 _PART = re.compile(
     r"(?P<code>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`))"
     rf"|(?P<statement>{_STATEMENT})"
@@ -41,11 +42,6 @@ _LABELS = [
 ]
 _ADDRESS = re.compile(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
 """The address of a picture where it is computed."""
-
-
-def is_mdx(text: str) -> bool:
-    """Whether a text holds what only MDX can hold."""
-    return _MDX.search(text) is not None
 
 
 def without_jsx(text: str, context: LessonContext) -> str:

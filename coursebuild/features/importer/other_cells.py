@@ -22,7 +22,7 @@ from coursebuild.features.importer.cells import (
     write_outputs,
     write_recorded,
 )
-from coursebuild.features.importer.context import JoinedCells, LessonContext, to_anchor
+from coursebuild.features.importer.context import JoinedCells, LessonContext
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment, find_group
 
@@ -97,12 +97,11 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     ):  # of which only figures and tables are referred to
         label = f"fig-{own_label}" if "fig-cap" in options else ""
         label = label or (f"tbl-{own_label}" if "caption" in code else "")
-    head = [f'<a id="{to_anchor(label)}"></a>'] if label else []
     if picture := _PICTURE.fullmatch(code):
         words = options.get("fig-cap", "")
         mark = f"{{#{label}}}" if words and label.startswith("fig-") else ""
         return rewrite_prose(f"![{words}]({picture['path']}){mark}", context)
-    head += caption_of_code(options, context, ("fig-cap", "lst-cap"))
+    head = caption_of_code(options, context, ("fig-cap", "lst-cap"), label)
     if _SETTINGS.fullmatch(code):
         context.leave(kind, f"a {kind} that sets how its tool shows others")
         code = ""

@@ -91,8 +91,8 @@ def read_outline(files: SourceFiles) -> Outline | None:
         for sidebar in sidebars.values() if sidebars else ():
             parts += _read_sidebar(sidebar, name, docs, files)
     parts = parts or [*read_folder(docs, files)]
-    title, summary = (settings.get(key, "") for key in ("title", "tagline"))
-    return Outline(title=title, summary=summary, parts=tuple(parts))
+    summary = settings.get("tagline", "")
+    return Outline(title=settings.get("title", ""), summary=summary, parts=tuple(parts))
 
 
 def find_text(name: object, files: SourceFiles) -> str:

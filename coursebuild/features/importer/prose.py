@@ -442,5 +442,5 @@ _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = re.compile(rf"(?<![\w@`])@({_KEY})")
 _TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
 """A formula with blanks at its ends, which some tools allow."""
-_WORD = re.compile(r"(?<![\\A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
-"""What no formula holds outside of its commands, but a sentence between two prices does."""
+_WORD = re.compile(r"(?s)\A(?!.*\\[A-Za-z]).*(?<![A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
+"""A word outside of braces and no command, as of a sentence between two prices."""

@@ -103,7 +103,8 @@ def _read(
             end = whole.end() if whole is not None else span.end
             if span.start not in edits:
                 edits[span.start] = Edit(Span(source, span.start, end), "")
-                leave(link, *_left_tag(text[span.start : end]))
+                tag = shorten(text[span.start : end], 120, placeholder="…")
+                leave(link, "tag of HTML", f"`{tag}`, which a page cannot hold")
         for html in _raw_html(document):
             for media in html.media:
                 if _ELSEWHERE.match(media.url):
@@ -143,15 +144,12 @@ def _link_to_picture(
     kind = "recording" if element["name"] else "picture"
     leave(link, "tag of HTML", _ELSEWHERE_NOTE.format(kind, address.text))
     alt = find_group(r"\salt=[\"']([^\"']+)", tag)
-    words = alt or urlsplit(address.text).path.rpartition("/")[2]
     before = source.text[:start].lower()
     is_in_link = before.rfind("<a ") > before.rfind("</a")
+    is_named = is_in_link and re.match(r"[^<]*\w", source.text[end:])  # by the words behind it
+    words = alt or ("" if is_named else urlsplit(address.text).path.rpartition("/")[2])
     new = words if is_in_link else f'<a href="{address.text}">{words}</a>'
     return {start: Edit(Span(source, start, end), "" if tag.startswith("<source") else new)}
-
-
-def _left_tag(tag: str) -> tuple[str, str]:
-    return "tag of HTML", f"`{shorten(tag, 120, placeholder='…')}`, which a page cannot hold"
 
 
 def _raw_html(document: model.Document) -> Iterator[model.HtmlBlock | model.RawInline]:
@@ -206,7 +204,7 @@ def _edit_links(
             if target_anchor in owner_text.anchors:
                 text = owner_text
             elif start:  # the text is there
-                address = start
+                address, target_anchor = start, ""
             else:
                 if reference := _REFERENCE.fullmatch(inline.span.text):
                     words = reference[1] or title_of_file(anchor.rpartition(":")[2])

@@ -234,7 +234,8 @@ _ATTRIBUTE = re.compile(r"(?<=\s)(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNOR
 
 _WITH_FILE = re.compile(r"<(?:a|(?P<frame>iframe)|img|source|video)\b", re.IGNORECASE)
 _LOOK = re.compile(
-    r"[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
+    r"(?<=<table)(?:(?!\sid=)[^<>])*?\salign=[\"'\w]+"  # by which words would stand beside it
+    r"|[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
 )
 
 

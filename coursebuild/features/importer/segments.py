@@ -25,7 +25,7 @@ from coursebuild.features.importer.source_files import Segment, read_toml, read_
 _MARK = re.compile(r" {0,3}(:{3,}|/{3,})[ \t]*(.*?)[ \t]*\n?")
 _TITLED = re.compile(
     r" {0,3}(?:===[!+]?[ \t]+([\"'])(?P<tab>.*)\1"
-    r"|(?P<mark>!!!|\?{3}\+?)[ \t]+(?P<head>\w[^\n]*?))[ \t]*\n?"
+    r"|(?P<mark>!!!|\?{3}\+?)[ \t]*(?P<head>[\w\"][^\n]*?))[ \t]*\n?"
 )
 _CELL = re.compile(r"\{code-cell\}(?:[ \t]+i?python3?\b.*)?|\{(?:python|ipython3?)[^}]*\}")
 _FRONT_MATTER = re.compile(
@@ -311,10 +311,7 @@ def _parse_titled(state: StateBlock, start: int, end: int, silent: bool) -> bool
                 break
             last = number
         token = state.push("titled", "", 0)
-        is_tab = title["mark"] is None
-        token.markup, token.info = (
-            ("===", title["tab"]) if is_tab else (title["mark"], title["head"])
-        )
+        token.markup, token.info = title["mark"] or "===", title["head"] or title["tab"]
         state.line = last + 1
         token.map = [start, state.line]
     return True
