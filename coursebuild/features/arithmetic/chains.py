@@ -26,10 +26,11 @@ from coursebuild.features.arithmetic.evaluate import (
     ORDERS,
     UNDECIDED,
     FormulaComparison,
+    PhysicalQuantity,
     Readings,
     agrees,
-    describe_dimension,
     evaluate,
+    find_conflict,
     read_numeral,
     unit_readings,
 )
@@ -118,13 +119,18 @@ def _check_chain(
                 terms = left.get_expression(), right.get_expression()
                 terms = (_strip_unit(terms[0]), _strip_unit(terms[1])) if has_common_unit else terms
                 mistake = _find_mistake(*terms, relation)
-                if mistake is not None and (reason := _other_reading(left, right, relation)):
-                    mistake = FormulaComparison("unread", left.start, right.end, reason)
-                letters = (t.text for t in terms if t.kind == "symbol" and t.text in CONSTANTS)
-                letter = next(letters, "")
-                if mistake is not None and letter:  # as in `\pi = 0.5`
+                if mistake is not None:
+                    # A letter may stand for anything, as in `\pi = 0.5` or `\pi^1 = 0.5`.
+                    bases = (
+                        term.parts[0]
+                        if term.kind == "^" and term.parts[1].text.isdigit()
+                        else term
+                        for term in terms
+                    )
+                    letter = min(CONSTANTS & {base.text for base in bases}, default="")
                     reason = "it says what the letter stands for"
-                    mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
+                    if letter or (reason := _other_reading(left, right, relation)):
+                        mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
             elif symbols and relation not in ("?", "≡"):
                 follows = unit if right is statement.sides[-1] else ""
                 mistake = SymbolComparison(statement, i, symbols, follows).find_mistake()
@@ -274,8 +280,7 @@ def _find_mistake_as_read(
 ) -> FormulaComparison | None:
     quantities = [evaluate(side, readings=readings) for side in (left, right)]
     values = [quantity.value for quantity in quantities]
-    if quantities[0].dimension != quantities[1].dimension:
-        message = " is held against ".join(describe_dimension(q.dimension) for q in quantities)
+    if message := find_conflict(*quantities):
         return FormulaComparison("wrong", right.start, right.end, message)
     sides = enumerate((left, right))
     numerals = {i: n for i, side in sides if (n := read_numeral(side, readings))}
@@ -287,10 +292,19 @@ def _find_mistake_as_read(
             raise right.not_understood(UNDECIDED)
         if ORDERS[relation](sign, 0) if relation in ORDERS else sign == 0:
             return None
-        numbers = [f"{value:.10g}" for value in values]
-        message = f"{numbers[0]} and {numbers[1]} are not the same"
-        if relation in ORDERS:
-            message = f"{numbers[0]} {relation} {numbers[1]} does not hold"
+        if relation == "=":  # as `100\cdot1.05^2 = 100\cdot1.1`
+            given = {part.text for part in left.walk()}
+            rounded = {
+                part.text: PhysicalQuantity(numeral.value.widen(numeral.step))
+                for part in right.walk()
+                if part.text not in given
+                and (numeral := read_numeral(part, readings))
+                and not numeral.is_whole
+            }
+            value = evaluate(right, rounded, readings=readings).value
+            if (value - values[0]).sign() is None:
+                raise right.not_understood("its decimals may be rounded")
+        message = f"{values[0]:.10g} {relation} {values[1]:.10g} does not hold"
         return FormulaComparison("wrong", right.start, right.end, message)
     index = choose_rounded(numerals, relation)
     numeral, side, value = numerals[index], (left, right)[index], values[1 - index]

@@ -23,7 +23,12 @@ from msgspec.structs import replace
 
 from coursebuild.core.text.units import Dimension, Unit, find_units, multiply
 from coursebuild.features.arithmetic.calculus import differentiate
-from coursebuild.features.arithmetic.expressions import SIDE_BY_SIDE, Expression, NotUnderstood
+from coursebuild.features.arithmetic.expressions import (
+    CONSTANTS,
+    SIDE_BY_SIDE,
+    Expression,
+    NotUnderstood,
+)
 from coursebuild.features.arithmetic.real import ONE, PI, E, Real, apply, integrate
 
 _ZERO = Real.of(0)
@@ -208,6 +213,7 @@ def evaluate(
 ) -> PhysicalQuantity:
     """Return the quantity that an expression has as its value.
 
+    `symbols` may also say what a number stands for, by its digits, as one that is rounded does.
     Without calculus derivatives and integrals have their dimensions, and any value. `readings`:
     what units mean that may mean several.
 
@@ -256,12 +262,14 @@ class _Evaluator:
 
     def _evaluate(self, expression: Expression) -> PhysicalQuantity:
         match expression.kind:
+            case "number" | "symbol" | "index" if expression.text in self.symbols:
+                return self.symbols[expression.text]
             case "number":
                 if len(expression.text) > _MAX_DIGITS:
                     raise OverflowError
                 return PhysicalQuantity(Real.of(expression.text))
             case "symbol":
-                return self._evaluate_symbol(expression)
+                return _evaluate_constant(expression)
             case "unit":
                 unit = find_reading(expression, self.readings)
                 return PhysicalQuantity(measure(unit), unit.dimension)
@@ -288,9 +296,7 @@ class _Evaluator:
             case "sum" | "prod":
                 return self._evaluate_series(expression)
             case "index":
-                if expression.text not in self.symbols:
-                    raise expression.not_understood("the dimension may differ from term to term")
-                return self.symbols[expression.text]
+                raise expression.not_understood("the dimension may differ from term to term")
             case "factorial" | "binom":
                 return PhysicalQuantity(self._count(expression))
             case name:
@@ -348,17 +354,6 @@ class _Evaluator:
                 total = PhysicalQuantity(total.value * quantity.value, dimension)
         return total or PhysicalQuantity(_ZERO if is_sum else ONE)
 
-    def _evaluate_symbol(self, expression: Expression) -> PhysicalQuantity:
-        quantity = self.symbols.get(expression.text)
-        if quantity is not None:
-            return quantity
-        if expression.text == r"\infty":
-            raise expression.not_understood("nothing is computed up to infinity")
-        if expression.text not in (r"\pi", r"\mathrm{e}"):
-            reason = f"no lesson says what `{expression.text}` is, or several differ in its unit"
-            raise expression.not_understood(reason)
-        return PhysicalQuantity(PI if expression.text == r"\pi" else E)
-
     def _beginning(self, expression: Expression) -> Real:
         """Return where the scale begins on which a product is a place, as 25 °C is."""
         if not expression.ends_in_unit():
@@ -375,7 +370,7 @@ class _Evaluator:
             beginning = self._beginning(expression.parts[0])
             return PhysicalQuantity(beginning + beginning - first.value, first.dimension)
         (second,) = rest
-        if first.dimension != second.dimension and not has_zero(first, second):
+        if find_conflict(first, second):
             dimensions = [describe_dimension(term.dimension) for term in (first, second)]
             reason = f"{dimensions[0]} and {dimensions[1]} are added"
             raise WrongDimensions(reason, expression.start, expression.end)
@@ -399,7 +394,7 @@ class _Evaluator:
     def _evaluate_derivative(self, expression: Expression) -> PhysicalQuantity:
         body, variable = expression.parts
         if not self.has_calculus:
-            quantity, point = self.evaluate(body), self._evaluate_symbol(variable)
+            quantity, point = self.evaluate(body), self.evaluate(variable)
             dimension = multiply(quantity.dimension, point.dimension, -1)
             return replace(quantity, dimension=dimension)
         return self.evaluate(differentiate(body, variable.text))
@@ -408,7 +403,7 @@ class _Evaluator:
         body, variable, *ends = expression.parts
         if not ends:
             raise expression.not_understood("it is not a number")
-        point = self._evaluate_symbol(variable)
+        point = self.evaluate(variable)
         limits = [self.evaluate(end).value for end in ends]
         inside = limits[0] + (limits[1] - limits[0]) * Real.of("0.382")
         quantity = self.with_symbol(
@@ -426,6 +421,15 @@ class _Evaluator:
         return PhysicalQuantity(integrate(integrand, *limits), dimension)
 
 
+def _evaluate_constant(expression: Expression) -> PhysicalQuantity:
+    if expression.text == r"\infty":
+        raise expression.not_understood("nothing is computed up to infinity")
+    if expression.text not in CONSTANTS:
+        reason = f"no lesson says what `{expression.text}` is, or several differ in its unit"
+        raise expression.not_understood(reason)
+    return PhysicalQuantity(PI if expression.text == r"\pi" else E)
+
+
 def measure(unit: Unit) -> Real:
     """Return the size of a unit in base units."""
     return Real.of(unit.size) * PI.raise_to(Real.of(unit.pi))
@@ -434,6 +438,13 @@ def measure(unit: Unit) -> Real:
 def has_zero(*quantities: PhysicalQuantity) -> bool:
     """Whether any is certainly zero, which has all dimensions."""
     return any(quantity.value.sign() == 0 for quantity in quantities)
+
+
+def find_conflict(left: PhysicalQuantity, right: PhysicalQuantity) -> str:
+    """Return in words how the dimensions of two quantities differ; empty if they may be equal."""
+    if left.dimension == right.dimension or has_zero(left, right):
+        return ""
+    return " is held against ".join(map(describe_dimension, (left.dimension, right.dimension)))
 
 
 def describe_dimension(dimension: Dimension) -> str:

@@ -202,10 +202,8 @@ class SymbolComparison:
                 quantities[name] = PhysicalQuantity(value, dimension)
             try:
                 return [evaluate(e, quantities, has_calculus=False) for e in self.expressions]
-            except WrongDimensions:
-                raise
-            except NotUnderstood:
-                if self.has_values:
+            except NotUnderstood as error:
+                if self.has_values or error.kind == "wrong":
                     raise
         raise NotJudged
 
