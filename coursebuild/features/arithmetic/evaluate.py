@@ -440,9 +440,14 @@ def has_zero(*quantities: PhysicalQuantity) -> bool:
     return any(quantity.value.sign() == 0 for quantity in quantities)
 
 
-def find_conflict(left: PhysicalQuantity, right: PhysicalQuantity) -> str:
-    """Return in words how the dimensions of two quantities differ; empty if they may be equal."""
-    if left.dimension == right.dimension or has_zero(left, right):
+def find_conflict(
+    left: PhysicalQuantity, right: PhysicalQuantity, *, zero_fits: bool = True
+) -> str:
+    """Return in words how the dimensions of two quantities differ; empty if they may be equal.
+
+    `zero_fits`: zero has all dimensions.
+    """
+    if left.dimension == right.dimension or (zero_fits and has_zero(left, right)):
         return ""
     return " is held against ".join(map(describe_dimension, (left.dimension, right.dimension)))
 

@@ -240,12 +240,11 @@ class SymbolComparison:
             value = scaled[1 - index]
             opposite = self.expressions[1 - index]
             symbols = (self.known[p.text] for p in opposite.walk() if p.text in self.known)
-            of_decimals = opposite.has_decimals() or any(s.step is not None for s in symbols)
+            of_decimals = opposite.has_decimals() or any(symbol.step for symbol in symbols)
             agreement = agrees(numeral, value, self.relation, of_decimals=of_decimals)
             if decide(agreement, self.expressions[1]):
                 return None
-            digits = max(numeral.digits + 2, 4)
-            result = f"{numeral.express(value / unit_size):.{digits}g}"
+            result = f"{numeral.express(value / unit_size):.{max(numeral.digits + 2, 4)}g}"
             mistakes.append(self._mistake(index, f"the result is {result}", result))
         return mistakes[0]
 
