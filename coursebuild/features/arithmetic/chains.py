@@ -28,7 +28,6 @@ from coursebuild.features.arithmetic.evaluate import (
     FormulaComparison,
     PhysicalQuantity,
     Readings,
-    agrees,
     evaluate,
     find_conflict,
     read_numeral,
@@ -51,6 +50,7 @@ from coursebuild.features.arithmetic.symbol_comparison import (
     NotJudged,
     SymbolComparison,
     SymbolQuantity,
+    agrees,
     choose_rounded,
     decide,
 )
@@ -300,11 +300,11 @@ def _find_mistake_as_read(
         if ORDERS[relation](sign, 0) if relation in ORDERS else sign == 0:
             return None
         if relation == "=":  # as `100\cdot1.05^2 = 100\cdot1.1`
-            given = {part.text for part in left.walk()}
+            known = {part.text for part in left.walk()}
             decimals = {
                 part.text: PhysicalQuantity(numeral.value.widen(numeral.step))
                 for part in right.walk()
-                if part.text not in given
+                if part.text not in known
                 and (numeral := read_numeral(part, readings))
                 and not numeral.is_whole
             }

@@ -1,8 +1,7 @@
 """Evaluates sides of a formula to quantities, and reads numbers as they are written.
 
 Entry points: `evaluate(expression, symbols)`, a value in base units with its dimension;
-`read_numeral(expression)`, a number with its precision, and `agrees`, whether a value is that
-number.
+`read_numeral(expression)`, a number with its precision.
 
 Results that are too large, or no numbers, are not understood. Sums of different dimensions, and
 functions of an argument with a dimension, are `WrongDimensions`.
@@ -158,32 +157,6 @@ def unit_readings(*sides: Expression) -> Iterator[Readings]:
         of_cycles = {key for key, unit in readings_of_units.items() if "cycle" in dict(unit.powers)}
         if is_mixed and any(part.text in of_cycles for side in numbers for part in side.walk()):
             yield {key: unit.in_radians() for key, unit in readings_of_units.items()}
-
-
-def agrees(
-    numeral: Numeral, value: Real, relation: str, *, of_decimals: bool = False
-) -> bool | None:
-    """Whether a value, rounded to the digits of a numeral, is that number; `None` if unknown.
-
-    After `=` a whole number is exact, or, if it has two digits or more and the value comes
-    `of_decimals`, rounded to as many digits: 49.05 to 49, but 9.75 to 9.8 and not to 10. So it is
-    where no decimal can be exact, as of 100/3.
-    """
-    difference, step = (value - numeral.value).abs(), numeral.step
-    if numeral.is_order and relation == "≈":
-        ten = Real.of(10)
-        signs = {(value * ten - numeral.value).sign(), (numeral.value * ten - value).sign()}
-        return None if None in signs else -1 not in signs
-    if numeral.is_whole and relation == "=":
-        last_digit = step * Real.of(Fraction(1, 10**numeral.zeros))
-        is_long = (value.abs() - last_digit * Real.of(10 ** (numeral.digits - 1))).sign()
-        may_be_rounded = of_decimals or not numeral.express(value).has_end
-        if not (may_be_rounded and numeral.digits > 1 and is_long in (0, 1)):
-            sign = difference.sign()
-            return None if sign is None else sign == 0
-        step = last_digit
-    excess = (difference * Real.of(2) - step).sign()
-    return None if excess is None else excess <= 0
 
 
 _MAX_CHOICES = 5
