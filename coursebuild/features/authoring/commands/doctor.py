@@ -215,7 +215,7 @@ def _try_code(code: str, **environment: str) -> str:
         return ""
     line = trial.last_line()
     number = re.search(r"\[Errno (\d+)\]", line)
-    error = OSError(int(number[1]), "") if number else RuntimeError(line.rpartition(": ")[2])
-    if lacking(error):
-        raise error
+    failure = OSError(int(number[1]), "") if number else RuntimeError(line.rpartition(": ")[2])
+    if lacking(failure):
+        raise failure
     return line or f"the process ended with status {trial.status}"
