@@ -300,11 +300,11 @@ def _find_mistake_as_read(
         if ORDERS[relation](sign, 0) if relation in ORDERS else sign == 0:
             return None
         if relation == "=":  # as `100\cdot1.05^2 = 100\cdot1.1`
-            known = {part.text for part in left.walk()}
+            numbers = {part.text for part in left.walk()}
             decimals = {
                 part.text: PhysicalQuantity(numeral.value.widen(numeral.step))
                 for part in right.walk()
-                if part.text not in known
+                if part.text not in numbers
                 and (numeral := read_numeral(part, readings))
                 and not numeral.is_whole
             }
