@@ -23,7 +23,9 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Span
 
-_HTML_ANCHOR = re.compile(r"""<a\s[^>]*?\bhref\s*=\s*\\?["']?(#[^"'\s>\\]+)""", re.IGNORECASE)
+_HTML_ANCHOR = re.compile(
+    r"""<a\s[^>]*?\bhref\s*=\s*(\\?["'])?(#(?(1)(?:(?!\1).)+|[^"'\s>]+))""", re.IGNORECASE
+)
 
 
 class LinkTargets(Struct, frozen=True):
@@ -119,8 +121,8 @@ class _Checker(Struct, frozen=True):
                 yield diagnose("html-forbidden", part.span, part.message, help=help)
         span = html.span
         for link in _HTML_ANCHOR.finditer(span.text):
-            place = Span(span.source, span.start + link.start(1), span.start + link.end(1))
-            yield from self.check_url(place, link[1])
+            place = Span(span.source, span.start + link.start(2), span.start + link.end(2))
+            yield from self.check_url(place, link[2])
         for media in html.media:
             parts = urlsplit_or_none(media.url)
             if parts is None or (parts.scheme != "data" and (parts.netloc or parts.path)):

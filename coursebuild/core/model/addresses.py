@@ -63,7 +63,8 @@ AnchorOwner: TypeAlias = (
 """What an anchor of a document leads to; a source for the title of a page."""
 
 _HTML_ID = re.compile(
-    r"""<(?:[^<>]*?\sid|a\s(?:[^<>]*?\s)?name)\s*=\s*["']?([^"'\s>]+)""", re.IGNORECASE
+    r"""<(?:[^<>]*?\sid|a\s(?:[^<>]*?\s)?name)\s*=\s*(["'])?((?(1)(?:(?!\1).)+|[^"'\s>]+))""",
+    re.IGNORECASE,
 )
 _NO_MARKUP = re.compile(
     r"<!--.*?(?:-->|\Z)|(<(script|style|textarea|title)\b[^<>]*>).*?(?:</\2\s*>|\Z)",
@@ -108,7 +109,7 @@ def document_anchors(document: blocks.Document) -> Iterator[tuple[str, AnchorOwn
 
 def html_ids(html: str) -> list[str]:
     """The ids that tags of some HTML have."""
-    return _HTML_ID.findall(_NO_MARKUP.sub(r"\1", html))
+    return [tag[2] for tag in _HTML_ID.finditer(_NO_MARKUP.sub(r"\1", html))]
 
 
 def heading_anchors(document: blocks.Document) -> frozenset[str]:

@@ -52,7 +52,7 @@ const typeset = (() => {
     [
       /\\(?:mbox|text(?:tt|rm|sf|bf|it)?)\{(?:[^{}$\\]|\\[^A-Za-z])*\}/g,
       (text, _, tex) => {
-        const mark = /\\(?:def|[a-z]*command)(?![A-Za-z])/.test(tex) ? /\\.|_|#(?![1-9])/g : /\\.|_|#/g
+        const mark = /\\(?:def|[a-z]*command)(?![A-Za-z])/.test(tex) ? /\\.|[_&]|#(?![1-9])/g : /\\.|[_&#]/g
         return text.replace(mark, (sign) => (sign.length > 1 ? sign : `\\${sign}`))
       },
     ],
@@ -121,7 +121,10 @@ const typeset = (() => {
   )
 
   function checkAttributes({ style, attributes }) {
-    for (const name in style) checkValue(name, String(style[name]))
+    for (const name in style) {
+      if (style[name] === undefined) delete style[name] // `\cancelto` has the colour of its text, even where none is set
+      else checkValue(name, String(style[name]))
+    }
     for (const name in attributes) if (CHECKED.has(name)) checkValue(name, String(attributes[name]))
   }
 

@@ -26,10 +26,10 @@ from coursebuild.features.arithmetic.evaluate import (
     ORDERS,
     UNDECIDED,
     FormulaComparison,
+    PhysicalQuantity,
     Readings,
-    agrees,
-    describe_dimension,
     evaluate,
+    find_conflict,
     read_numeral,
     unit_readings,
 )
@@ -50,6 +50,7 @@ from coursebuild.features.arithmetic.symbol_comparison import (
     NotJudged,
     SymbolComparison,
     SymbolQuantity,
+    agrees,
     choose_rounded,
     decide,
 )
@@ -108,24 +109,33 @@ def _end_of_number(tex: str, pointed: str, end: int) -> int:
 def _check_chain(
     statement: Statement, symbols: Mapping[str, SymbolQuantity], unit: str
 ) -> Iterator[FormulaComparison]:
-    has_common_unit: bool | None = None
+    earlier: list[Expression] = []
     for i, relation in enumerate(statement.relations):
         left, right = statement.sides[i : i + 2]
         try:
             if _is_of_numbers(left, symbols) and _is_of_numbers(right, symbols):
-                if has_common_unit is None:
-                    has_common_unit = _has_common_unit(statement.sides)
-                terms = left.get_expression(), right.get_expression()
-                terms = (_strip_unit(terms[0]), _strip_unit(terms[1])) if has_common_unit else terms
-                mistake = _find_mistake(*terms, relation)
-                if mistake is not None and (reason := _other_reading(left, right, relation)):
-                    mistake = FormulaComparison("unread", left.start, right.end, reason)
-                letters = (t.text for t in terms if t.kind == "symbol" and t.text in CONSTANTS)
-                letter = next(letters, "")
-                if mistake is not None and letter:  # as in `\pi = 0.5`
+                first, second = left.get_expression(), right.get_expression()
+                if _has_common_unit(statement.sides):
+                    first, second = _strip_unit(first), _strip_unit(second)
+                earlier = [*earlier, first] if relation in "=≈" else []
+                mistake = _find_mistake(first, second, relation)
+                if mistake:
+                    if None in (_find_mistake(side, second, relation) for side in earlier):
+                        continue  # `10/3\cdot2 = 3.33\cdot2 = 6.67`
+                    # A letter may stand for anything, as in `\pi = 0.5` or `\pi^1 = 0.5`.
+                    bases = {
+                        (
+                            term.parts[0]
+                            if term.kind == "^" and term.parts[1].text.isdigit()
+                            else term
+                        ).text
+                        for term in (first, second)
+                    }
+                    letter = min(CONSTANTS & bases, default="")
                     reason = "it says what the letter stands for"
-                    mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
-            elif symbols and relation not in ("?", "≡"):
+                    if letter or (reason := _other_reading(left, right, relation)):
+                        mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
+            elif symbols and relation not in "?≡":
                 follows = unit if right is statement.sides[-1] else ""
                 mistake = SymbolComparison(statement, i, symbols, follows).find_mistake()
             else:
@@ -262,7 +272,7 @@ def _find_mistake(left: Expression, right: Expression, relation: str) -> Formula
         if mistake is None:
             return None
         mistakes.append(mistake)
-    unread = (m for m in mistakes if isinstance(m, NotUnderstood) and m.kind == "unread")
+    unread = (mistake for mistake in mistakes if mistake.kind == "unread")
     worst = next(unread, mistakes[0])
     if isinstance(worst, NotUnderstood):
         raise worst
@@ -274,11 +284,13 @@ def _find_mistake_as_read(
 ) -> FormulaComparison | None:
     quantities = [evaluate(side, readings=readings) for side in (left, right)]
     values = [quantity.value for quantity in quantities]
-    if quantities[0].dimension != quantities[1].dimension:
-        message = " is held against ".join(describe_dimension(q.dimension) for q in quantities)
-        return FormulaComparison("wrong", right.start, right.end, message)
-    sides = enumerate((left, right))
-    numerals = {i: n for i, side in sides if (n := read_numeral(side, readings))}
+    if conflict := find_conflict(*quantities, zero_fits=False):
+        return FormulaComparison("wrong", right.start, right.end, conflict)
+    numerals = {
+        i: numeral
+        for i, side in enumerate((left, right))
+        if (numeral := read_numeral(side, readings))
+    }
     if relation in ORDERS or not numerals:
         if relation == "≈":
             raise right.not_understood("neither side is a number whose digits could be compared")
@@ -287,10 +299,19 @@ def _find_mistake_as_read(
             raise right.not_understood(UNDECIDED)
         if ORDERS[relation](sign, 0) if relation in ORDERS else sign == 0:
             return None
-        numbers = [f"{value:.10g}" for value in values]
-        message = f"{numbers[0]} and {numbers[1]} are not the same"
-        if relation in ORDERS:
-            message = f"{numbers[0]} {relation} {numbers[1]} does not hold"
+        if relation == "=":  # as `100\cdot1.05^2 = 100\cdot1.1`
+            numbers = {part.text for part in left.walk()}
+            decimals = {
+                part.text: PhysicalQuantity(numeral.value.widen(numeral.step))
+                for part in right.walk()
+                if part.text not in numbers
+                and (numeral := read_numeral(part, readings))
+                and not numeral.is_whole
+            }
+            value = evaluate(right, decimals, readings=readings).value
+            if (value - values[0]).sign() is None:
+                raise right.not_understood("its decimals may be rounded")
+        message = f"{values[0]:.10g} {relation} {values[1]:.10g} does not hold"
         return FormulaComparison("wrong", right.start, right.end, message)
     index = choose_rounded(numerals, relation)
     numeral, side, value = numerals[index], (left, right)[index], values[1 - index]
@@ -300,9 +321,8 @@ def _find_mistake_as_read(
         of_decimals = has_scale or (left, right)[1 - i].has_decimals()
         if decide(agrees(rounded, values[1 - i], relation, of_decimals=of_decimals), right):
             return None
-    digits = max(numeral.digits + 2, 4)
-    result = f"{numeral.express(value):.{digits}g}"
-    message = f"the result is {result}, not this"
+    result = f"{numeral.express(value):.{max(numeral.digits + 2, 4)}g}"
     is_rounded = numeral.is_whole and relation == "=" and agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""
+    message = f"the result is {result}, not this"
     return FormulaComparison("wrong", side.start, side.end, message, help=help, result=result)

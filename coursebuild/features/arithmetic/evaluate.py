@@ -1,8 +1,7 @@
 """Evaluates sides of a formula to quantities, and reads numbers as they are written.
 
 Entry points: `evaluate(expression, symbols)`, a value in base units with its dimension;
-`read_numeral(expression)`, a number with its precision, and `agrees`, whether a value is that
-number.
+`read_numeral(expression)`, a number with its precision.
 
 Results that are too large, or no numbers, are not understood. Sums of different dimensions, and
 functions of an argument with a dimension, are `WrongDimensions`.
@@ -23,7 +22,12 @@ from msgspec.structs import replace
 
 from coursebuild.core.text.units import Dimension, Unit, find_units, multiply
 from coursebuild.features.arithmetic.calculus import differentiate
-from coursebuild.features.arithmetic.expressions import SIDE_BY_SIDE, Expression, NotUnderstood
+from coursebuild.features.arithmetic.expressions import (
+    CONSTANTS,
+    SIDE_BY_SIDE,
+    Expression,
+    NotUnderstood,
+)
 from coursebuild.features.arithmetic.real import ONE, PI, E, Real, apply, integrate
 
 _ZERO = Real.of(0)
@@ -155,32 +159,6 @@ def unit_readings(*sides: Expression) -> Iterator[Readings]:
             yield {key: unit.in_radians() for key, unit in readings_of_units.items()}
 
 
-def agrees(
-    numeral: Numeral, value: Real, relation: str, *, of_decimals: bool = False
-) -> bool | None:
-    """Whether a value, rounded to the digits of a numeral, is that number; `None` if unknown.
-
-    After `=` a whole number is exact, or, if it has two digits or more and the value comes
-    `of_decimals`, rounded to as many digits: 49.05 to 49, but 9.75 to 9.8 and not to 10. So it is
-    where no decimal can be exact, as of 100/3.
-    """
-    difference, step = (value - numeral.value).abs(), numeral.step
-    if numeral.is_order and relation == "≈":
-        ten = Real.of(10)
-        signs = {(value * ten - numeral.value).sign(), (numeral.value * ten - value).sign()}
-        return None if None in signs else -1 not in signs
-    if numeral.is_whole and relation == "=":
-        last_digit = step * Real.of(Fraction(1, 10**numeral.zeros))
-        is_long = (value.abs() - last_digit * Real.of(10 ** (numeral.digits - 1))).sign()
-        may_be_rounded = of_decimals or not numeral.express(value).has_end
-        if not (may_be_rounded and numeral.digits > 1 and is_long in (0, 1)):
-            sign = difference.sign()
-            return None if sign is None else sign == 0
-        step = last_digit
-    excess = (difference * Real.of(2) - step).sign()
-    return None if excess is None else excess <= 0
-
-
 _MAX_CHOICES = 5
 _MAX_DIGITS = 300
 _MAX_COUNT = 1_000
@@ -208,6 +186,7 @@ def evaluate(
 ) -> PhysicalQuantity:
     """Return the quantity that an expression has as its value.
 
+    `symbols` may also say what a number stands for, by its digits, as one that is rounded does.
     Without calculus derivatives and integrals have their dimensions, and any value. `readings`:
     what units mean that may mean several.
 
@@ -256,12 +235,14 @@ class _Evaluator:
 
     def _evaluate(self, expression: Expression) -> PhysicalQuantity:
         match expression.kind:
+            case "number" | "symbol" | "index" if expression.text in self.symbols:
+                return self.symbols[expression.text]
             case "number":
                 if len(expression.text) > _MAX_DIGITS:
                     raise OverflowError
                 return PhysicalQuantity(Real.of(expression.text))
             case "symbol":
-                return self._evaluate_symbol(expression)
+                return _evaluate_constant(expression)
             case "unit":
                 unit = find_reading(expression, self.readings)
                 return PhysicalQuantity(measure(unit), unit.dimension)
@@ -288,9 +269,7 @@ class _Evaluator:
             case "sum" | "prod":
                 return self._evaluate_series(expression)
             case "index":
-                if expression.text not in self.symbols:
-                    raise expression.not_understood("the dimension may differ from term to term")
-                return self.symbols[expression.text]
+                raise expression.not_understood("the dimension may differ from term to term")
             case "factorial" | "binom":
                 return PhysicalQuantity(self._count(expression))
             case name:
@@ -348,17 +327,6 @@ class _Evaluator:
                 total = PhysicalQuantity(total.value * quantity.value, dimension)
         return total or PhysicalQuantity(_ZERO if is_sum else ONE)
 
-    def _evaluate_symbol(self, expression: Expression) -> PhysicalQuantity:
-        quantity = self.symbols.get(expression.text)
-        if quantity is not None:
-            return quantity
-        if expression.text == r"\infty":
-            raise expression.not_understood("nothing is computed up to infinity")
-        if expression.text not in (r"\pi", r"\mathrm{e}"):
-            reason = f"no lesson says what `{expression.text}` is, or several differ in its unit"
-            raise expression.not_understood(reason)
-        return PhysicalQuantity(PI if expression.text == r"\pi" else E)
-
     def _beginning(self, expression: Expression) -> Real:
         """Return where the scale begins on which a product is a place, as 25 °C is."""
         if not expression.ends_in_unit():
@@ -375,7 +343,7 @@ class _Evaluator:
             beginning = self._beginning(expression.parts[0])
             return PhysicalQuantity(beginning + beginning - first.value, first.dimension)
         (second,) = rest
-        if first.dimension != second.dimension and not has_zero(first, second):
+        if find_conflict(first, second):
             dimensions = [describe_dimension(term.dimension) for term in (first, second)]
             reason = f"{dimensions[0]} and {dimensions[1]} are added"
             raise WrongDimensions(reason, expression.start, expression.end)
@@ -399,7 +367,7 @@ class _Evaluator:
     def _evaluate_derivative(self, expression: Expression) -> PhysicalQuantity:
         body, variable = expression.parts
         if not self.has_calculus:
-            quantity, point = self.evaluate(body), self._evaluate_symbol(variable)
+            quantity, point = self.evaluate(body), self.evaluate(variable)
             dimension = multiply(quantity.dimension, point.dimension, -1)
             return replace(quantity, dimension=dimension)
         return self.evaluate(differentiate(body, variable.text))
@@ -408,7 +376,7 @@ class _Evaluator:
         body, variable, *ends = expression.parts
         if not ends:
             raise expression.not_understood("it is not a number")
-        point = self._evaluate_symbol(variable)
+        point = self.evaluate(variable)
         limits = [self.evaluate(end).value for end in ends]
         inside = limits[0] + (limits[1] - limits[0]) * Real.of("0.382")
         quantity = self.with_symbol(
@@ -426,6 +394,15 @@ class _Evaluator:
         return PhysicalQuantity(integrate(integrand, *limits), dimension)
 
 
+def _evaluate_constant(expression: Expression) -> PhysicalQuantity:
+    if expression.text == r"\infty":
+        raise expression.not_understood("nothing is computed up to infinity")
+    if expression.text not in CONSTANTS:
+        reason = f"no lesson says what `{expression.text}` is, or several differ in its unit"
+        raise expression.not_understood(reason)
+    return PhysicalQuantity(PI if expression.text == r"\pi" else E)
+
+
 def measure(unit: Unit) -> Real:
     """Return the size of a unit in base units."""
     return Real.of(unit.size) * PI.raise_to(Real.of(unit.pi))
@@ -434,6 +411,18 @@ def measure(unit: Unit) -> Real:
 def has_zero(*quantities: PhysicalQuantity) -> bool:
     """Whether any is certainly zero, which has all dimensions."""
     return any(quantity.value.sign() == 0 for quantity in quantities)
+
+
+def find_conflict(
+    left: PhysicalQuantity, right: PhysicalQuantity, *, zero_fits: bool = True
+) -> str:
+    """Return in words how the dimensions of two quantities differ; empty if they may be equal.
+
+    `zero_fits`: zero has all dimensions.
+    """
+    if left.dimension == right.dimension or (zero_fits and has_zero(left, right)):
+        return ""
+    return " is held against ".join(map(describe_dimension, (left.dimension, right.dimension)))
 
 
 def describe_dimension(dimension: Dimension) -> str:

@@ -27,9 +27,8 @@ from coursebuild.features.arithmetic.evaluate import (
     FormulaComparison,
     PhysicalQuantity,
     WrongDimensions,
-    describe_dimension,
     evaluate,
-    has_zero,
+    find_conflict,
 )
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.real import Real
@@ -56,9 +55,8 @@ class Domain(Struct, frozen=True):
         """Whether all conditions certainly hold."""
         for left, relation, right in self.conditions():
             sides = evaluate(left, symbols), evaluate(right, symbols)
-            if sides[0].dimension != sides[1].dimension and not has_zero(*sides):
-                words = " is held against ".join(describe_dimension(s.dimension) for s in sides)
-                raise right.not_understood(words)
+            if conflict := find_conflict(*sides):
+                raise right.not_understood(conflict)
             sign = (sides[0].value - sides[1].value).sign()
             if sign is None or not ORDERS[relation](sign, 0):
                 return False
@@ -182,10 +180,8 @@ def _compare_at(
         NotUnderstood: they differ, or one is not known, or not closely enough to agree.
     """
     lhs, rhs = (evaluate(side, values) for side in (left, right))
-    if lhs.dimension != rhs.dimension and not has_zero(lhs, rhs):
-        dimensions = [describe_dimension(side.dimension) for side in (lhs, rhs)]
-        reason = f"{dimensions[0]} is held against {dimensions[1]}"
-        raise WrongDimensions(reason, right.start, right.end)
+    if conflict := find_conflict(lhs, rhs):
+        raise WrongDimensions(conflict, right.start, right.end)
     difference = lhs.value - rhs.value
     if difference.sign():
         points = ", ".join(f"{name} = {x.value:.6g}" for name, x in values.items())

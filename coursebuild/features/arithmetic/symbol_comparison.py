@@ -1,6 +1,7 @@
 r"""Compares two sides of a relation, at least one of which has symbols, by their values and units.
 
-Entry points: `SymbolComparison`; `SymbolQuantity`, what is known of a symbol.
+Entry points: `SymbolComparison`; `SymbolQuantity`, what is known of a symbol; `agrees`, whether a
+value is a number as it is written.
 
 1. A side is computed if all of its symbols have a value. A number that leaves out its unit has that
    of the chain, or of the symbol alone on one side, or is in base units.
@@ -23,7 +24,6 @@ from coursebuild.features.arithmetic.evaluate import (
     Numeral,
     PhysicalQuantity,
     WrongDimensions,
-    agrees,
     describe_dimension,
     evaluate,
     has_zero,
@@ -202,10 +202,8 @@ class SymbolComparison:
                 quantities[name] = PhysicalQuantity(value, dimension)
             try:
                 return [evaluate(e, quantities, has_calculus=False) for e in self.expressions]
-            except WrongDimensions:
-                raise
-            except NotUnderstood:
-                if self.has_values:
+            except NotUnderstood as error:
+                if self.has_values or error.kind == "wrong":
                     raise
         raise NotJudged
 
@@ -242,12 +240,11 @@ class SymbolComparison:
             value = scaled[1 - index]
             opposite = self.expressions[1 - index]
             symbols = (self.known[p.text] for p in opposite.walk() if p.text in self.known)
-            of_decimals = opposite.has_decimals() or any(s.step is not None for s in symbols)
+            of_decimals = opposite.has_decimals() or any(symbol.step for symbol in symbols)
             agreement = agrees(numeral, value, self.relation, of_decimals=of_decimals)
             if decide(agreement, self.expressions[1]):
                 return None
-            digits = max(numeral.digits + 2, 4)
-            result = f"{numeral.express(value / unit_size):.{digits}g}"
+            result = f"{numeral.express(value / unit_size):.{max(numeral.digits + 2, 4)}g}"
             mistakes.append(self._mistake(index, f"the result is {result}", result))
         return mistakes[0]
 
@@ -292,6 +289,32 @@ class SymbolComparison:
         if sign is None and all(symbol.step is None for symbol in self.known.values()):
             raise self.expressions[1].not_understood(UNDECIDED)
         return not sign
+
+
+def agrees(
+    numeral: Numeral, value: Real, relation: str, *, of_decimals: bool = False
+) -> bool | None:
+    """Whether a value, rounded to the digits of a numeral, is that number; `None` if unknown.
+
+    After `=` a whole number is exact, or, if it has two digits or more and the value comes
+    `of_decimals`, rounded to as many digits: 49.05 to 49, but 9.75 to 9.8 and not to 10. So it is
+    where no decimal can be exact, as of 100/3.
+    """
+    difference, step = (value - numeral.value).abs(), numeral.step
+    if numeral.is_order and relation == "≈":
+        ten = Real.of(10)
+        signs = {(value * ten - numeral.value).sign(), (numeral.value * ten - value).sign()}
+        return None if None in signs else -1 not in signs
+    if numeral.is_whole and relation == "=":
+        last_digit = step * Real.of(Fraction(1, 10**numeral.zeros))
+        is_long = (value.abs() - last_digit * Real.of(10 ** (numeral.digits - 1))).sign()
+        may_be_rounded = of_decimals or not numeral.express(value).has_end
+        if not (may_be_rounded and numeral.digits > 1 and is_long in (0, 1)):
+            sign = difference.sign()
+            return None if sign is None else sign == 0
+        step = last_digit
+    excess = (difference * Real.of(2) - step).sign()
+    return None if excess is None else excess <= 0
 
 
 def choose_rounded(numerals: Mapping[int, Numeral], relation: str) -> int:

@@ -183,9 +183,7 @@ def check_sources(course: Course, documents: Collection[Document]) -> Iterator[D
             message, help = f"no text cites `{work.key}`", f"cite it, `[@{work.key}]`, or delete it"
             yield diagnose("source-unused", work.span, message, help=help)
         elif message := check_identifier(work):
-            help = "add the `doi` or `isbn` of the work, by which readers find it"
-            if work.field("doi") or work.isbn:
-                help = "copy it once more from the work"
+            help = "copy it once more from the work"
             yield diagnose("source-identifier", work.span, message, help=help)
     if course.citation_style is not None:
         try:
@@ -215,6 +213,6 @@ FEATURE = Feature(
         Rule("source-malformed", "error", "An entry of the list of sources cannot be read."),
         Rule("source-style", "error", "The course's style for citations cannot be used."),
         Rule("source-unused", "warning", "No text cites this source."),
-        Rule("source-identifier", "warning", "A source has no valid DOI or ISBN."),
+        Rule("source-identifier", "warning", "The DOI or ISBN of a source cannot be one."),
     ),
 )

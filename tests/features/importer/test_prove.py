@@ -313,7 +313,7 @@ def test_the_account_says_first_what_contradicts_the_course_each_with_its_place(
 
     account = (folder / "new/IMPORT.md").read_text()
     assert account.partition("## What does not hold\n\n")[2].splitlines()[:8] == [
-        f"- {place('16/70')}: 0.2285714286 and 0.2428571429 are not the same",
+        f"- {place('16/70')}: 0.2285714286 = 0.2428571429 does not hold",
         "",
         "## What running showed",
         "",
