@@ -36,6 +36,11 @@ _BRACKETS = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 """A formula between brackets, or below a line that holds nothing but a dollar sign."""
+_ESCAPED = re.compile(
+    rf"{_CODE}|(?P<mark>\\\\[(\[])(?P<tex>(?>(?:(?!\\\\[()\[\]]|\n[ \t]*\n).)+))(?=\\\\[)\]])",
+    re.DOTALL,
+)
+"""A formula whose brackets have two backslashes, one of which is Markdown's; or code."""
 _LABEL = re.compile(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
 """A label of LaTeX, or of mdBook's preprocessor `numeq`."""
 _EMPTY = re.compile(r"[ \t]*\n?[ \t]*")
@@ -59,6 +64,16 @@ _OPERATOR = re.compile(
 _MACROS = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
 """Where MyST and Sphinx have macros by their names."""
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
+
+
+def read_escapes(text: str) -> str:
+    """Read Markdown's escapes in formulas, as where MathJax is given what Markdown has read."""
+
+    def read(match: re.Match[str]) -> str:
+        tex = re.sub(r"\\([!-/:-@\[-`{-~])", r"\1", match["tex"] or "")
+        return f"{match['mark']}{tex}" if tex else match[0]
+
+    return _ESCAPED.sub(read, text)
 
 
 def normalize_formulas(text: str) -> str:

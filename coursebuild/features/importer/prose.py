@@ -20,7 +20,7 @@ from coursebuild.features.importer.anchors import (
     write_target,
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
-from coursebuild.features.importer.displays import WORDS, normalize_formulas
+from coursebuild.features.importer.displays import WORDS, normalize_formulas, read_escapes
 from coursebuild.features.importer.pandoc_tables import MEANING, rewrite_tables, write_meanings
 from coursebuild.features.importer.roles import (
     address_of_label,
@@ -204,6 +204,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = account.replace(text, *rule)
     if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
         text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
+    if context.path.endswith(".md"):
+        text = read_escapes(text)
     if context.files.dollars != "\n":
         text = normalize_formulas(text)
     text = _OVER_LINES.sub(_join_lines, text)
