@@ -154,6 +154,12 @@ def test_limits_of_files_are_told_and_as_many_as_said_are_enough(make: Make) -> 
     )
     status, output = run_limited(folder, "-n 64", "build", "--jobs", "2")
     assert status == 0, output
+    assert run_limited(folder, "-s 1024", "check", "-q", "--no-cache") == (
+        2,
+        "coursebuild: formulas need a stack of 2 MiB, and this process may have 1024 KiB\n"
+        "  help: `ulimit -s 8192` raises the limit\n",
+    )
+    assert run_limited(folder, "-s 2048", "check", "-q", "--no-cache") == (0, "")
     assert run_limited(folder, "-f 0", "check") == (
         2,
         "coursebuild: nothing may be written into any file\n"

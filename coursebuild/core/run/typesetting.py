@@ -11,20 +11,21 @@ from __future__ import annotations
 
 import json
 import re
+import resource
 import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from coursebuild.core.files.errors import EffectError
+from coursebuild.core.files.errors import EffectError, LackError
 from coursebuild.core.files.resources import assets_dir
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.text.units import write_quantities
 
 _MEMORY = 128
 """MiB."""
-_STACK = 1 << 20
-"""Bytes; the stack of a thread is eight times as large, where nobody chose otherwise."""
+_STACK = 4 << 20
+"""Bytes at most: what the deepest formula takes that browsers draw."""
 _BATCH = 100
 """Formulas at a time; one takes about 0.3 ms."""
 _MOST_REMEMBERED = 2000
@@ -47,7 +48,7 @@ class MathEngine:
         """The MathML of each formula, or why there is none; no macro outlives its formula.
 
         Raises:
-            EffectError: Temml or QuickJS is not installed.
+            EffectError: Temml or QuickJS is not installed, or has too small a stack.
         """
         with self._lock:
             results: dict[Formula, str | MathError] = {
@@ -94,7 +95,18 @@ class MathEngine:
 
 
 def _start() -> Any:
-    """A context that knows `typeset`."""
+    """A context that knows `typeset`.
+
+    Raises:
+        EffectError: Temml or QuickJS is not installed.
+        LackError: threads have so small a stack that a formula could exceed it.
+    """
+    stack = resource.getrlimit(resource.RLIMIT_STACK)[0]
+    if stack == resource.RLIM_INFINITY:
+        stack = 2 << 20  # of a thread, then
+    if stack < 2 << 20:
+        message = f"formulas need a stack of 2 MiB, and this process may have {stack >> 10} KiB"
+        raise LackError(message, help="`ulimit -s 8192` raises the limit")
     try:
         import quickjs
     except ImportError as error:
@@ -102,7 +114,7 @@ def _start() -> Any:
         raise EffectError(message, help="run `pip install coursebuild` again") from None
     context = quickjs.Context()
     context.set_memory_limit(_MEMORY << 20)
-    context.set_max_stack_size(_STACK)
+    context.set_max_stack_size(min(_STACK, stack // 2))
     for path in (assets_dir() / "temml" / "temml.min.js", Path(__file__).with_name("typeset.js")):
         context.eval(path.read_text(encoding="utf-8"))
     return context

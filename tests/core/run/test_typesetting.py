@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from xml.etree import ElementTree
 
 import pytest
@@ -187,3 +188,14 @@ def test_copies_of_a_process_that_typesets_do_so_too() -> None:
     process = run_code(program("typeset_in_copies"))
     assert process.stderr == ""
     assert process.stdout == "True False\n"
+
+
+def test_threads_share_an_engine_whatever_is_nested_in_their_formulas() -> None:
+    engine = MathEngine()
+
+    def typeset(number: int) -> list[type]:
+        roots = [r"\sqrt{" * depth + str(number) + "}" * depth for depth in (70, 9_000)]
+        return [type(one) for one in engine.typeset([Formula(root, True) for root in roots])]
+
+    with ThreadPoolExecutor(3) as threads:
+        assert list(threads.map(typeset, range(6))) == [[str, MathError]] * 6
