@@ -195,7 +195,7 @@ def test_threads_share_an_engine_whatever_is_nested_in_their_formulas() -> None:
 
     def typeset(number: int) -> list[type]:
         roots = [r"\sqrt{" * depth + str(number) + "}" * depth for depth in (70, 9_000)]
-        return [type(one) for one in engine.typeset([Formula(root, True) for root in roots])]
+        return [type(result) for result in engine.typeset([Formula(root, True) for root in roots])]
 
     with ThreadPoolExecutor(3) as threads:
         assert list(threads.map(typeset, range(6))) == [[str, MathError]] * 6
