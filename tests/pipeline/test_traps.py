@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from coursebuild.cli.commands import known_commands
 from support.editor import Editor
@@ -16,6 +18,7 @@ from support.local_cluster import install_plugin
 from support.scratch_course import Folder, kill_at_end, processes
 from support.traps import COMMANDS, OF_MJBENCH, TrapFolder, mjbench, tool, variables
 
+ROOT = Path(__file__).parents[2]
 STARTED_IN_TESTS_OF_THEIR_OWN = {"lsp", "serve"}
 EACH = [
     pytest.param(command, id=" ".join(command)) for group in COMMANDS.values() for command in group
@@ -133,6 +136,30 @@ def test_no_trap_runs_in_a_run_of_pytest(traps: TrapFolder) -> None:
     )
     assert traps.marks() == [], result.stdout
     assert "passed" in result.stdout, result.stdout + result.stderr
+
+
+@pytest.mark.site
+def test_no_trap_runs_in_a_hook_or_an_action(traps: TrapFolder, tmp_path: Path) -> None:
+    """The lines that pre-commit and a workflow give to a shell, each in the course's folder."""
+    hooks = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
+    action = yaml.safe_load((ROOT / "action.yml").read_text())
+    lines = [hook["entry"] for hook in hooks]
+    lines += [step["run"] for step in action["runs"]["steps"] if "run" in step]
+    pip = tmp_path / "bin/pip"  # there is no index to install from
+    pip.parent.mkdir()
+    pip.write_text("#!/bin/sh\necho pip\n")
+    pip.chmod(0o755)
+    paths = [str(pip.parent), str(Path(sys.executable).parent), os.environ["PATH"]]
+    environment = {
+        "COMMAND": action["inputs"]["command"]["default"],
+        "GITHUB_ACTION_PATH": str(ROOT),
+        "PATH": ":".join(paths),
+        "RUNNER_TEMP": str(tmp_path),
+    }
+    results = [run(traps, ["bash", "-e", "-c", line], **environment) for line in lines]
+    assert traps.marks() == []
+    assert [result.returncode for result in results] == [0, 0, 0, 0], results
+    assert results[2].stdout == "pip\n" * 3 and "trying labs" in results[3].stderr
 
 
 WITHOUT_MUJOCO = fixture_text("scripts/without_mujoco.txt")
