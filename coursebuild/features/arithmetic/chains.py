@@ -117,11 +117,11 @@ def _check_chain(
                 first, second = left.get_expression(), right.get_expression()
                 if _has_common_unit(statement.sides):
                     first, second = _strip_unit(first), _strip_unit(second)
-                earlier = [*earlier, first] if relation in "=≈" else []
+                earlier = [*earlier, first] if relation in ("=", "≈") else []
                 mistake = _find_mistake(first, second, relation)
                 if mistake:
                     if None in (_find_mistake(side, second, relation) for side in earlier):
-                        continue  # `10/3\cdot2 = 3.33\cdot2 = 6.67`
+                        continue  # `20/3 = 3.33\cdot2 = 6.67`
                     # A letter may stand for anything, as in `\pi = 0.5` or `\pi^1 = 0.5`.
                     bases = {
                         (
@@ -135,7 +135,7 @@ def _check_chain(
                     reason = "it says what the letter stands for"
                     if letter or (reason := _other_reading(left, right, relation)):
                         mistake = FormulaComparison("unread", left.start, right.end, reason, letter)
-            elif symbols and relation not in "?≡":
+            elif symbols and relation not in ("?", "≡"):
                 follows = unit if right is statement.sides[-1] else ""
                 mistake = SymbolComparison(statement, i, symbols, follows).find_mistake()
             else:
