@@ -11,7 +11,6 @@ from support.scratch_course import Folder, Make, block
 
 pytestmark = pytest.mark.site
 
-COPY = "import shutil, sys; shutil.copy(*sys.argv[1:])"
 RUNNERS = fixture_text("documents/runners.toml")
 SUM = fixture_text("documents/shell.md")
 
