@@ -32,6 +32,7 @@ from coursebuild.core.features import TrialContext as TrialContext
 from coursebuild.core.features import TrialOutcome as TrialOutcome
 from coursebuild.core.features import TrialRun as TrialRun
 from coursebuild.core.features import Trials as Trials
+from coursebuild.core.features import on_demand as on_demand
 from coursebuild.core.files.course_root import DECISIVE as DECISIVE
 from coursebuild.core.files.course_root import is_dropping as is_dropping
 from coursebuild.core.files.errors import EffectError as EffectError

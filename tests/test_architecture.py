@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 from functools import cache
 from graphlib import TopologicalSorter
@@ -229,6 +230,14 @@ def test_no_pattern_has_a_possessive_group() -> None:
         if possessive_group.search(str(node.value))
     ]
     assert not violations, "\n".join(violations)
+
+
+def test_what_is_imported_on_demand_is_there() -> None:
+    pattern = re.compile(r'on_demand\(\s*"([\w.]+):(\w+)"')
+    names = [name for path in FILES for name in pattern.findall(path.read_text(encoding="utf-8"))]
+    assert names
+    missing = [name for name in names if not hasattr(importlib.import_module(name[0]), name[1])]
+    assert not missing
 
 
 @pytest.mark.site

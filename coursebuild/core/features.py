@@ -8,6 +8,7 @@ docs/how-to/features.md. What the core asks of a parsed block are methods of `Fe
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic, Literal, Protocol, TypeAlias, TypeVar
@@ -257,6 +258,16 @@ class Command(Struct, frozen=True, kw_only=True):
     module: str
     """The module with `declare(parser)`, which adds arguments, and `run(arguments)`, which returns
     the exit status. It is imported when the command is called."""
+
+
+def on_demand(name: str) -> Any:
+    """A function, given as `module:name`, whose module is imported when it is first called."""
+    module, _, function = name.partition(":")
+
+    def call(*arguments: Any, **keywords: Any) -> Any:
+        return getattr(importlib.import_module(module), function)(*arguments, **keywords)
+
+    return call
 
 
 class Executor(Protocol):

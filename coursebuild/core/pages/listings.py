@@ -15,10 +15,6 @@ from itertools import pairwise
 
 import tree_sitter_python
 from markupsafe import Markup
-from pygments.lexer import Lexer
-from pygments.lexers import find_lexer_class_by_name
-from pygments.token import Comment, Keyword, Literal, Name, Operator, String, Token, _TokenType
-from pygments.util import ClassNotFound
 from tree_sitter import Language, Parser, Query, QueryCursor
 
 from coursebuild.core.text.characters import visible
@@ -70,29 +66,11 @@ def _python() -> tuple[Parser, Query]:
     return Parser(language), Query(language, _QUERY.replace("KEYWORDS", keywords))
 
 
-_CLASSES: tuple[tuple[_TokenType, str], ...] = (
-    (Comment, "c"),
-    (String.Doc, "d"),
-    (String.Interpol, "i"),
-    (String, "s"),
-    (Literal.Number, "n"),
-    (Keyword, "k"),
-    (Operator.Word, "k"),
-    (Name.Function, "f"),
-    (Name.Class, "f"),
-    (Name.Decorator, "a"),
-    (Name.Attribute, "a"),
-    (Name.Tag, "t"),
-    (Token.Generic.Prompt, "p"),
-    (Token.Generic.Deleted, "x"),
-    (Token.Generic.Inserted, "y"),
-)
-"""Kinds of tokens and their classes, the special before the general."""
 _PYTHON = ("python", "py", "python3", "py3")
 _MAX_FOR_TREE_SITTER = 20_000
 """The most characters of Python that tree-sitter reads. For absurd texts, such as backslashes only,
 its time grows with the square of the length, unlike that of Pygments: a second at this length."""
-_ALIASES = {"mjcf": "xml", "urdf": "xml"}
+_PLAIN = ("", "text")
 _WITHOUT_OUTER_SPACE = re.compile(r"\S(?:.*\S)?")
 
 
@@ -105,15 +83,10 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
     runs: Iterable[tuple[str, str]] = [("", text)]
     if language in _PYTHON and len(text) <= _MAX_FOR_TREE_SITTER:
         runs = python_runs(text)
-    elif (lexer := _lexer(_ALIASES.get(language, language))) is not None:
-        for end in ("", "\n"):  # lexers of sessions need a line end
-            tokens = [(_class_of(token), part) for token, part in lexer.get_tokens(text + end)]
-            if "".join(part for _, part in tokens) == text + end:  # else nothing is marked
-                if end:
-                    css, part = tokens.pop()
-                    tokens.append((css, part.removesuffix(end)))
-                runs = tokens
-                break
+    elif language not in _PLAIN:
+        from coursebuild.core.pages.lexers import pygments_runs
+
+        runs = pygments_runs(language, text) or runs
     groups = [["", mark]]
     for css, run in runs:  # neighbours of the same class, with the space between them on a line
         if css == groups[-1][0] or not run or (run.isspace() and "\n" not in run):
@@ -127,16 +100,3 @@ def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:
             html = _WITHOUT_OUTER_SPACE.sub(rf'<span class="{css}">\g<0></span>', html)
         parts.append(html)
     return tuple(map(Markup, "".join(parts).split("\n")))
-
-
-@functools.cache
-def _lexer(language: str) -> Lexer | None:
-    try:
-        return find_lexer_class_by_name(language)(stripnl=False, ensurenl=False)
-    except ClassNotFound:
-        return None
-
-
-@functools.cache
-def _class_of(token: _TokenType) -> str:
-    return next((css for kind, css in _CLASSES if token in kind), "")

@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-from coursebuild.api import Command, Feature, FenceKind, ModelPart
+from coursebuild.api import Command, Feature, FenceKind, ModelPart, on_demand
 from coursebuild.features.bench.model import Bench, check_benches, check_keyframes, parse_bench
-from coursebuild.features.bench.page import (
-    bench_markdown,
-    bench_view,
-    draw_bench,
-    draw_measurements,
-    index_bench,
-    measurement_facts,
-    measurements_view,
-)
 
 KIND = FenceKind(
     name="bench",
     block=Bench,
     parse=parse_bench,
-    values=bench_view,
-    draw=draw_bench,
-    markdown=bench_markdown,
-    index=index_bench,
+    values=on_demand("coursebuild.features.bench.page:bench_view"),
+    draw=on_demand("coursebuild.features.bench.page:draw_bench"),
+    markdown=on_demand("coursebuild.features.bench.page:bench_markdown"),
+    index=on_demand("coursebuild.features.bench.page:index_bench"),
 )
 FEATURE = Feature(
     name="bench",
     needs=("lab",),
     fences=(KIND,),
-    model_part=ModelPart(facts=measurement_facts, values=measurements_view, draw=draw_measurements),
+    model_part=ModelPart(
+        facts=on_demand("coursebuild.features.bench.page:measurement_facts"),
+        values=on_demand("coursebuild.features.bench.page:measurements_view"),
+        draw=on_demand("coursebuild.features.bench.page:draw_measurements"),
+    ),
     check=check_benches,
     check_models=check_keyframes,
     commands=(

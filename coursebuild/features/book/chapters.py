@@ -217,7 +217,7 @@ _FOLDS = _ANSWERS | {"callout", "further-text", "lab-note"}
 _TYPES = {**PICTURES, "avif": "image/avif", "woff2": "font/woff2"}
 
 
-def page_file(context: ExportContext, *, page_numbers: bool = False) -> OutputFile:
+def page_file(context: ExportContext, *, page_numbers: bool = False) -> tuple[OutputFile]:
     """Return the page."""
     course = context.course
     ids = {urls.lesson_path(lesson): lesson.id for lesson in course.written_lessons}
@@ -263,7 +263,7 @@ def page_file(context: ExportContext, *, page_numbers: bool = False) -> OutputFi
         page_numbers=page_numbers,
         text=text,
     )
-    return OutputFile("course.html", visible(html).encode())
+    return (OutputFile("course.html", visible(html).encode()),)
 
 
 def _anchor(lesson: str, id: str = "_top") -> str:
@@ -320,7 +320,7 @@ _KIDS = re.compile(rb"/Kids \[([^\]]*)\]")
 _ROOT = re.compile(rb"/Type /Catalog\s+/Pages (\d+) 0 R")
 
 
-def pdf_file(context: ExportContext) -> OutputFile:
+def pdf_file(context: ExportContext) -> tuple[OutputFile]:
     """Return the PDF.
 
     Raises:
@@ -336,7 +336,8 @@ def pdf_file(context: ExportContext) -> OutputFile:
             help=f"install Chromium or Chrome, or name one in the variable {_BROWSER_PATH}; or "
             "print the page of `coursebuild export page` in any browser",
         )
-    html = page_file(context, page_numbers=True).data.decode()
+    (page,) = page_file(context, page_numbers=True)
+    html = page.data.decode()
     with temporary_folder() as folder:
         first = _print(program, Path(folder), _with_numbers(html, {}))
         # The pages on which it has the targets of links.
@@ -357,7 +358,7 @@ def pdf_file(context: ExportContext) -> OutputFile:
     # Chromium's numbers of nodes depend on what it did before; their order, its key, stays.
     numbers = {node: number for number, node in enumerate(sorted(set(_NODE.findall(data))))}
     data = _NODE.sub(lambda match: b"(node%08d)" % numbers[match[0]], data)
-    return OutputFile("course.pdf", data)
+    return (OutputFile("course.pdf", data),)
 
 
 def _print(program: str, folder: Path, html: str) -> bytes:

@@ -45,7 +45,7 @@ _UNWRAPPED = frozenset(("dock", "dock-before", "dock-lab", "dock-after", "furthe
 """Classes of elements that only group what may begin slides."""
 
 
-def slides_file(context: ExportContext) -> OutputFile:
+def slides_file(context: ExportContext) -> tuple[OutputFile]:
     """Return the page."""
     lesson, course = context.lesson, context.course
     assert lesson is not None  # the exporter is one of a lesson
@@ -112,7 +112,7 @@ def slides_file(context: ExportContext) -> OutputFile:
             for path, data in files.items()
         ],
     )
-    return OutputFile("slides.html", visible(html).encode())
+    return (OutputFile("slides.html", visible(html).encode()),)
 
 
 def _elements(content: Iterable[HtmlContent]) -> Iterator[HtmlElement]:

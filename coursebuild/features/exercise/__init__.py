@@ -14,9 +14,8 @@ from coursebuild.api import (
     PagePart,
     PublishedTrials,
     Results,
-    TrialContext,
-    TrialRun,
     Trials,
+    on_demand,
 )
 from coursebuild.core.pages.assets import hashed_name
 from coursebuild.features.exercise.model import (
@@ -26,16 +25,7 @@ from coursebuild.features.exercise.model import (
     exercise_inputs,
     exercise_trials,
 )
-from coursebuild.features.exercise.page import draw_exercise, exercise_markdown, index_exercise
-from coursebuild.features.exercise.parse import parse_fence
 from coursebuild.features.exercise.schema import ExerciseFile
-
-
-def start(context: TrialContext) -> TrialRun:
-    """Start the trials of exercises; their engines are imported only here."""
-    from coursebuild.features.exercise.trial import ExerciseTrials
-
-    return ExerciseTrials(context)
 
 
 def publish(results: Results, assets: Assets) -> PublishedTrials:
@@ -63,13 +53,18 @@ FEATURE = Feature(
         FenceKind(
             name="exercise",
             block=Exercise,
-            parse=parse_fence,
-            draw=draw_exercise,
-            markdown=exercise_markdown,
-            index=index_exercise,
+            parse=on_demand("coursebuild.features.exercise.parse:parse_fence"),
+            draw=on_demand("coursebuild.features.exercise.page:draw_exercise"),
+            markdown=on_demand("coursebuild.features.exercise.page:exercise_markdown"),
+            index=on_demand("coursebuild.features.exercise.page:index_exercise"),
         ),
     ),
     parts=(PagePart(mark="data-exercise=", texts=("exercise.live.",)),),
-    trials=Trials(find=exercise_trials, start=start, inputs=exercise_inputs, publish=publish),
+    trials=Trials(
+        find=exercise_trials,
+        start=on_demand("coursebuild.features.exercise.trial:ExerciseTrials"),
+        inputs=exercise_inputs,
+        publish=publish,
+    ),
     schemas={"exercise": (ExerciseFile, "An exercise fence")},
 )

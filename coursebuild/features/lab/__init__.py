@@ -7,22 +7,12 @@ Labs of formulas and equations, which need no engine, are read and tried in `equ
 
 from __future__ import annotations
 
-from coursebuild.api import Feature, FenceKind, ModelPart, PagePart, TrialContext, TrialRun, Trials
-from coursebuild.features.lab import page
+from coursebuild.api import Feature, FenceKind, ModelPart, PagePart, Trials, on_demand
 from coursebuild.features.lab.compile import lab_trials, trial_inputs
 from coursebuild.features.lab.model import Lab
-from coursebuild.features.lab.parse import parse_fence
 from coursebuild.features.lab.relations import check_labs, check_model_names
 from coursebuild.features.lab.reply import publish_labs
 from coursebuild.features.lab.schema import OdeLab, PlotLab, SimLab, refine_schema
-
-
-def start(context: TrialContext) -> TrialRun:
-    """Start the trials of labs; their engines are imported only here."""
-    from coursebuild.features.lab.trial import LabTrials
-
-    return LabTrials(context)
-
 
 _LIVE = PagePart(
     mark="data-config=",
@@ -38,22 +28,30 @@ FEATURE = Feature(
         FenceKind(
             name="lab",
             block=Lab,
-            parse=parse_fence,
+            parse=on_demand("coursebuild.features.lab.parse:parse_fence"),
             label="lab",
-            draw=page.draw_lab,
-            markdown=page.lab_markdown,
-            index=page.index_lab,
-            picture=page.lab_picture,
+            draw=on_demand("coursebuild.features.lab.page:draw_lab"),
+            markdown=on_demand("coursebuild.features.lab.page:lab_markdown"),
+            index=on_demand("coursebuild.features.lab.page:index_lab"),
+            picture=on_demand("coursebuild.features.lab.page:lab_picture"),
             docked=lambda lab: lab.fields.dock,
         ),
     ),
     model_part=ModelPart(
-        values=page.model_view, draw=page.draw_model, opens=True, picture=page.model_picture
+        values=on_demand("coursebuild.features.lab.page:model_view"),
+        draw=on_demand("coursebuild.features.lab.page:draw_model"),
+        opens=True,
+        picture=on_demand("coursebuild.features.lab.page:model_picture"),
     ),
     check=check_labs,
     check_models=check_model_names,
     parts=(_LIVE,),
-    trials=Trials(find=lab_trials, start=start, inputs=trial_inputs, publish=publish_labs),
+    trials=Trials(
+        find=lab_trials,
+        start=on_demand("coursebuild.features.lab.trial:LabTrials"),
+        inputs=trial_inputs,
+        publish=publish_labs,
+    ),
     schemas={
         "lab": (SimLab, "A lab fence of the kind simlab"),
         "lab-plot": (PlotLab, "A lab fence of the kind plot"),

@@ -26,6 +26,7 @@ from coursebuild.api import (
     document_scripts,
     find_blocks,
     is_run,
+    on_demand,
     parse_json,
 )
 from coursebuild.core.model import CodeBlock, Heading, Mode, ThematicBreak
@@ -33,8 +34,6 @@ from coursebuild.core.scripts.lines import LineMatcher, MappedText, apply_filter
 from coursebuild.features.lab.model import Lab
 from coursebuild.features.lab.relations import check_steps
 from coursebuild.features.quiz.model import ChoiceQuestion, Quiz
-from coursebuild.features.quiz.page import draw_quiz, index_quiz, quiz_markdown
-from coursebuild.features.quiz.parse import parse_fence
 from coursebuild.features.quiz.schema import QuizFile
 
 
@@ -142,10 +141,10 @@ FEATURE = Feature(
         FenceKind(
             name="quiz",
             block=Quiz,
-            parse=parse_fence,
-            draw=draw_quiz,
-            markdown=quiz_markdown,
-            index=index_quiz,
+            parse=on_demand("coursebuild.features.quiz.parse:parse_fence"),
+            draw=on_demand("coursebuild.features.quiz.page:draw_quiz"),
+            markdown=on_demand("coursebuild.features.quiz.page:quiz_markdown"),
+            index=on_demand("coursebuild.features.quiz.page:index_quiz"),
             wide=False,
             scopes=lambda quiz: tuple(question.span for question in quiz.questions),
         ),

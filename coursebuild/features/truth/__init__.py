@@ -8,23 +8,76 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from coursebuild.api import Course, Diagnostic, Document, Feature, Parsed, Rule, diagnose
-from coursebuild.features.truth.claims import (
-    Claims,
-    check_sources,
-    sourced_claims,
-    unbound_results,
+from msgspec import Struct
+
+from coursebuild.api import (
+    Course,
+    Diagnostic,
+    Document,
+    Feature,
+    Mathml,
+    Parsed,
+    Rule,
+    Span,
+    diagnose,
 )
+
+
+class StatedNumber(Struct, frozen=True):
+    """A number that a document states."""
+
+    span: Span
+    text: str
+    """Empty for a mark that stands beside no number."""
+    values: tuple[tuple[float, float], ...] = ()
+    """Its value and one unit of its last place: as it is written, and in base units."""
+    sources: tuple[str, ...] = ()
+    """The parts of the course of which one must hold it."""
+    mark: Span | None = None
+    """Where these are named."""
+
+    def is_in(self, numbers: Iterable[float]) -> bool:
+        """Whether one of these, rounded to its digits, is this number."""
+        return any(
+            2 * abs(abs(number) - abs(value)) <= step * (1 + 1e-9)
+            for number in numbers
+            for value, step in self.values
+        )
+
+
+class Claims(Struct, frozen=True):
+    """The claims of a document that its scripts and formulas do not prove."""
+
+    open: tuple[StatedNumber, ...]
+    """Those that name no source."""
+    sourced: tuple[StatedNumber, ...] = ()
+    """Those whose source is a part of the course."""
+    inputs: tuple[float, ...] = ()
+    """The numbers that are given, or computed with."""
+
+
+def summary(document: Document, mathml: Mathml) -> Parsed[Claims | None]:
+    """The claims of a document that name a part of the course."""
+    if "given" not in document.source.text:  # as a mark of a source has that word
+        return Parsed(None)
+    from coursebuild.features.truth.claims import sourced_claims
+
+    return Parsed(sourced_claims(document))
 
 
 def check(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:
     """Yield an error for each number that its source does not hold."""
     claims = ((document, document.summary_of(Claims)) for document in documents)
-    yield from check_sources(course, [(d, c) for d, c in claims if c is not None])
+    if sourced := [(d, c) for d, c in claims if c is not None]:
+        from coursebuild.features.truth.claims import check_sources
+
+        yield from check_sources(course, sourced)
 
 
 def unproven(course: Course) -> Iterator[Diagnostic]:
     """Yield a warning for each result that nothing binds."""
+    from coursebuild.features.truth.claims import unbound_results
+
     for _, claims in unbound_results(course):
         for claim in claims:
             message = f"`{claim.text}` is stated, and nothing gives it"
@@ -35,7 +88,7 @@ def unproven(course: Course) -> Iterator[Diagnostic]:
 FEATURE = Feature(
     name="truth",
     needs=("arithmetic",),
-    summary=lambda document, mathml: Parsed(sourced_claims(document)),
+    summary=summary,
     check=check,
     unproven=unproven,
     rules=(

@@ -30,7 +30,6 @@ from itertools import groupby
 from math import isfinite
 from operator import itemgetter
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean, model
@@ -43,6 +42,7 @@ from coursebuild.features.arithmetic.evaluate import FormulaComparison, measure,
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
 from coursebuild.features.arithmetic.symbol_values import check_formulas
+from coursebuild.features.truth import Claims, StatedNumber
 
 _PART = re.compile(
     r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+|(?:content|examples|lib|models|runs)/\S*|lab|#lab:\S+|lesson:\S+"
@@ -61,39 +61,6 @@ _MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?
 """Every formula with claims matches this."""
 _DIGIT = re.compile("[0-9]")
 _VECTOR = re.compile(r"\s*[(\[](?:[-+\d.,;\s]|\\[,;: ])+[)\]]\s*")
-
-
-class StatedNumber(Struct, frozen=True):
-    """A number that a document states."""
-
-    span: Span
-    text: str
-    """Empty for a mark that stands beside no number."""
-    values: tuple[tuple[float, float], ...] = ()
-    """Its value and one unit of its last place: as it is written, and in base units."""
-    sources: tuple[str, ...] = ()
-    """The parts of the course of which one must hold it."""
-    mark: Span | None = None
-    """Where these are named."""
-
-    def is_in(self, numbers: Iterable[float]) -> bool:
-        """Whether one of these, rounded to its digits, is this number."""
-        return any(
-            2 * abs(abs(number) - abs(value)) <= step * (1 + 1e-9)
-            for number in numbers
-            for value, step in self.values
-        )
-
-
-class Claims(Struct, frozen=True):
-    """The claims of a document that its scripts and formulas do not prove."""
-
-    open: tuple[StatedNumber, ...]
-    """Those that name no source."""
-    sourced: tuple[StatedNumber, ...] = ()
-    """Those whose source is a part of the course."""
-    inputs: tuple[float, ...] = ()
-    """The numbers that are given, or computed with."""
 
 
 # --- held against the course
@@ -202,8 +169,6 @@ def _map_claims(owner: model.Owner, comma: bool) -> Iterator[StatedNumber]:
 
 def sourced_claims(document: model.Document) -> Claims | None:
     """The claims of a document that name a part of the course; `None` where there are none."""
-    if "given" not in document.source.text:  # as a mark of a source has that word
-        return None
     sourced = document_claims(document).sourced
     return Claims((), sourced) if sourced else None
 
