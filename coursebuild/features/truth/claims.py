@@ -42,7 +42,7 @@ from coursebuild.features.arithmetic.evaluate import FormulaComparison, measure,
 from coursebuild.features.arithmetic.expressions import Expression, NotUnderstood
 from coursebuild.features.arithmetic.statements import FormulaSide, read_statements
 from coursebuild.features.arithmetic.symbol_values import check_formulas
-from coursebuild.features.truth import Claims, StatedNumber
+from coursebuild.features.truth.model import Claims, StatedNumber
 
 _PART = re.compile(
     r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+|(?:content|examples|lib|models|runs)/\S*|lab|#lab:\S+|lesson:\S+"
