@@ -13,10 +13,13 @@ from coursebuild.features.importer.context import (
 from coursebuild.features.importer.displays import normalize_formulas
 
 TARGET = re.compile(
-    r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)\((?P<name>[\w:./|@<>*+-]+)\)=[ \t]*"
+    r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)"
+    r"(?:(?P<myst>\()|(?P<mkdocs>\[\]\(\)\{[ ]*#)|r\[)(?P<name>[\w:./|@<>*+-]+)"
+    r"(?(myst)\)=|(?(mkdocs)[ ]*\}|\]))[ \t]*"
     r"(?:\n{1,2}(?P<heading>#{1,6}[ \t].*))?$",  # a title that was taken out leaves more
     re.MULTILINE,
 )
+"""An anchor of MyST, of `mkdocstrings`, or of a rule in the reference of Rust."""
 FIGURE = re.compile(
     r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"
     r"\{#fig-(?P<label>[\w-]+)(?:[^{}\n]*?fig-alt=\"(?P<alternative>[^\"\n]*)\")?[^{}\n]*\}(?=\n|\Z)"

@@ -48,7 +48,8 @@ _QUOTED_KIND = re.compile(
 
 def convert_segment(segment: Segment, context: LessonContext) -> str:
     """Return a segment as Markdown; a cell becomes a part of the lesson's script."""
-    return textwrap.indent(_convert(segment, context), segment.indent)
+    new = textwrap.indent(_convert(segment, context), " " * len(segment.indent))
+    return segment.indent + new.removeprefix(" " * len(segment.indent))
 
 
 def _convert(segment: Segment, context: LessonContext) -> str:
@@ -137,7 +138,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         return _write_callout(kind, title, text, context, is_folded)
     if re.fullmatch(r"[A-Za-z_]\w*(?:\.\w+)+", head):
         context.leave("division", f"documentation that its tool makes from the code of `{head}`")
-        return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
+        return ""
     if "panel-tabset" in classes:
         return _write_tabs(text, context)
     context.change("division", "what it holds, without a frame")

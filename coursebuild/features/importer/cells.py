@@ -34,6 +34,9 @@ _ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
 _MAGIC = re.compile(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
+_COMMAND = re.compile(r"^(?:!|%(?=pip|conda))[ ]*(.+)$", re.MULTILINE)
+"""What Jupyter gives to a shell."""
+
 
 def write_cell(cell: Segment, context: LessonContext) -> str:
     """Return a cell as a part of the lesson's script, with what it prints and draws; or as code."""
@@ -54,6 +57,8 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
             language = re.sub("writefile|script", "text", magic[1].lower())
         if language == "html":
             return rewrite_prose(shown_code, context)
+        if not shown_code and (commands := _COMMAND.findall(cell.text)):
+            language, shown_code = "sh", "\n".join(commands)  # a sentence above may end in a colon
         blocks = [marks.fence(language, shown_code)] if shown_code else []
         return "\n\n".join((*blocks, *write_outputs(cell, context)))
     code, figure = _with_new_paths(code, context), ""

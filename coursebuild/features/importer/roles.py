@@ -11,6 +11,7 @@ import re
 import unicodedata
 from urllib.parse import urlsplit
 
+from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.context import (
     PROOF_LABELS,
     LessonContext,
@@ -162,6 +163,17 @@ def convert_cross_reference(whole: str, kind: str, label: str, context: LessonCo
     return f"the {words[kind]}"
 
 
+_SORTS = {**PROOF_LABELS, "prop": "proposition", "imp": ""}
+"""Kinds of theorems of `numthm` by their labels, some of which Quarto has otherwise."""
+
+
+def write_proof(sort: str, title: str, key: str) -> str:
+    """Return the head of a theorem; a kind that its settings add is not named, its title is."""
+    kind = _SORTS.get(sort, "").capitalize()
+    words = f"{kind} ({title})" if kind and title else kind or title
+    return (f'<a id="{to_anchor(key)}"></a>' if key else "") + words
+
+
 _FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split()
 """Names between braces that only place or mark what stands between them."""
 
@@ -244,6 +256,8 @@ def convert_tag(tag: str, context: LessonContext) -> str:
 
     A class names a look that its tool gives; here it could be that of another thing.
     """
+    if re.match(r"<img\b[^<>]*\sclass=[\"'][^\"'<>]*\b(?:only-dark|dark-only)\b", tag):
+        return ""  # a page makes its pictures dark itself
     tag = _LOOK.sub("", tag)
     name = tag[1:].split()[0]
     if name[0].isupper() and not name.isupper():  # no element of HTML
@@ -256,6 +270,9 @@ def convert_tag(tag: str, context: LessonContext) -> str:
         words = title or words_of_link(address, attribute[3])
         context.leave("tag of HTML", f"a frame that shows `{attribute[3]}`; it is a link now")
         return f'<a href="{address}">{words}</a>' if address else words
+    if attribute and re.match("<a[ ]", tag, re.IGNORECASE) and attribute[3].startswith("data:"):
+        context.leave("link", f"a link to `{shorten_value(attribute[3])}`, data in the text")
+        return tag[: attribute.start()].rstrip() + tag[attribute.end() + 1 :]
     if attribute is None or re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
         return tag
     address = attribute[3].removeprefix("attachment:")

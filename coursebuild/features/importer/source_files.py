@@ -40,7 +40,7 @@ class Segment(Struct, frozen=True, kw_only=True):
     mark: str = "```"
     """The opening mark: backticks, tildes, colons, `!!!`, `===` or `>`."""
     indent: str = ""
-    """What stands before each line of a block in a list."""
+    """What stands before a block in a list; in its further lines, as many blanks."""
     shows_value: bool | None = None
     """Of a cell: whether the value of its last expression was shown; `None` where no output is
     recorded."""
