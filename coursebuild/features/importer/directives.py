@@ -254,7 +254,7 @@ def _write_file(directive: Directive, context: LessonContext, kind: str) -> str:
         context.leave(kind, f"the file `{name}`: {TOO_MUCH}")
         return ""
     if directive.name == "include":
-        return directive.nested(text)
+        return directive.nested(read_rst(text) if path.endswith((".rst", ".txt")) else text)
     language = options.get("language") or path.rpartition(".")[2]
     language = {"py": "python", "yml": "yaml"}.get(language, language)
     caption = rewrite_prose(options.get("caption", ""), context)
