@@ -38,7 +38,6 @@ _PLACES = (
     ("", TARGET.pattern),
     ("sec-", r"\{#sec-(?P<name>[\w-]+)"),
     ("", r"^#{1,6}[ \t].*\{#(?P<name>[\w-]+)[^{}\n]*\}[ \t]*$"),
-    ("", r"\{\{[a-z]+\}\}\{(?P<name>[^{}\n]+)\}"),
     ("lst:", r"^(?:[`~ \t]*\{#|#\|[ \t]*(?:lst-)?label:[ \t]*)lst-(?P<name>[\w-]+)"),
     ("", r"^[: \t]*\{#(?P<name>(?:fig|tbl)-[\w-]+)"),
     ("fig-", _CHUNK),

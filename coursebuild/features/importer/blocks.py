@@ -13,12 +13,8 @@ from coursebuild.api import marks
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.absent_labs import write_absent_lab
-from coursebuild.features.importer.cells import (
-    code_for_readers,
-    read_options,
-    write_cell,
-    write_outputs,
-)
+from coursebuild.features.importer.cell_texts import code_for_readers, read_options
+from coursebuild.features.importer.cells import write_cell, write_outputs
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.directives import (
     CALLOUTS,
@@ -138,7 +134,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         return _write_callout(kind, title, text, context, is_folded)
     if re.fullmatch(r"[A-Za-z_]\w*(?:\.\w+)+", head):
         context.leave("division", f"documentation that its tool makes from the code of `{head}`")
-        return ""
+        return f"`{head}`"
     if "panel-tabset" in classes:
         return _write_tabs(text, context)
     context.change("division", "what it holds, without a frame")

@@ -182,7 +182,7 @@ def _write(directive: Directive, context: LessonContext) -> str:
         case _ if name.startswith("auto"):
             message = f"documentation that its tool makes from the code of `{argument}`"
             context.leave(kind, message)
-            return ""
+            return f"`{argument}`" if argument else ""
         case _ if name in _FRAMES:
             return directive.nested(text)
         case _ if name in _CHANGES:

@@ -39,7 +39,6 @@ from coursebuild.features.importer.roles import (
     draw_emoji,
     words_of_link,
     write_link,
-    write_proof,
 )
 from coursebuild.features.importer.source_files import title_of_file
 
@@ -85,8 +84,6 @@ _LINE = re.compile(
     rf"|(?P<told>(?<![\w@.\\/])@(?P<work>{_KEY})(?:[ ]?\[[, ]*(?P<cited>[^\[\]\n@]+)\](?!\())?)"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
     r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
-    r"|(?P<proof>\{\{(?P<sort>[a-z]+)\}\}(?=[{\[])(?:\{(?P<key>[^{}\n]+)\})?"
-    r"(?:\[(?P<name_of>[^\[\]\n]*)\])?)"
     r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
@@ -174,7 +171,6 @@ _KINDS = {
     "cite": ("citation", "in the words of BibTeX's keys"),
     "told": ("citation", "its authors, and the source"),
     "pair": ("pair of tags", "what it holds, without a frame"),
-    "proof": ("theorem of mdBook's `numthm`", "an anchor, its kind and its title"),
     "substitution": ("substitution", "the words that it stands for"),
     "marked": ("marked words", "a tag of HTML"),
     "change": ("suggested change", "as if it had been accepted"),
@@ -386,9 +382,6 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return write_link("", address) or whole
         case "pair":
             return _rewrite_line(match["held"], context)
-        case "proof":
-            title = _rewrite_line(match["name_of"] or "", context)
-            return write_proof(match["sort"], title, match["key"] or "")
         case "substitution":
             return convert_substitution(whole, context, bool(_STATEMENTS.fullmatch(match.string)))
         case "marked":

@@ -90,7 +90,8 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             tag = {"underline": "u", "strike": "del"}.get(name, name)
             return f"<{tag}>{body}</{tag}>"
         case _ if name.rpartition(":")[2] in _CODE_ROLES:
-            return f"`{words or target}`"
+            name_of_part = re.sub(r"^(?:!|~(?:.*\.)?)", "", target)  # as Sphinx shows it
+            return f"`{words or name_of_part}`"
         case _ if name in _WORD_ROLES:
             return words or body
         case _ if _ICON_ROLE.fullmatch(name):
@@ -163,17 +164,6 @@ def convert_cross_reference(whole: str, kind: str, label: str, context: LessonCo
     return f"the {words[kind]}"
 
 
-_SORTS = {**PROOF_LABELS, "prop": "proposition", "imp": ""}
-"""Kinds of theorems of `numthm` by their labels, some of which Quarto has otherwise."""
-
-
-def write_proof(sort: str, title: str, key: str) -> str:
-    """Return the head of a theorem; a kind that its settings add is not named, its title is."""
-    kind = _SORTS.get(sort, "").capitalize()
-    words = f"{kind} ({title})" if kind and title else kind or title
-    return (f'<a id="{to_anchor(key)}"></a>' if key else "") + words
-
-
 _FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split()
 """Names between braces that only place or mark what stands between them."""
 
@@ -188,11 +178,9 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     A statement shows nothing itself, and of a call of a macro its texts are shown.
     """
     title = find_group(r"(?:title|caption)=\"([^\"]*)\"", whole)
-    if number := re.fullmatch(r"\{\{(?:eq|t)?ref:[ ]*([^{}\s]+)[ ]*\}\}", whole):
-        if address := context.resolve_formula(number[1]):
-            return write_link("", address)
-        if address := context.resolve_anchor(to_anchor(number[1])):
-            return write_link(title_of_file(number[1].rpartition(":")[2]), address)
+    number = find_group(r"\A\{\{eqref:[ ]*([^{}\s]+)[ ]*\}\}\Z", whole)
+    if number and (address := context.resolve_formula(number)):
+        return write_link("", address)
     name, *arguments = whole.strip("{}<> %").split() or [""]
     address = "".join(arguments[:1])
     if name in ("tab", "code") and title:

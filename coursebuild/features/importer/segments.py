@@ -35,6 +35,8 @@ _FRONT_MATTER = re.compile(
     r"|\+\+\+[ \t]*\n(?P<toml>.*?\n)?\+\+\+[ \t]*(?:\n|\Z)",
     re.DOTALL,
 )
+_PLAIN_FIELDS = re.compile(r"(?:[\w-]+:.*\n|[ \t]+.*\n|-[ ].*\n|\n)*")
+"""Front matter that other tools read line by line: a value may hold a colon."""
 _TITLE = re.compile(
     r"^[ ]?#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?"
     r"(?:[ \t]*\{(?:[^{}]*#(?P<label>[\w-]+))?[^{}]*\})?[ \t]*$"
@@ -216,6 +218,8 @@ def read_front_matter(text: str) -> tuple[Mapping[str, Any], int]:
         return {}, 0
     is_yaml = match["toml"] is None
     value = read_yaml(match["yaml"] or "{}") if is_yaml else read_toml(match["toml"])
+    if value is None and is_yaml and _PLAIN_FIELDS.fullmatch(match["yaml"]):
+        value = dict(re.findall(r"^([\w-]+):[ \t]*(\S.*)$", match["yaml"], re.MULTILINE))
     return (value, match.end()) if isinstance(value, dict) else ({}, 0)
 
 
@@ -356,6 +360,7 @@ def _read_cells(
     """Return cells as segments, and the pictures that are attached to them, by name."""
     segments: list[Segment] = []
     attachments: dict[str, bytes] = {}
+    is_run = any(cell.get("outputs") for cell in cells)
     for number, cell in enumerate(cells, 1):
         place, source = f"cell {number}", join_lines(cell.get("source", ""))
         if cell.get("cell_type") == "markdown":
@@ -383,7 +388,7 @@ def _read_cells(
                 place=place,
                 text=source,
                 head=tags if is_python else f"{{{language}}}",
-                shows_value=bool(values),
+                shows_value=bool(values) if is_run else None,
                 printed="".join(join_lines(stream.get("text") or "") for stream in streams),
                 value="\n".join(map(join_lines, value_texts)),
                 picture=_recorded_picture(outputs) if outputs else None,
