@@ -38,6 +38,7 @@ from coursebuild.features.importer.roles import (
     convert_wiki_link,
     draw_emoji,
     words_of_link,
+    write_icon,
     write_link,
 )
 from coursebuild.features.importer.source_files import title_of_file
@@ -66,7 +67,7 @@ _LINE = re.compile(
     rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
     r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
-    r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
+    r"|(?P<anchor>(?<!!)\[(?P<bare>[^\[\]\n`]*)\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]"
     r"(?:\[(?P<path>[A-Za-z_]\w*(?:[.-]\w+)+)?\]|(?=\[\^)))"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\](?!\())"
@@ -323,12 +324,11 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             text = _rewrite_line(match["text"], context) or words_of_link(address, match["address"])
             return write_link(text, address, match["title"] or "")
         case "anchor":
-            return ""
-        case "icon":  # alone in a cell or link it says something
-            before, after = match.string[: match.start()], match.string[match.end() :]
-            is_alone = re.search(r"[|\[][ \t]*$", before) and re.match(r"[ \t]*[|\]]", after)
-            words = title_of_file(match["sign"]).lower()
-            return f"{words} " if is_alone else ""
+            if words := match["bare"]:
+                context.leave("link", f"the link “{words}”, which has no address")
+            return _rewrite_line(words, context)
+        case "icon":
+            return write_icon(match)
         case "object":
             called = match["called"]
             if (match["path"] or called).casefold() in context.references:

@@ -215,6 +215,13 @@ def draw_emoji(name: str, context: LessonContext) -> str:
     return name
 
 
+def write_icon(icon: re.Match[str]) -> str:
+    """Return the name of an icon that is alone in a cell or link, where it says something."""
+    before, after = icon.string[: icon.start()], icon.string[icon.end() :]
+    is_alone = re.search(r"[|\[][ \t]*$", before) and re.match(r"[ \t]*[|\]]", after)
+    return f"{title_of_file(icon['sign']).lower()} " if is_alone else ""
+
+
 def convert_wiki_link(whole: str, page: str, part: str, words: str, context: LessonContext) -> str:
     """Return a link or picture of Obsidian; as it is where the folder has no such file."""
     if whole[0] == "!" and (address := page and context.resolve_picture(page)):
