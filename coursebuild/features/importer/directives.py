@@ -180,9 +180,10 @@ def _write(directive: Directive, context: LessonContext) -> str:
         case "eval-rst":
             return directive.nested(read_rst(text))
         case _ if name.startswith("auto"):
-            message = f"documentation that its tool makes from the code of `{argument}`"
+            names = re.findall(r"^[ \t]*~?([\w.]+)", f"{argument}\n{text}", re.MULTILINE)
+            message = f"documentation that its tool makes from the code of `{', '.join(names)}`"
             context.leave(kind, message)
-            return f"`{argument}`" if argument else ""
+            return "\n\n".join(f"`{name}`" for name in names)
         case _ if name in _FRAMES:
             return directive.nested(text)
         case _ if name in _CHANGES:
