@@ -392,6 +392,8 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
     last = tree.body[-1] if tree.body else None
     if not isinstance(last, ast.Expr) or text.rstrip().endswith(";"):
         return text
+    if ast.unparse(last) == "None":  # so that nothing is shown
+        return text
     if isinstance(last.value, ast.Call):
         name = ast.unparse(last.value.func)
         if re.match(r"(?:print|plt|ax|axs|axes|fig)\b", name):
