@@ -13,10 +13,13 @@ from coursebuild.features.importer.context import (
 from coursebuild.features.importer.displays import normalize_formulas
 
 TARGET = re.compile(
-    r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)\((?P<name>[\w:./|@<>*+-]+)\)=[ \t]*"
+    r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)"
+    r"(?:(?P<myst>\()|(?P<mkdocs>\[\]\(\)\{[ ]*#)|r\[)(?P<name>[\w:./|@<>*+-]+)"
+    r"(?(myst)\)=|(?(mkdocs)[ ]*\}|\]))[ \t]*"
     r"(?:\n{1,2}(?P<heading>#{1,6}[ \t].*))?$",  # a title that was taken out leaves more
     re.MULTILINE,
 )
+"""An anchor of MyST, of `mkdocstrings`, or of a rule in the reference of Rust."""
 FIGURE = re.compile(
     r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"
     r"\{#fig-(?P<label>[\w-]+)(?:[^{}\n]*?fig-alt=\"(?P<alternative>[^\"\n]*)\")?[^{}\n]*\}(?=\n|\Z)"
@@ -35,7 +38,6 @@ _PLACES = (
     ("", TARGET.pattern),
     ("sec-", r"\{#sec-(?P<name>[\w-]+)"),
     ("", r"^#{1,6}[ \t].*\{#(?P<name>[\w-]+)[^{}\n]*\}[ \t]*$"),
-    ("", r"\{\{[a-z]+\}\}\{(?P<name>[^{}\n]+)\}"),
     ("lst:", r"^(?:[`~ \t]*\{#|#\|[ \t]*(?:lst-)?label:[ \t]*)lst-(?P<name>[\w-]+)"),
     ("", r"^[: \t]*\{#(?P<name>(?:fig|tbl)-[\w-]+)"),
     ("fig-", _CHUNK),

@@ -13,12 +13,8 @@ from coursebuild.api import marks
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.absent_labs import write_absent_lab
-from coursebuild.features.importer.cells import (
-    code_for_readers,
-    read_options,
-    write_cell,
-    write_outputs,
-)
+from coursebuild.features.importer.cell_texts import code_for_readers, read_options
+from coursebuild.features.importer.cells import write_cell, write_outputs
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.directives import (
     CALLOUTS,
@@ -48,7 +44,8 @@ _QUOTED_KIND = re.compile(
 
 def convert_segment(segment: Segment, context: LessonContext) -> str:
     """Return a segment as Markdown; a cell becomes a part of the lesson's script."""
-    return textwrap.indent(_convert(segment, context), segment.indent)
+    new = textwrap.indent(_convert(segment, context), " " * len(segment.indent))
+    return segment.indent + new.removeprefix(" " * len(segment.indent))
 
 
 def _convert(segment: Segment, context: LessonContext) -> str:
@@ -137,7 +134,7 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
         return _write_callout(kind, title, text, context, is_folded)
     if re.fullmatch(r"[A-Za-z_]\w*(?:\.\w+)+", head):
         context.leave("division", f"documentation that its tool makes from the code of `{head}`")
-        return _convert_nested(re.sub(r"\A(?:[ ]{4}.*\n?|\n)*", "", text), context)
+        return f"`{head}`"
     if "panel-tabset" in classes:
         return _write_tabs(text, context)
     context.change("division", "what it holds, without a frame")

@@ -13,14 +13,17 @@ from msgspec.structs import replace
 from coursebuild.api import marks
 from coursebuild.core.scripts.figures import prepare_figure
 from coursebuild.features.importer.anchors import figure_of
+from coursebuild.features.importer.cell_texts import (
+    COMMENT,
+    MAGIC,
+    code_for_readers,
+    drop_magics,
+    read_options,
+)
 from coursebuild.features.importer.context import LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.source_files import Segment, find_group, read_yaml
+from coursebuild.features.importer.source_files import Segment, find_group
 
-_OPTION = re.compile(
-    r"\s*(?:(?:#|//|%%)(?:[ ](?=\|[ ]+[\w-]+:[ ]))?\|(.*)|:([\w-]+):[ \t]*(.*))(?:\n|\Z)"
-)
-"""A line of options of a cell: YAML of Quarto, or one option of MyST."""
 _TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
 _TIMES = re.compile(r"^(?:CPU times|Wall time|.* per loop \(mean)\b.*\n?", re.MULTILINE)
 """What it prints."""
@@ -32,7 +35,6 @@ _DISPLAY = re.compile(r"^([ \t]*)display\(", re.MULTILINE)
 """What Jupyter shows without an import."""
 _ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
-_MAGIC = re.compile(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 
 
 def write_cell(cell: Segment, context: LessonContext) -> str:
@@ -54,6 +56,9 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
             language = re.sub("writefile|script", "text", magic[1].lower())
         if language == "html":
             return rewrite_prose(shown_code, context)
+        elif not re.search(r"^[^#\n]", shown_code, re.MULTILINE):
+            language = "sh" if re.search("^# !|^# %[pc]", shown_code, re.MULTILINE) else "python"
+            shown_code = COMMENT.sub("", shown_code)
         blocks = [marks.fence(language, shown_code)] if shown_code else []
         return "\n\n".join((*blocks, *write_outputs(cell, context)))
     code, figure = _with_new_paths(code, context), ""
@@ -248,33 +253,6 @@ def _copy_figure(name: str, data: bytes, context: LessonContext) -> bool:
     return isinstance(picture, bytes)
 
 
-def read_options(text: str) -> tuple[Mapping[str, str], str]:
-    """Return the options that begin a cell or directive, by their names, and its other lines.
-
-    They are YAML, between lines of hyphens or behind the marks of Quarto, or lines of MyST.
-    """
-    head = _YAML_HEAD.match(text)
-    at, yaml_lines, options = head.end() if head else 0, list[str](), dict[str, str]()
-    while option := _OPTION.match(text, at):
-        at = option.end()
-        if option[2]:
-            options[option[2]] = option[3].strip()
-        else:
-            yaml_lines.append(option[1])
-    for yaml_text in ("\n".join(yaml_lines), head[1] if head else ""):
-        value = read_yaml(yaml_text)
-        pending = [value] if isinstance(value, dict) else []
-        while pending:
-            for name, inner in pending.pop().items():
-                if isinstance(inner, dict):
-                    pending.append(inner)
-                else:
-                    words = " ".join(map(str, inner)) if isinstance(inner, list) else str(inner)
-                    words = words.lower() if isinstance(inner, bool) else words
-                    options[str(name).replace(".", "-")] = words  # as knitr and Quarto call it
-    return options, text[at:]
-
-
 def _with_new_paths(code: str, context: LessonContext) -> str:
     """Return code that opens the files of the folder where they are in the new course."""
     lines = code.encode().split(b"\n")
@@ -327,9 +305,6 @@ def _without_host(text: str, context: LessonContext) -> str:
     return "\n".join(lines)
 
 
-_YAML_HEAD = re.compile(r"---[ \t]*\n(.*?)\n---[ \t]*(?:\n|\Z)", re.DOTALL)
-
-
 def recorded_output(cell: Segment, code: str) -> str:
     """Return what is recorded of a cell which the script has as `code`: what it should print."""
     output = ""
@@ -370,16 +345,6 @@ def how_shown(options: Mapping[str, str], tags: str, *, begins: bool) -> str:
     return " folded" if is_folded else ""
 
 
-def code_for_readers(text: str) -> str:
-    """Return the code of a cell without the lines that only its tool understands."""
-    return _drop_magics(read_options(text)[1]).strip("\n")
-
-
-def _drop_magics(text: str) -> str:
-    """Return code without the lines of Jupyter; a block that holds only one stays a block."""
-    return _MAGIC.sub(lambda magic: magic[1] and f"{magic[1]}pass", text)
-
-
 def _find_fault(text: str) -> str:
     """Return why a text is no Python; empty where it is."""
     try:
@@ -409,9 +374,9 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
         context.leave("cell", f"a cell of `{first.split()[0]}` is shown and not run")
         return ""
     if _find_fault(text):  # else a line that begins with `%` goes on from the one before
-        for magic in _MAGIC.finditer(text):
+        for magic in MAGIC.finditer(text):
             context.leave("magic", f"`{magic[0].strip()}`, which is for Jupyter alone")
-        text = _drop_magics(text)
+        text = drop_magics(text)
     text = _DISPLAY.sub(r"\1print(", _WINDOW.sub(r"\1pass", text))
     text = _without_host(text, context)
     if fault := _find_fault(text):
@@ -419,13 +384,15 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
         return ""
     if cell.shows_value is not False:
         text = _print_last_value(cell, text, ast.parse(text), context)
-    return text.strip()
+    return text.strip() if re.search(r"^[ \t]*[^#\s]", text, re.MULTILINE) else ""
 
 
 def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: LessonContext) -> str:
     """Return the code with its last expression printed, since Jupyter shows its value."""
     last = tree.body[-1] if tree.body else None
     if not isinstance(last, ast.Expr) or text.rstrip().endswith(";"):
+        return text
+    if ast.unparse(last) == "None":  # so that nothing is shown
         return text
     if isinstance(last.value, ast.Call):
         name = ast.unparse(last.value.func)

@@ -47,7 +47,7 @@ _NOT_LESSONS = ("readme", "license", "licence", "changelog", "contributing", "co
 _PAGES = ("index", "intro", "introduction", "about")
 _TITLE_PATHS = ((), ("project",), ("book",), ("website",))
 """Keys below which settings have the title of the course."""
-_LIST_KEYS = ("parts", "chapters", "sections", "children", "toc", "contents", "entries")
+_LIST_KEYS = "parts chapters sections subtrees children toc contents entries".split()
 _FILE_KEYS = ("file", "href", "part")
 _TITLE_KEYS = ("caption", "title", "section", "text", "part")
 _COURSE_KEYS = {"toc", "root", "site-url", "author", "authors", "version"}

@@ -11,6 +11,7 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from coursebuild.core.drawing.safe_svg import without_refused
+from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.source_files import TEXTS, SourceFiles, stem_of
 
 
@@ -156,8 +157,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         if address.startswith("eq") and (resolved := self.resolve_formula(address)):
             return resolved
         parts = urlsplit(re.sub("^(?:project|path):", "", address))
-        if parts.scheme == "javascript":
-            self.leave("link", f"a link to `{address}`, which is a program")
+        if parts.scheme in ("javascript", "data"):
+            self.leave("link", f"a link to `{shorten_value(address)}`, a program or data")
             return ""
         if parts.scheme or parts.netloc or not parts.path:
             return parts.geturl()
@@ -183,6 +184,12 @@ class LessonContext(Struct, frozen=True, kw_only=True):
             return False
         self.cited.update(keys)
         return True
+
+    @property
+    def has_citations(self) -> bool:
+        """Whether its tool may read `[@key]` as a citation."""
+        files = self.files
+        return bool(self.sources) or not (files.mkdocs or files.docusaurus or "book.toml" in files)
 
     def cite_in_words(self, key: str, place: str = "") -> str:
         """Return a source of the list as a part of a sentence: its authors, and the source."""

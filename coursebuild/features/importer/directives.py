@@ -18,6 +18,7 @@ from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.roles import convert_role, words_of_link, write_link
+from coursebuild.features.importer.rst import read_rst
 from coursebuild.features.importer.source_files import TOO_MUCH, find_group
 
 CALLOUTS = {
@@ -104,6 +105,8 @@ def _write(directive: Directive, context: LessonContext) -> str:
         case "math":
             tex = "\n".join(part for part in (argument, text) if part.strip())
             return display_formula(tex, directive.label)
+        case "figure" | "image" if "only-dark" in options.get("class", ""):
+            return ""  # a page makes its pictures dark itself
         case "figure" | "image":
             return _write_figure(directive, context)
         case "figure-md":  # its argument is its label, its first paragraph the picture
@@ -141,7 +144,17 @@ def _write(directive: Directive, context: LessonContext) -> str:
         case "raw" if argument.strip() == "html":
             return rewrite_prose(text, context)
         case (
-            "raw" | "index" | "sectionauthor" | "codeauthor" | "meta" | "tags" | "only" | "ifconfig"
+            "raw"
+            | "index"
+            | "sectionauthor"
+            | "codeauthor"
+            | "meta"
+            | "tags"
+            | "only"
+            | "ifconfig"
+            | "role"
+            | "currentmodule"
+            | "py:currentmodule"
         ):
             if name == "only" and "html" in argument:
                 return directive.nested(text)
@@ -164,6 +177,13 @@ def _write(directive: Directive, context: LessonContext) -> str:
             return marks.block_quote(directive.nested(text))
         case _ if name in _MAPS:
             return ""
+        case "eval-rst":
+            return directive.nested(read_rst(text))
+        case _ if name.startswith("auto"):
+            names = re.findall(r"^[ \t]*~?([\w.]+)", f"{argument}\n{text}", re.MULTILINE)
+            message = f"documentation that its tool makes from the code of `{', '.join(names)}`"
+            context.leave(kind, message)
+            return "\n\n".join(f"`{name}`" for name in names)
         case _ if name in _FRAMES:
             return directive.nested(text)
         case _ if name in _CHANGES:
@@ -235,7 +255,7 @@ def _write_file(directive: Directive, context: LessonContext, kind: str) -> str:
         context.leave(kind, f"the file `{name}`: {TOO_MUCH}")
         return ""
     if directive.name == "include":
-        return directive.nested(text)
+        return directive.nested(read_rst(text) if path.endswith((".rst", ".txt")) else text)
     language = options.get("language") or path.rpartition(".")[2]
     language = {"py": "python", "yml": "yaml"}.get(language, language)
     caption = rewrite_prose(options.get("caption", ""), context)

@@ -75,8 +75,6 @@ def expand_includes(
 
     `lesson` is the file that includes this one, where another does.
     """
-    for mark, braces in files.macro_marks:
-        text = text.replace(mark, braces)
 
     def expand(mark: re.Match[str]) -> str:
         if mark["escape"]:

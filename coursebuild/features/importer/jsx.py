@@ -38,8 +38,14 @@ _INDENT = re.compile(
 _COMPUTED = re.compile(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
 _LABELS = [
     re.compile(rf"\s(?:{names})=(?:\"([^\"]*)\"|'([^']*)')")
-    for names in ("label|title|caption", "value|alt")
+    for names in ("label|title|caption|heading", "value|alt", "href|to|link")
 ]
+_SENTENCE = re.compile(
+    r"\s(?!class|style)\w+=([\"'])"
+    r"((?:(?!\1).)*[A-Za-z]{2}[^\"'\w]*[ ](?:(?!\1).)*[A-Za-z]{2}.*?)\1",
+    re.DOTALL,
+)
+"""An attribute of more than a word, which readers see."""
 _ADDRESS = re.compile(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
 """The address of a picture where it is computed."""
 
@@ -53,12 +59,16 @@ def without_jsx(text: str, context: LessonContext) -> str:
 def write_component(name: str, attributes: str, context: LessonContext) -> str:
     """Return what the beginning of a component has readers see: a picture, or its label."""
     context.leave("component", f"the component `<{name}>`; what it holds is shown")
-    words = find_group(_LABELS[0], attributes) or find_group(_LABELS[1], attributes)
+    title, value, address = (find_group(label, attributes) for label in _LABELS)
+    words = title or value
     if picture := _ADDRESS.search(attributes):
         return f"![{words}]({picture[1]})"
     if number := re.search(r"\snumber=\"([^\"]+)", attributes):
         words = f"{name} {number[1]}: {words}"
-    return words and f"**{words}**"
+    sentences = [text for _, text in _SENTENCE.findall(attributes) if text not in (words, address)]
+    address = address if context.is_mdx else address and context.resolve_link(address)
+    head = f"[{words}]({address})" if words and address else words
+    return " ".join([f"**{head}**" if head else "", *sentences]).strip()
 
 
 def _convert_part(part: re.Match[str], context: LessonContext) -> str:

@@ -14,11 +14,10 @@ from collections.abc import Iterable, Iterator
 from msgspec.structs import replace
 
 from coursebuild.api import marks
+from coursebuild.features.importer.cell_texts import code_for_readers, read_options
 from coursebuild.features.importer.cells import (
     caption_of_code,
-    code_for_readers,
     how_shown,
-    read_options,
     write_outputs,
     write_recorded,
 )

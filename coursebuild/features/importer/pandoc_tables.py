@@ -265,6 +265,34 @@ _READERS = ((_INDENT, _read_grid), (_QUOTE, _read_ruled))
 """What reads tables, and what stands before each of their lines."""
 
 
+_BAR = re.compile(r"(?<!\\)\|")
+
+
+def cut_rows(lines: Sequence[str], leave: Callable[[int, str], None]) -> Iterator[str]:
+    """Yield lines, of which the rows of tables have no more cells than the heads: none is shown.
+
+    `leave` is told the line, from 0, and the cells that are cut off, if there is a word in them.
+    """
+    width, width_above, fence = 0, 0, ""
+    for number, line in enumerate(lines):
+        if mark := _FENCE.match(line):
+            fence = "" if fence and mark[1].startswith(fence) else fence or mark[1]
+        row = line.strip("> \t")
+        bars = [bar.start() for bar in _BAR.finditer(line)]
+        cells = len(bars) + 1 - row.startswith("|") - (len(row) > 1 and row.endswith("|"))
+        if fence or not bars:
+            width = 0
+        elif not width and _DELIMITERS.fullmatch(row):
+            width = cells if cells == width_above else 0
+        elif cells > width > 0:
+            end = bars[width - (not row.startswith("|"))] + 1
+            if rest := line[end:].strip("| \t"):
+                leave(number, rest)
+            line = line[:end]
+        width_above = cells
+        yield line
+
+
 MEANING = re.compile(
     r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
     r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",

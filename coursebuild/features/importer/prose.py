@@ -21,7 +21,12 @@ from coursebuild.features.importer.anchors import (
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
 from coursebuild.features.importer.displays import WORDS, normalize_formulas, read_escapes
-from coursebuild.features.importer.pandoc_tables import MEANING, rewrite_tables, write_meanings
+from coursebuild.features.importer.pandoc_tables import (
+    MEANING,
+    cut_rows,
+    rewrite_tables,
+    write_meanings,
+)
 from coursebuild.features.importer.roles import (
     address_of_label,
     convert_attributes,
@@ -33,6 +38,7 @@ from coursebuild.features.importer.roles import (
     convert_wiki_link,
     draw_emoji,
     words_of_link,
+    write_icon,
     write_link,
 )
 from coursebuild.features.importer.source_files import title_of_file
@@ -61,7 +67,7 @@ _LINE = re.compile(
     rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
     r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
-    r"|(?P<anchor>\[\]\(\)(?:\{[^{}\n]*\})?)"
+    r"|(?P<anchor>(?<!!)\[(?P<bare>[^\[\]\n`]*)\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]"
     r"(?:\[(?P<path>[A-Za-z_]\w*(?:[.-]\w+)+)?\]|(?=\[\^)))"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\](?!\())"
@@ -79,12 +85,11 @@ _LINE = re.compile(
     rf"|(?P<told>(?<![\w@.\\/])@(?P<work>{_KEY})(?:[ ]?\[[, ]*(?P<cited>[^\[\]\n@]+)\](?!\())?)"
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
     r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
-    r"|(?P<proof>\{\{(?P<sort>[a-z]+)\}\}(?=[{\[])(?:\{(?P<key>[^{}\n]+)\})?"
-    r"(?:\[(?P<name_of>[^\[\]\n]*)\])?)"
     r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
-    r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-[\w-]+:(?:\{[^{}\n]*\})?(?:[ ]|&nbsp;)*)"
+    r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-(?P<sign>[\w-]+?)(?:-\d+)?:"
+    r"(?:\{[^{}\n]*\})?(?:[ ]|&nbsp;)*)"
     r"|(?P<emoji>(?<![\w:]):[a-z][a-z0-9_+-]*:(?![\w:]))|(?P<block>(?<!\S)\^(?P<id>[\w-]+)$)"
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
     r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source|iframe)>)?)"
@@ -117,6 +122,7 @@ _COMMENT_AS_HEADING = re.compile(
     r"^(#{1,6}[ \t]+)?<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$(?(1)|(?=\n+:[ \t]))", re.MULTILINE
 )
 """Or as a term whose meaning is below it."""
+_HELD_COMMENT = re.compile(r"[ ]\((<!--(?:(?!-->)[^\n])*-->)\)")
 _CONTENTS = re.compile(
     r'<div class="toc">.*?</div>|^(?:\[TOC\]|\[\[_?TOC_?\]\])[ \t]*$', re.DOTALL | re.M
 )
@@ -166,7 +172,6 @@ _KINDS = {
     "cite": ("citation", "in the words of BibTeX's keys"),
     "told": ("citation", "its authors, and the source"),
     "pair": ("pair of tags", "what it holds, without a frame"),
-    "proof": ("theorem of mdBook's `numthm`", "an anchor, its kind and its title"),
     "substitution": ("substitution", "the words that it stands for"),
     "marked": ("marked words", "a tag of HTML"),
     "change": ("suggested change", "as if it had been accepted"),
@@ -229,7 +234,13 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         elif edge is not None and edge[1].startswith(mark):
             mark = "" if mark else edge[1]
         out.append(line)
-    return FIGURE.sub(write_figure, _PICTURE_LINE.sub(r"\g<0>\n", "\n".join(out)))
+
+    def leave_cells(line: int, cells: str) -> None:
+        message = f"`{cells}`, cells of a row that no column of the table has"
+        context.line_below(line).leave("table", message)
+
+    text = "\n".join(cut_rows(out, leave_cells))
+    return FIGURE.sub(write_figure, _PICTURE_LINE.sub(r"\g<0>\n", text))
 
 
 def _write_comment(match: re.Match[str]) -> str:
@@ -244,6 +255,7 @@ _BLOCKS: Rules = (
     (_QUOTED_TITLE, r"\g<0>#", "heading in a quotation", "a level lower"),
     (_COMMENT_AS_HEADING, r"\1`\2`", "comment", "words of a heading or term that has no others"),
     (_COMMENT, _write_comment, "comment of MyST", "a comment of HTML"),
+    (_HELD_COMMENT, r"\1", "comment", "without the parentheses that hold nothing else"),
 )
 """What is changed before the lines of a text are read, and how the account calls it."""
 
@@ -281,18 +293,6 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
     return _LINE.sub(rewrite, line)
 
 
-_SORTS = {"prop": "proposition"}
-"""Kinds of theorems of `numthm` by their labels, where Quarto has others."""
-
-
-def _write_proof(match: re.Match[str], context: LessonContext) -> str:
-    """Return the head of a theorem; a kind that its settings add is not named, its title is."""
-    kind = {**PROOF_LABELS, **_SORTS}.get(match["sort"], "") if match["sort"] != "imp" else ""
-    title = _rewrite_line(match["name_of"] or "", context)
-    words = f"{kind.capitalize()} ({title})" if kind and title else kind.capitalize() or title
-    return (f'<a id="{to_anchor(match["key"])}"></a>' if match["key"] else "") + words
-
-
 def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
     whole = match[0]
     match match.lastgroup:
@@ -304,8 +304,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             source = match["source"].strip("<>")
             if source.startswith("#"):
                 return convert_role("embed", source[1:], context)
-            if source.endswith("#only-dark"):  # a page makes its pictures dark itself
-                return ""
+            if source.endswith(("#only-dark", "#gh-dark-mode-only")):
+                return ""  # a page makes its pictures dark itself
             if re.match("[a-z]+://|//", source):
                 message = f"a picture from another host, `{source}`; it is a link now"
                 context.leave("picture", message)
@@ -323,17 +323,21 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             address = context.resolve_link(match["address"].strip("<>"))
             text = _rewrite_line(match["text"], context) or words_of_link(address, match["address"])
             return write_link(text, address, match["title"] or "")
-        case "anchor" | "icon":
-            return ""
+        case "anchor":
+            if words := match["bare"]:
+                context.leave("link", f"the link “{words}”, which has no address")
+            return _rewrite_line(words, context)
+        case "icon":
+            return write_icon(match)
         case "object":
             called = match["called"]
             if (match["path"] or called).casefold() in context.references:
                 # What stands before a note would be called by it
                 return whole if len(whole) > len(called) + 2 else f"{whole}[]"
-            is_path = match["path"] is not None or re.fullmatch(
-                r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called
-            )
-            return _rewrite_line(called, context) if is_path else whole
+            words = _rewrite_line(called, context)
+            if match["path"] is not None:
+                return write_link(words, context.resolve_anchor(to_anchor(match["path"])))
+            return words if re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called) else whole
         case "math" | "digits" if not whole.startswith(context.files.dollars):
             return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if context.files.dollars != "$":
@@ -360,7 +364,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "cross":
             return convert_cross_reference(whole, match["kind"], match["label"], context)
         case "cite":
-            if whole[1:-1].casefold() in context.references:
+            if whole[1:-1].casefold() in context.references or not context.has_citations:
                 return whole.replace("@", r"\@")
             keys = _CITED_KEY.findall(whole)
             if any(key.partition("-")[0] in _CROSS_KINDS for key in keys):
@@ -378,8 +382,6 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return write_link("", address) or whole
         case "pair":
             return _rewrite_line(match["held"], context)
-        case "proof":
-            return _write_proof(match, context)
         case "substitution":
             return convert_substitution(whole, context, bool(_STATEMENTS.fullmatch(match.string)))
         case "marked":

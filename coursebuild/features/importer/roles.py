@@ -11,6 +11,7 @@ import re
 import unicodedata
 from urllib.parse import urlsplit
 
+from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.context import (
     PROOF_LABELS,
     LessonContext,
@@ -89,7 +90,8 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             tag = {"underline": "u", "strike": "del"}.get(name, name)
             return f"<{tag}>{body}</{tag}>"
         case _ if name.rpartition(":")[2] in _CODE_ROLES:
-            return f"`{words or target}`"
+            name_of_part = re.sub(r"^(?:!|~(?:.*\.)?)", "", target)  # as Sphinx shows it
+            return f"`{words or name_of_part}`"
         case _ if name in _WORD_ROLES:
             return words or body
         case _ if _ICON_ROLE.fullmatch(name):
@@ -176,11 +178,9 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     A statement shows nothing itself, and of a call of a macro its texts are shown.
     """
     title = find_group(r"(?:title|caption)=\"([^\"]*)\"", whole)
-    if number := re.fullmatch(r"\{\{(?:eq|t)?ref:[ ]*([^{}\s]+)[ ]*\}\}", whole):
-        if address := context.resolve_formula(number[1]):
-            return write_link("", address)
-        if address := context.resolve_anchor(to_anchor(number[1])):
-            return write_link(title_of_file(number[1].rpartition(":")[2]), address)
+    number = find_group(r"\A\{\{eqref:[ ]*([^{}\s]+)[ ]*\}\}\Z", whole)
+    if number and (address := context.resolve_formula(number)):
+        return write_link("", address)
     name, *arguments = whole.strip("{}<> %").split() or [""]
     address = "".join(arguments[:1])
     if name in ("tab", "code") and title:
@@ -215,6 +215,13 @@ def draw_emoji(name: str, context: LessonContext) -> str:
     return name
 
 
+def write_icon(icon: re.Match[str]) -> str:
+    """Return the name of an icon that is alone in a cell or link, where it says something."""
+    before, after = icon.string[: icon.start()], icon.string[icon.end() :]
+    is_alone = re.search(r"[|\[][ \t]*$", before) and re.match(r"[ \t]*[|\]]", after)
+    return f"{title_of_file(icon['sign']).lower()} " if is_alone else ""
+
+
 def convert_wiki_link(whole: str, page: str, part: str, words: str, context: LessonContext) -> str:
     """Return a link or picture of Obsidian; as it is where the folder has no such file."""
     if whole[0] == "!" and (address := page and context.resolve_picture(page)):
@@ -244,6 +251,8 @@ def convert_tag(tag: str, context: LessonContext) -> str:
 
     A class names a look that its tool gives; here it could be that of another thing.
     """
+    if re.match(r"<img\b[^<>]*\sclass=[\"'][^\"'<>]*\b(?:only-dark|dark-only)\b", tag):
+        return ""  # a page makes its pictures dark itself
     tag = _LOOK.sub("", tag)
     name = tag[1:].split()[0]
     if name[0].isupper() and not name.isupper():  # no element of HTML
@@ -256,6 +265,9 @@ def convert_tag(tag: str, context: LessonContext) -> str:
         words = title or words_of_link(address, attribute[3])
         context.leave("tag of HTML", f"a frame that shows `{attribute[3]}`; it is a link now")
         return f'<a href="{address}">{words}</a>' if address else words
+    if attribute and re.match("<a[ ]", tag, re.IGNORECASE) and attribute[3].startswith("data:"):
+        context.leave("link", f"a link to `{shorten_value(attribute[3])}`, data in the text")
+        return tag[: attribute.start()].rstrip() + tag[attribute.end() + 1 :]
     if attribute is None or re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
         return tag
     address = attribute[3].removeprefix("attachment:")

@@ -22,17 +22,21 @@ from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.displays import read_macros
 from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
-_MARK = re.compile(r" {0,3}(:{3,}|/{3,})[ \t]*(.*?)[ \t]*\n?")
+_MARK = re.compile(r"(:{3,}|/{3,})[ \t]*(.*?)[ \t]*")
 _TITLED = re.compile(
-    r" {0,3}(?:===[!+]?[ \t]+([\"'])(?P<tab>.*)\1"
-    r"|(?P<mark>!!!|\?{3}\+?)[ \t]*(?P<head>[\w\"][^\n]*?))[ \t]*\n?"
+    r"(?:===[!+]?[ \t]+([\"'])(?P<tab>.*)\1"
+    r"|(?P<mark>!!!|\?{3}\+?|:::(?=[ \t]+[A-Za-z_]\w*(?:\.\w+)+[ \t]*\Z))"
+    r"[ \t]*(?P<head>[\w\"].*?))[ \t]*"
 )
+"""A tab, an admonition, or what `mkdocstrings` makes of the code of an object."""
 _CELL = re.compile(r"\{code-cell\}(?:[ \t]+i?python3?\b.*)?|\{(?:python|ipython3?)[^}]*\}")
 _FRONT_MATTER = re.compile(
     r"(?:[ \t]*\n)*---[ \t]*\n(?P<yaml>.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
     r"|\+\+\+[ \t]*\n(?P<toml>.*?\n)?\+\+\+[ \t]*(?:\n|\Z)",
     re.DOTALL,
 )
+_PLAIN_FIELDS = re.compile(r"(?:[\w-]+:.*\n|[ \t]+.*\n|-[ ].*\n|\n)*")
+"""Front matter that other tools read line by line: a value may hold a colon."""
 _TITLE = re.compile(
     r"^[ ]?#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?"
     r"(?:[ \t]*\{(?:[^{}]*#(?P<label>[\w-]+))?[^{}]*\})?[ \t]*$"
@@ -174,12 +178,23 @@ _HINT = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 """A callout of GitBook."""
+_ALERT = re.compile(
+    r"^<div\b[^<>]*\bclass=[\"'][^\"'<>]*\balert-(?!block\b)(?P<kind>\w+)[^<>]*>"
+    r"(?P<text>(?:(?!<div\b).)*?)</div>[ \t]*$",
+    re.MULTILINE | re.DOTALL | re.IGNORECASE,
+)
+"""A callout of Jupyter, as its style sheet has it."""
 _HIGHLIGHT = re.compile(
     r"^\{[%{][<%-]?[ ]*(?:(highlight)[ ]+|(\w+)[ ]+lang=\"?)(\w+)[^\n]*\n(.*?)\n"
     r"\{[%{][<%-]?[ ]*(?:end|/)(?:\1|\2)\b[^\n]*$",
     re.MULTILINE | re.DOTALL,
 )
 """A block of code of Jekyll or Hugo, whose own shortcodes say so by `lang`."""
+
+
+def _write_alert(alert: re.Match[str]) -> str:
+    kind = {"success": "tip", "warning": "warning", "danger": "danger"}.get(alert["kind"], "note")
+    return f"::::::{kind}\n{textwrap.dedent(alert['text']).strip()}\n::::::"
 
 
 def _join_gates(gates: re.Match[str]) -> str:
@@ -203,6 +218,8 @@ def read_front_matter(text: str) -> tuple[Mapping[str, Any], int]:
         return {}, 0
     is_yaml = match["toml"] is None
     value = read_yaml(match["yaml"] or "{}") if is_yaml else read_toml(match["toml"])
+    if value is None and is_yaml and _PLAIN_FIELDS.fullmatch(match["yaml"]):
+        value = dict(re.findall(r"^([\w-]+):[ \t]*(\S.*)$", match["yaml"], re.MULTILINE))
     return (value, match.end()) if isinstance(value, dict) else ({}, 0)
 
 
@@ -213,7 +230,7 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
     block.
     """
     text = _HINT.sub(r"::::::\1\n\2\n::::::", _GATES.sub(_join_gates, text))
-    text = _HIGHLIGHT.sub(r"```\3\n\4\n```", text)
+    text = _HIGHLIGHT.sub(r"```\3\n\4\n```", _ALERT.sub(_write_alert, text))
     lines = text.split("\n")
     at = 0
     for (start, end), mark, head, content in (*_find_blocks(text), ([len(lines)] * 2, "", "", "")):
@@ -226,7 +243,8 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
         if mark:
             if mark[0] in "!?=":
                 content = textwrap.dedent("\n".join(lines[start + 1 : end])).strip("\n")
-            indent = lines[start][: len(lines[start]) - len(lines[start].lstrip())]
+            lead = _LEAD.match(lines[start])
+            indent = lead[0] if lead is not None else ""
             is_cell = _CELL.fullmatch(head) and mark[0] != ":" and not indent
             yield Segment(
                 kind="cell" if is_cell else "block",
@@ -256,7 +274,7 @@ def _find_blocks(text: str) -> Iterator[tuple[list[int], str, str, str]]:
                 texts = (_QUOTE.sub("", line) for line in lines[slice(*quotation)])
                 yield quotation, ">", "", "\n".join(texts)
         elif token.level == 0 or (
-            not is_plain and lines[token.map[0]].lstrip().startswith(token.markup)
+            not is_plain and _LEAD.sub("", lines[token.map[0]]).startswith(token.markup)
         ):
             yield token.map, token.markup, head, token.content
 
@@ -268,7 +286,7 @@ def _parse_marked(state: StateBlock, start: int, end: int, silent: bool) -> bool
     """
 
     def match_mark(number: int) -> re.Match[str] | None:
-        return _MARK.fullmatch(state.getLines(number, number + 1, state.blkIndent, False))
+        return _MARK.fullmatch(_line_at(state, number))
 
     opening = match_mark(start)
     if opening is None or not re.match(r"." if opening[1][0] == ":" else r"[A-Za-z]", opening[2]):
@@ -276,7 +294,7 @@ def _parse_marked(state: StateBlock, start: int, end: int, silent: bool) -> bool
     depth, last, fence = 1, start, ""
     while depth and last + 1 < end:
         last += 1
-        line = state.getLines(last, last + 1, state.blkIndent, False).strip()
+        line = _line_at(state, last)
         if edge := re.match("`{3,}(?=[^`]*$)|~{3,}", line):  # marks within code are its text
             fence = edge[0] if not fence else fence * (not line.startswith(fence))
         if fence:
@@ -299,7 +317,7 @@ def _parse_marked(state: StateBlock, start: int, end: int, silent: bool) -> bool
 
 def _parse_titled(state: StateBlock, start: int, end: int, silent: bool) -> bool:
     """Parse a tab or an admonition of MkDocs: a title, and indented lines."""
-    title = _TITLED.fullmatch(state.getLines(start, start + 1, state.blkIndent, False))
+    title = _TITLED.fullmatch(_line_at(state, start))
     if title is None:
         return False
     if not silent:
@@ -317,10 +335,19 @@ def _parse_titled(state: StateBlock, start: int, end: int, silent: bool) -> bool
     return True
 
 
+def _line_at(state: StateBlock, number: int) -> str:
+    """Return a line without what stands before it for the blocks around; empty for code."""
+    is_code = state.sCount[number] - state.blkIndent > 3
+    start = state.bMarks[number] + state.tShift[number]
+    return "" if is_code else state.src[start : state.eMarks[number]]
+
+
 _QUOTE = re.compile(r"^ {0,3}> ?")
+_LEAD = re.compile(r"[ \t]*(?:(?:[-+*]|\d+[.)])[ \t]+)*")
+"""What stands before a block in a list; the mark of its item, where this begins with it."""
 _BLOCKS = ("fence", "marked", "titled")
 _PARSER = MarkdownIt("commonmark").use(footnote_plugin).disable("footnote_tail")  # in its order
-for _name, _parse in (("marked", _parse_marked), ("titled", _parse_titled)):
+for _name, _parse in (("titled", _parse_titled), ("marked", _parse_marked)):
     _PARSER.block.ruler.before("fence", _name, _parse, {"alt": ["paragraph", "list", "blockquote"]})
 
 
@@ -333,6 +360,7 @@ def _read_cells(
     """Return cells as segments, and the pictures that are attached to them, by name."""
     segments: list[Segment] = []
     attachments: dict[str, bytes] = {}
+    is_run = any(cell.get("outputs") for cell in cells)
     for number, cell in enumerate(cells, 1):
         place, source = f"cell {number}", join_lines(cell.get("source", ""))
         if cell.get("cell_type") == "markdown":
@@ -360,7 +388,7 @@ def _read_cells(
                 place=place,
                 text=source,
                 head=tags if is_python else f"{{{language}}}",
-                shows_value=bool(values),
+                shows_value=bool(values) if is_run else None,
                 printed="".join(join_lines(stream.get("text") or "") for stream in streams),
                 value="\n".join(map(join_lines, value_texts)),
                 picture=_recorded_picture(outputs) if outputs else None,

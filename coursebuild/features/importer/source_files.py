@@ -40,10 +40,10 @@ class Segment(Struct, frozen=True, kw_only=True):
     mark: str = "```"
     """The opening mark: backticks, tildes, colons, `!!!`, `===` or `>`."""
     indent: str = ""
-    """What stands before each line of a block in a list."""
+    """What stands before a block in a list; in its further lines, as many blanks."""
     shows_value: bool | None = None
-    """Of a cell: whether the value of its last expression was shown; `None` where no output is
-    recorded."""
+    """Of a cell: whether the value of its last expression was shown; `None` where no output of any
+    cell is recorded."""
     printed: str = ""
     """Of a cell: what it printed, as recorded."""
     value: str = ""
@@ -294,14 +294,6 @@ class SourceFiles:
         marks = value_at(self.settings("book.toml"), "output", "html", "code", "hidelines")
         own_marks = marks if isinstance(marks, dict) else {}
         return {**own_marks, "rust": "#"} if "book.toml" in self else {}
-
-    @cached_property
-    def macro_marks(self) -> Sequence[tuple[str, str]]:
-        """The marks that stand for braces, as settings of MkDocs name them, each with these."""
-        names = {"variable_start": "{{", "variable_end": "}}"}
-        names |= {"block_start": "{%", "block_end": "%}"}
-        pattern = rf"\bj2_({'|'.join(names)})_string:[ \t]*[\"']?([^\s\"']+)"
-        return [(mark, names[name]) for name, mark in re.findall(pattern, self.mkdocs)]
 
     def has_signs(self, path: str) -> bool:
         """Whether the tool of a text draws hyphens in a row as a dash."""

@@ -112,7 +112,7 @@ def test_a_cell_that_fails_costs_only_those_that_need_it(folder: Path) -> None:
     assert "*Not run here:* `NameError: name 'missing' is not defined`" in text
     assert "print(height)\n```\n\n```output\n3\n```" in text
     assert lesson(folder / "new", "1.2-b").startswith(
-        "```python\n1 / 0\n```\n\n*Not run here:* `Zero"
+        "```python\nprint(1 / 0)\n```\n\n*Not run here:* `Zero"
     )
     assert lesson(folder / "new", "1.3-c").startswith(
         f"```python file=examples/l1_3_c.py requires={ABSENT}\n"

@@ -1,0 +1,46 @@
+"""reStructuredText within a text of MyST, as MyST."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+
+from coursebuild.api import marks
+from coursebuild.features.importer.source_files import find_group
+
+_DIRECTIVE = re.compile(
+    r"^\.\.[ ]+(?P<name>[\w:-]+)::[ ]*(?P<argument>.*)\n?(?P<body>(?:[ \t]*\n|[ ]+\S.*\n?)*)"
+    r"|^\.\.[ ]+_(?P<label>[\w .-]+):[ \t]*$"
+    r"|^\.\.(?:[ ].*)?\n(?:[ \t]*\n|[ ]+\S.*\n?)*",
+    re.MULTILINE,
+)
+"""A directive, a label, or a comment."""
+_INLINE = re.compile(
+    r"(?P<code>``.+?``)|:(?P<role>[A-Za-z][\w:+.-]*):`(?P<body>[^`]+)`"
+    r"|`(?P<words>[^`<>]*\S)\s*<(?P<address>[^`<>]+)>`__?"
+)
+
+
+def read_rst(text: str) -> str:
+    """Return reStructuredText in Markdown of MyST: its directives, roles, links and labels."""
+    parts, at = [], 0
+    for block in _DIRECTIVE.finditer(text := f"{text}\n"):
+        parts += [_INLINE.sub(_write_inline, text[at : block.start()]), _write_block(block)]
+        at = block.end()
+    return "".join((*parts, _INLINE.sub(_write_inline, text[at:])))
+
+
+def _write_block(block: re.Match[str]) -> str:
+    if block["name"] is None:
+        return f"({block['label']})=" if block["label"] else ""
+    body = textwrap.dedent(block["body"]).strip("\n")
+    if not re.search("code|math|raw", block["name"]):
+        options = find_group(r"\A((?::[\w-]+:.*\n?)*)", body)
+        body = options + read_rst(body[len(options) :])
+    return marks.fence(f"{{{block['name']}}} {block['argument']}".rstrip(), body) + "\n\n"
+
+
+def _write_inline(match: re.Match[str]) -> str:
+    if match["role"]:
+        return f"{{{match['role']}}}`{match['body']}`"
+    return match["code"] or f"[{match['words']}]({match['address']})"
