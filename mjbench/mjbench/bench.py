@@ -113,6 +113,11 @@ class Subject(Struct, frozen=True):
         return str(Path(self.folder, self.path))
 
     @property
+    def data(self) -> bytes:
+        """The text of the model as its file has it."""
+        return self.mjcf.encode("utf-8", "surrogateescape")
+
+    @property
     def is_binary(self) -> bool:
         """Whether it is a compiled model, which has no source."""
         return self.path.endswith(".mjb")
@@ -122,7 +127,7 @@ class Subject(Struct, frozen=True):
         path = self.file
         if self.is_binary:
             return mujoco.MjModel.from_binary_path(path)
-        return mujoco.MjModel.from_xml_path(path, assets={path: self.mjcf.encode()})
+        return mujoco.MjModel.from_xml_path(path, assets={path: self.data})
 
     def read_spec(self) -> Any:
         """Its `MjSpec`; `None` where it has no source."""
@@ -313,7 +318,7 @@ def report_errors(
         raise CannotMeasureError(error.message, place, error.help, "scenario") from None
     except LoopError as error:
         raise CannotMeasureError(str(error), subject.place) from None
-    except (mujoco.FatalError, *errors) as error:
+    except (mujoco.FatalError, UnicodeDecodeError, *errors) as error:
         message = f"{failure.format(subject.name)}: {' '.join(str(error).split())}"
         raise CannotMeasureError(message, subject.place) from None
 
@@ -356,7 +361,7 @@ def _card(compiled_model: CompiledModel, host: Host) -> SceneCard:
     return SceneCard(
         possible=len(possible_pairs(model)),
         touched=len(touching_pairs),
-        mjcf=len(subject.mjcf.encode()) + subject.parts,
+        mjcf=len(subject.data) + subject.parts,
         mjb=int(mujoco.mj_sizeModel(model)),
         browser=host.browser_speed(key, first.duration),
     )
@@ -389,7 +394,7 @@ def read_subject(file: Path) -> Subject:
         name=file.stem,
         digest=digest.hexdigest(),
         declarations_path=declarations.name if declarations.is_file() else "",
-        declarations=declarations.read_text("utf-8") if declarations.is_file() else "",
+        declarations=declarations.read_text("utf-8", "replace") if declarations.is_file() else "",
         exact=exact.name if exact.is_file() else "",
         parts=parts,
         fair=True,
@@ -406,7 +411,7 @@ def _source(file: Path, data: bytes) -> str:
         message = f"{file} takes files from the package `{match[1]}`, and no folder of that name"
         raise UsageError(f"{message} lies beside it or above it: put the package there")
 
-    text = data.decode("utf-8", "surrogatepass")
+    text = data.decode("utf-8", "surrogateescape")  # MuJoCo reads comments in any encoding
     return re.sub(r"package://([^/\s\"'<>]+)/", folder, text) if file.suffix == ".urdf" else text
 
 

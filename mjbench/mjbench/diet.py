@@ -102,7 +102,7 @@ def look_at(
                 files[path] = None
         return files[path]
 
-    files[subject.path] = subject.mjcf.encode("utf-8", "surrogatepass")
+    files[subject.path] = subject.data
     text = _open_text(subject, read)
     all_readers = [reader for source in readers for reader in _read(source, modules)]
     all_readers += _declared_readers(declarations)
