@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjbench.declarations import MOST_STEPS, Declarations, DeclaredScenario, Place
+from mjbench.declarations import DURATION, MOST_STEPS, Declarations, DeclaredScenario, Place
 from mjbench.loop import Loop, close_loop, step, time_left
 from mjbench.problem import Array
 from mjbench.simulation import advance, without_sleep
@@ -148,10 +148,14 @@ def _commands(model: Any, middle: Array, seed: int, angles: Array) -> Array:
 
 def _velocities_at_rest(model: Any, data: Any, loop: Loop | None) -> tuple[float, ...]:
     """Random velocities where nothing would move from a state, under a controller; else none."""
-    if loop is not None:
+    steps = _HOLD
+    if loop is not None:  # its first commands may act late
         close_loop(loop, model, data)
-        step(model, data, _HOLD)
-    mujoco.mj_forward(model, data)
-    if not max(np.abs(data.qvel).max(), np.abs(data.qacc).max()) < _STILL:
-        return ()
+        steps = min(round(DURATION / float(model.opt.timestep)), MOST_STEPS)
+    for _ in range(0, steps, _HOLD):
+        if loop is not None:
+            step(model, data, _HOLD)
+        mujoco.mj_forward(model, data)
+        if not max(np.abs(data.qvel).max(), np.abs(data.qacc).max()) < _STILL:
+            return ()
     return tuple(np.random.default_rng(SEEDS[0]).uniform(-1, 1, int(model.nv)).tolist())

@@ -76,9 +76,9 @@ def test_what_would_not_move_gets_velocities_and_what_cannot_has_no_scenario() -
     still_arm = mujoco.MjModel.from_xml_string(
         weightless.replace("</mujoco>", f"{MOTORS}</mujoco>")
     )
-    for command, is_moving in ((0.0, False), (1.0, True)):
+    for command, delay, is_moving in ((0.0, 0.0, False), (1.0, 0.0, True), (1.0, 0.5, True)):
         code = compile(f"def control(m, d): return [{command}, 0]", "hold.py", "exec")
-        loop = Loop("hold.py", code, 0.02)
+        loop = Loop("hold.py", code, 0.02, delay)
         (scenario,) = fair_declarations(still_arm, "arm.xml", quick=True, loop=loop).scenarios
         assert scenario.name == "loop" and scenario.title is not None
         assert ", under the controller hold.py" in scenario.title
