@@ -220,7 +220,7 @@ def _measure_variant(
     try:
         run = simulate(Setup(scenario=scene.scenario), model)
     except mujoco.FatalError as error:
-        return replace(row, status="diverged", reasons=(f"MuJoCo does not run it: {error}",))
+        return replace(row, status="refused", reasons=(str(error),))
     judgement = run.judgement
     row = replace(row, status=judgement.status.value, reasons=judgement.reasons)
     if not judgement.ok:
