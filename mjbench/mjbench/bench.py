@@ -30,7 +30,7 @@ from mjbench.declarations import (
     parse_declarations,
 )
 from mjbench.derive import derive_seeds, derive_sweep
-from mjbench.fair import fair_declarations
+from mjbench.fair import fair_scenarios
 from mjbench.host import Host
 from mjbench.loop import Loop, LoopError, program_output
 from mjbench.machine import one_processor, this_machine
@@ -89,12 +89,17 @@ class Subject(Struct, frozen=True):
     parts: int = 0
     """The size of the files that the model pulls in, bytes."""
     fair: bool = False
-    """Whether fair scenarios are made for a model without declarations; else keyframes are."""
+    """Whether fair scenarios are made for a model without declared ones; else keyframes are."""
 
     @property
     def place(self) -> Place:
         """The model's file."""
         return Place(self.path)
+
+    @property
+    def is_fair(self) -> bool:
+        """Whether its scenarios are fair ones, since nobody declares any."""
+        return self.fair and not self.read_declarations().scenarios
 
     def read_declarations(self) -> Declarations:
         """The declarations; a `CannotMeasureError` where they cannot be read."""
@@ -149,11 +154,6 @@ class CompiledModel(Struct, frozen=True):
     spec: Any
     """Its `mjSpec`, from which it can be compiled with other parameters; `None` without source."""
 
-    @property
-    def is_fair(self) -> bool:
-        """Whether its scenarios are fair ones, which nobody declared."""
-        return self.subject.fair and not self.subject.declarations_path
-
 
 def compile_subject(
     subject: Subject, host: Host, *, quick: bool, loop: Loop | None = None, task: str = ""
@@ -171,9 +171,10 @@ def compile_subject(
             raise SceneError(
                 f"its timestep is {model.opt.timestep:g} s, and time goes forward", subject.place
             )
-        if subject.fair and not subject.declarations_path:
-            declarations = fair_declarations(model, subject.path, quick=quick, loop=loop)
-        elif loop is not None:
+        if subject.is_fair:
+            scenarios = fair_scenarios(model, subject.path, quick=quick, loop=loop)
+            declarations = replace(declarations, scenarios=scenarios)
+        if loop is not None:
             declarations = _under_control(declarations)
         if task:
             declarations = _with_task(model, declarations, task, loop)
@@ -287,7 +288,7 @@ def join_parts(
 
     `failures`: what was not measured.
     """
-    if compiled_model.is_fair:
+    if compiled_model.subject.is_fair:
         scenarios = derive_seeds(scenarios)
     report = SceneReport(
         model=compiled_model.subject.name,

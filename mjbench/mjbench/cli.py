@@ -247,7 +247,7 @@ def _measure_scene(
     left = len(compiled_model.scenarios) + len(declared_sweeps)
     for number, scene in enumerate(compiled_model.scenarios):
         # Another seed asks the same again; what an author declares asks something else.
-        share = 1.0 if compiled_model.is_fair else 1 / (left - number)
+        share = 1.0 if compiled_model.subject.is_fair else 1 / (left - number)
         parts.run(f"the scenario {scene.name}", partial(scenario, number), None, share=share)
     for number, sweep in enumerate(declared_sweeps):
         run = partial(bench.run_sweep, compiled_model, sweep.name, host, quick=quick, timed=timed)

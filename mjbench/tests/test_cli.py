@@ -88,10 +88,13 @@ def test_what_a_model_does_not_need_is_taken_out_and_its_interface_stays(
         "sensor-unread": ("interface", ""),
     }
     assert main(["show", record]) == 0 and "kept: for the plot" in capsys.readouterr().out
-    model.with_suffix(".toml").write_text(SWING + keep.replace("energy-flag", "unused-mesh"))
+    motor = '<actuator><motor joint="pivot"/></actuator></mujoco>'
+    model.write_text(ENERGY.replace("</mujoco>", motor))
+    model.with_suffix(".toml").write_text(keep.replace("energy-flag", "unused-mesh"))
     assert main(["diet", str(model), "--quick"]) == 1
     out = capsys.readouterr().out
-    assert "`unused-mesh` no longer keeps anything: remove the entry (arm.toml:7:12)" in out
+    assert "`unused-mesh` no longer keeps anything: remove the entry (arm.toml:2:12)" in out
+    assert out.startswith("arm  (quick: short runs and rough times)\n  in seed-1, seed-2\n")
 
 
 URDF = """\
