@@ -380,14 +380,13 @@ def read_subject(file: Path) -> Subject:
         return _subject_of_python(file)
     folder, data = file.parent.resolve(), file.read_bytes()
     declarations, exact = file.with_suffix(".toml"), file.with_suffix(".exact.py")
-    digest, parts = hashlib.sha256(data), 0
+    digest = hashlib.sha256(data)
     for file_beside in (declarations, exact):
         if file_beside.is_file():
             digest.update(file_beside.read_bytes())
     for part in _dependencies(folder / file.name) if file.suffix == ".xml" else ():
         if part.exists() and not part.samefile(file):
             digest.update(part.read_bytes())
-            parts += part.stat().st_size
     return Subject(
         folder=str(folder),
         path=file.name,
@@ -397,7 +396,6 @@ def read_subject(file: Path) -> Subject:
         declarations_path=declarations.name if declarations.is_file() else "",
         declarations=declarations.read_text("utf-8", "replace") if declarations.is_file() else "",
         exact=exact.name if exact.is_file() else "",
-        parts=parts,
         fair=True,
     )
 

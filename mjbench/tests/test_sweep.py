@@ -149,8 +149,8 @@ def test_a_number_alone_is_the_first_of_several() -> None:
     toml = TOML.replace("0.4", "0.02")
     rows = run_sweep(vary, BALL.replace('name="rail"', 'name="rail" damping="0.5"'), toml=toml).rows
     assert [row.own for row in rows] == [True, False, False] and rows[1].change
-    (drawn, *_) = draw_models('draw = { "joint.damping" = [1, 2] }')
-    assert drawn.model.dof_damping[0] >= 1 and not drawn.model.dof_dampingpoly.any()
+    model = draw_models('draw = { "joint.damping" = [1, 2] }')[0].model
+    assert model.dof_damping[0] >= 1 and not model.dof_dampingpoly.any()
 
 
 def test_what_begins_inside_something_goes_through_nothing() -> None:
