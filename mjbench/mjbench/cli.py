@@ -146,9 +146,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_report_options(command: argparse.ArgumentParser, *, check: bool = True) -> None:
-    command.add_argument("--format", choices=("text", "json"), default="text")
-    help = "the same as --format json"
-    command.add_argument("--json", dest="format", action="store_const", const="json", help=help)
+    command.add_argument("--json", action="store_true", help="print the report as JSON")
     command.add_argument("--record", type=Path, metavar="FILE", help="write the report to a file")
     if check:
         help = "compare with a recorded report; times are never compared"
@@ -379,7 +377,7 @@ def _print(
     """Print a report, which is `data` as a file, and write that file if asked and `record`."""
     if sys.stderr.isatty():
         print("\r\x1b[K", end="", file=sys.stderr)
-    sys.stdout.write(data.decode() if arguments.format == "json" else words)
+    sys.stdout.write(data.decode() if arguments.json else words)
     for remark in remarks:
         print(remark, file=sys.stderr)
     if arguments.record is not None and record:
