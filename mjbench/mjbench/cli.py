@@ -58,13 +58,13 @@ _STOPPED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 where all holds, 1 where something is to be done, 2 for a mistake in it."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if words and words[0] not in _COMMANDS and not words[0].startswith("-"):
+    if words and words[0] not in (*_COMMANDS, "-h", "--help", "--version"):
         words.insert(0, "bench")
     namespace = _parser().parse_args(words)
     try:
         status: int = namespace.run(namespace)
     except (KeyboardInterrupt, TimeLimitError):
-        print("mjbench: stopped before anything was known", file=sys.stderr)
+        print("mjbench: stopped before there was a report", file=sys.stderr)
         return _STOPPED
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
@@ -321,8 +321,8 @@ def _diet(arguments: argparse.Namespace) -> int:
     modules = frozenset(file.stem for file in arguments.code if file.suffix == ".py")
     while True:
         subject = read_subject(arguments.model)
-        if subject.is_binary:
-            raise UsageError("the diet edits the source of a model, and this one has none")
+        if subject.path.endswith((".mjb", ".urdf")):
+            raise UsageError(f"the diet edits MJCF, and {arguments.model} is none")
         keeps = tuple(_keeps(subject))
         result = diet.look_at(
             _host(subject),

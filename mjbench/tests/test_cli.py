@@ -47,7 +47,8 @@ def test_a_model_is_measured_recorded_and_checked(model: Path, capsys: Capture) 
         assert text in out, text
     assert main(["bench", str(model), "--check", record]) == 0
     assert capsys.readouterr().out == "as recorded\n"
-    model.write_text(ARM.replace(".3 0 0", ".4 0 0"))
+    other = ARM.replace('pos=".3 0 0"/>', 'pos=".4 0 0"/><!-- länger -->')
+    model.write_bytes(other.encode("latin-1"))
     assert main(["bench", str(model), "--check", record]) == 1
     assert "± 5 %" in capsys.readouterr().out
 
@@ -117,6 +118,8 @@ def test_a_package_of_urdf_is_the_folder_of_its_name(tmp_path: Path, capsys: Cap
     subject = read_subject(file)
     compiled_model = compile_subject(subject, LocalHost(tmp_path, lambda _: None), quick=True)
     assert compiled_model.model.nmesh == compiled_model.spec.compile().nmesh == 1
+    assert main(["diet", str(file)]) == 2
+    assert f"the diet edits MJCF, and {file} is none" in capsys.readouterr().err
     file.write_text(URDF.replace("kit", "kat"), "utf-8")
     assert main([str(file)]) == 2
     assert "from the package `kat`, and no folder of that name lies" in capsys.readouterr().err
@@ -125,7 +128,7 @@ def test_a_package_of_urdf_is_the_folder_of_its_name(tmp_path: Path, capsys: Cap
 @pytest.mark.parametrize(
     ("arguments", "toml", "status", "message"),
     [
-        (["{}.txt"], "", 2, "there is no file "),
+        (["--quick", "{}.txt"], "", 2, "there is no file "),
         (["{}", "--quick", "--record", "a"], "", 2, "--quick measures only a part"),
         (["{}", "--engines", "mjocuo"], "", 2, "there is no engine `mjocuo`: known are mujoco, "),
         (["diet", "{}", "--only", "x"], "", 1, "arm.xml: no finding is of the kind `x`"),
