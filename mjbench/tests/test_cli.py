@@ -47,8 +47,8 @@ def test_a_model_is_measured_recorded_and_checked(model: Path, capsys: Capture) 
         assert text in out, text
     assert main(["bench", str(model), "--check", record]) == 0
     assert capsys.readouterr().out == "as recorded\n"
-    other = ARM.replace('pos=".3 0 0"/>', 'pos=".4 0 0"/><!-- länger -->')
-    model.write_bytes(other.encode("latin-1"))
+    longer_arm = ARM.replace('pos=".3 0 0"/>', 'pos=".4 0 0"/><!-- länger -->')
+    model.write_bytes(longer_arm.encode("latin-1"))
     assert main(["bench", str(model), "--check", record]) == 1
     assert "± 5 %" in capsys.readouterr().out
 
