@@ -30,7 +30,7 @@ from mjbench.declarations import (
     parse_declarations,
 )
 from mjbench.derive import derive_seeds, derive_sweep
-from mjbench.fair import fair_declarations
+from mjbench.fair import fair_scenarios
 from mjbench.host import Host
 from mjbench.loop import Loop, LoopError, program_output
 from mjbench.machine import one_processor, this_machine
@@ -89,12 +89,17 @@ class Subject(Struct, frozen=True):
     parts: int = 0
     """The size of the files that the model pulls in, bytes."""
     fair: bool = False
-    """Whether fair scenarios are made for a model without declarations; else keyframes are."""
+    """Whether fair scenarios are made for a model without declared ones; else keyframes are."""
 
     @property
     def place(self) -> Place:
         """The model's file."""
         return Place(self.path)
+
+    @property
+    def is_fair(self) -> bool:
+        """Whether its scenarios are fair ones, since nobody declares any."""
+        return self.fair and not self.read_declarations().scenarios
 
     def read_declarations(self) -> Declarations:
         """The declarations; a `CannotMeasureError` where they cannot be read."""
@@ -113,6 +118,11 @@ class Subject(Struct, frozen=True):
         return str(Path(self.folder, self.path))
 
     @property
+    def data(self) -> bytes:
+        """The text of the model as its file has it."""
+        return self.mjcf.encode("utf-8", "surrogateescape")
+
+    @property
     def is_binary(self) -> bool:
         """Whether it is a compiled model, which has no source."""
         return self.path.endswith(".mjb")
@@ -122,7 +132,7 @@ class Subject(Struct, frozen=True):
         path = self.file
         if self.is_binary:
             return mujoco.MjModel.from_binary_path(path)
-        return mujoco.MjModel.from_xml_path(path, assets={path: self.mjcf.encode()})
+        return mujoco.MjModel.from_xml_path(path, assets={path: self.data})
 
     def read_spec(self) -> Any:
         """Its `MjSpec`; `None` where it has no source."""
@@ -144,11 +154,6 @@ class CompiledModel(Struct, frozen=True):
     spec: Any
     """Its `mjSpec`, from which it can be compiled with other parameters; `None` without source."""
 
-    @property
-    def is_fair(self) -> bool:
-        """Whether its scenarios are fair ones, which nobody declared."""
-        return self.subject.fair and not self.subject.declarations_path
-
 
 def compile_subject(
     subject: Subject, host: Host, *, quick: bool, loop: Loop | None = None, task: str = ""
@@ -166,9 +171,10 @@ def compile_subject(
             raise SceneError(
                 f"its timestep is {model.opt.timestep:g} s, and time goes forward", subject.place
             )
-        if subject.fair and not subject.declarations_path:
-            declarations = fair_declarations(model, subject.path, quick=quick, loop=loop)
-        elif loop is not None:
+        if subject.is_fair:
+            scenarios = fair_scenarios(model, subject.path, quick=quick, loop=loop)
+            declarations = replace(declarations, scenarios=scenarios)
+        if loop is not None:
             declarations = _under_control(declarations)
         if task:
             declarations = _with_task(model, declarations, task, loop)
@@ -282,7 +288,7 @@ def join_parts(
 
     `failures`: what was not measured.
     """
-    if compiled_model.is_fair:
+    if compiled_model.subject.is_fair:
         scenarios = derive_seeds(scenarios)
     report = SceneReport(
         model=compiled_model.subject.name,
@@ -313,7 +319,7 @@ def report_errors(
         raise CannotMeasureError(error.message, place, error.help, "scenario") from None
     except LoopError as error:
         raise CannotMeasureError(str(error), subject.place) from None
-    except (mujoco.FatalError, *errors) as error:
+    except (mujoco.FatalError, UnicodeDecodeError, *errors) as error:
         message = f"{failure.format(subject.name)}: {' '.join(str(error).split())}"
         raise CannotMeasureError(message, subject.place) from None
 
@@ -356,7 +362,7 @@ def _card(compiled_model: CompiledModel, host: Host) -> SceneCard:
     return SceneCard(
         possible=len(possible_pairs(model)),
         touched=len(touching_pairs),
-        mjcf=len(subject.mjcf.encode()) + subject.parts,
+        mjcf=len(subject.data) + subject.parts,
         mjb=int(mujoco.mj_sizeModel(model)),
         browser=host.browser_speed(key, first.duration),
     )
@@ -374,14 +380,13 @@ def read_subject(file: Path) -> Subject:
         return _subject_of_python(file)
     folder, data = file.parent.resolve(), file.read_bytes()
     declarations, exact = file.with_suffix(".toml"), file.with_suffix(".exact.py")
-    digest, parts = hashlib.sha256(data), 0
+    digest = hashlib.sha256(data)
     for file_beside in (declarations, exact):
         if file_beside.is_file():
             digest.update(file_beside.read_bytes())
     for part in _dependencies(folder / file.name) if file.suffix == ".xml" else ():
         if part.exists() and not part.samefile(file):
             digest.update(part.read_bytes())
-            parts += part.stat().st_size
     return Subject(
         folder=str(folder),
         path=file.name,
@@ -389,9 +394,8 @@ def read_subject(file: Path) -> Subject:
         name=file.stem,
         digest=digest.hexdigest(),
         declarations_path=declarations.name if declarations.is_file() else "",
-        declarations=declarations.read_text("utf-8") if declarations.is_file() else "",
+        declarations=declarations.read_text("utf-8", "replace") if declarations.is_file() else "",
         exact=exact.name if exact.is_file() else "",
-        parts=parts,
         fair=True,
     )
 
@@ -406,7 +410,7 @@ def _source(file: Path, data: bytes) -> str:
         message = f"{file} takes files from the package `{match[1]}`, and no folder of that name"
         raise UsageError(f"{message} lies beside it or above it: put the package there")
 
-    text = data.decode("utf-8", "surrogatepass")
+    text = data.decode("utf-8", "surrogateescape")  # MuJoCo reads comments in any encoding
     return re.sub(r"package://([^/\s\"'<>]+)/", folder, text) if file.suffix == ".urdf" else text
 
 

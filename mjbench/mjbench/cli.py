@@ -58,13 +58,13 @@ _STOPPED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command; 0 where all holds, 1 where something is to be done, 2 for a mistake in it."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if words and words[0] not in _COMMANDS and not words[0].startswith("-"):
+    if words and words[0] not in (*_COMMANDS, "-h", "--help", "--version"):
         words.insert(0, "bench")
     namespace = _parser().parse_args(words)
     try:
         status: int = namespace.run(namespace)
     except (KeyboardInterrupt, TimeLimitError):
-        print("mjbench: stopped before anything was known", file=sys.stderr)
+        print("mjbench: stopped before there was a report", file=sys.stderr)
         return _STOPPED
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
@@ -146,9 +146,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_report_options(command: argparse.ArgumentParser, *, check: bool = True) -> None:
-    command.add_argument("--format", choices=("text", "json"), default="text")
-    help = "the same as --format json"
-    command.add_argument("--json", dest="format", action="store_const", const="json", help=help)
+    command.add_argument("--json", action="store_true", help="print the report as JSON")
     command.add_argument("--record", type=Path, metavar="FILE", help="write the report to a file")
     if check:
         help = "compare with a recorded report; times are never compared"
@@ -247,7 +245,7 @@ def _measure_scene(
     left = len(compiled_model.scenarios) + len(declared_sweeps)
     for number, scene in enumerate(compiled_model.scenarios):
         # Another seed asks the same again; what an author declares asks something else.
-        share = 1.0 if compiled_model.is_fair else 1 / (left - number)
+        share = 1.0 if compiled_model.subject.is_fair else 1 / (left - number)
         parts.run(f"the scenario {scene.name}", partial(scenario, number), None, share=share)
     for number, sweep in enumerate(declared_sweeps):
         run = partial(bench.run_sweep, compiled_model, sweep.name, host, quick=quick, timed=timed)
@@ -323,8 +321,8 @@ def _diet(arguments: argparse.Namespace) -> int:
     modules = frozenset(file.stem for file in arguments.code if file.suffix == ".py")
     while True:
         subject = read_subject(arguments.model)
-        if subject.is_binary:
-            raise UsageError("the diet edits the source of a model, and this one has none")
+        if subject.path.endswith((".mjb", ".urdf")):
+            raise UsageError(f"the diet edits MJCF, and {arguments.model} is none")
         keeps = tuple(_keeps(subject))
         result = diet.look_at(
             _host(subject),
@@ -379,7 +377,7 @@ def _print(
     """Print a report, which is `data` as a file, and write that file if asked and `record`."""
     if sys.stderr.isatty():
         print("\r\x1b[K", end="", file=sys.stderr)
-    sys.stdout.write(data.decode() if arguments.format == "json" else words)
+    sys.stdout.write(data.decode() if arguments.json else words)
     for remark in remarks:
         print(remark, file=sys.stderr)
     if arguments.record is not None and record:

@@ -49,6 +49,8 @@ class RunStatus(enum.Enum):
     """No warning, but the state left the range of what can be."""
     DIVERGED = "diverged"
     """MuJoCo warned of a huge acceleration, velocity or position, or the state is no number."""
+    REFUSED = "refused"
+    """MuJoCo does not run the model under this setting."""
 
 
 class RunJudgement(Struct, frozen=True):

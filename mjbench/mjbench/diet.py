@@ -19,6 +19,7 @@ from msgspec.structs import replace
 
 from mjbench.bench import CannotMeasureError, Subject, report_errors
 from mjbench.declarations import DeclarationError, Declarations, parse_declarations
+from mjbench.fair import fair_scenarios
 from mjbench.host import Host
 from mjbench.machine import this_machine
 from mjbench.pruning.candidates import KINDS
@@ -102,11 +103,14 @@ def look_at(
                 files[path] = None
         return files[path]
 
-    files[subject.path] = subject.mjcf.encode("utf-8", "surrogatepass")
+    files[subject.path] = subject.data
     text = _open_text(subject, read)
     all_readers = [reader for source in readers for reader in _read(source, modules)]
     all_readers += _declared_readers(declarations)
     with report_errors(subject, _FAILURE, ModelTextError, ValueError):
+        if subject.is_fair:
+            scenarios = fair_scenarios(text.model, subject.path, quick=quick)
+            declarations = replace(declarations, scenarios=scenarios)
         survey = Surveyor(
             model=subject.name,
             digest=subject.digest,

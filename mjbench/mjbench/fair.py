@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mjbench.declarations import MOST_STEPS, Declarations, DeclaredScenario, Place
+from mjbench.declarations import DURATION, MOST_STEPS, DeclaredScenario, Place
 from mjbench.loop import Loop, close_loop, step, time_left
 from mjbench.problem import Array
 from mjbench.simulation import advance, without_sleep
@@ -40,15 +40,15 @@ _STILL = 1e-3
 """The speed, in m/s or rad/s, below which a model has come to rest."""
 
 
-def fair_declarations(
+def fair_scenarios(
     model: Any, path: str, *, quick: bool, loop: Loop | None = None
-) -> Declarations:
+) -> tuple[DeclaredScenario, ...]:
     """The scenarios of a model (`mjModel`) that nobody declared; none if nothing can move.
 
     `loop`: the controller that commands it.
     """
     if not model.nv:
-        return Declarations(path)
+        return ()
     keyframe, words, data = _begin(model)
     seeds = QUICK_SEEDS if quick else SEEDS
     qpos = () if keyframe is not None else tuple(data.qpos.tolist())
@@ -59,8 +59,7 @@ def fair_declarations(
         qvel = _velocities_at_rest(model, data, loop)
         words += ", with random velocities, since else nothing would move" if qvel else ""
         name = "start" if loop is None else "loop"
-        scenario = DeclaredScenario(name, words, keyframe, qpos=qpos, qvel=qvel, table=Place(path))
-        return Declarations(path, (scenario,))
+        return (DeclaredScenario(name, words, keyframe, qpos=qpos, qvel=qvel, table=Place(path)),)
     hold = _HOLD * float(model.opt.timestep)
     slowest = max(_SLOWEST, _FEWEST * hold)
     slowest = min(slowest, _most_steps(model, data, quick=quick) / _PERIODS * hold / _HOLD)
@@ -81,7 +80,7 @@ def fair_declarations(
                 table=Place(path),
             )
         )
-    return Declarations(path, tuple(scenarios))
+    return tuple(scenarios)
 
 
 def _most_steps(model: Any, data: Any, *, quick: bool) -> float:
@@ -148,10 +147,14 @@ def _commands(model: Any, middle: Array, seed: int, angles: Array) -> Array:
 
 def _velocities_at_rest(model: Any, data: Any, loop: Loop | None) -> tuple[float, ...]:
     """Random velocities where nothing would move from a state, under a controller; else none."""
-    if loop is not None:
+    steps = _HOLD
+    if loop is not None:  # its first commands may act late
         close_loop(loop, model, data)
-        step(model, data, _HOLD)
-    mujoco.mj_forward(model, data)
-    if not max(np.abs(data.qvel).max(), np.abs(data.qacc).max()) < _STILL:
-        return ()
+        steps = min(round(DURATION / float(model.opt.timestep)), MOST_STEPS)
+    for _ in range(0, steps, _HOLD):
+        if loop is not None:
+            step(model, data, _HOLD)
+        mujoco.mj_forward(model, data)
+        if not max(np.abs(data.qvel).max(), np.abs(data.qacc).max()) < _STILL:
+            return ()
     return tuple(np.random.default_rng(SEEDS[0]).uniform(-1, 1, int(model.nv)).tolist())

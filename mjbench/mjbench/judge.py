@@ -114,8 +114,7 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
         text = f"nothing can be said of the scene's own setting: {row.lucky}"
         return RowVerdict(None, text + remark)
     if row.dominated_by is None:
-        scope = " that was measured" if report.failures else ""
-        text = f"no other setting{scope} is cheaper without being less accurate"
+        text = "no other setting that was measured is cheaper without being less accurate"
         return RowVerdict(None, (_describe_rival(report) or text) + remark)
     text, is_better = _judge_rival(report, row.dominated_by, starts)
     return RowVerdict(row.dominated_by if is_better else None, text + remark)
@@ -156,16 +155,14 @@ def _judge_rival(report: ScenarioReport, number: int, starts: Starts) -> tuple[s
     if limit := stray_timestep(report, rival):
         reason = f"leaves the motion of small steps at some timesteps beyond {limit}"
         return f"{none}{claim} here, but {rival.setting.integrator} {reason}", False
-    text = f"{rival.name} is better: it {price} and {_gain_text(everywhere, figure)}"
     quantity = quantity_of(report)
     if quantity.name == "seen" and rival.step_error is not None:
         quantity = replace(STEPPED, least=report.least_seen)
-    if not resolved:
-        text += _AS_FAR
-    elif (value := quantity.value_of(rival)) is not None and value <= quantity.least:
-        is_less = " less" in text
-        text += ", or more: the reference resolves no more" if is_less else _AS_FAR
-    return text, True
+    value = quantity.value_of(rival)
+    is_vague = not resolved or (value is not None and value <= quantity.least)
+    gain = _gain_text(everywhere, figure, is_least=is_vague)
+    text = f"{rival.name} is better: it {price} and {gain}"
+    return text + (_AS_FAR if is_vague and " less" not in gain else ""), True
 
 
 _AS_FAR = ", as far as the reference resolves"
@@ -178,14 +175,19 @@ def _gain(starts: Sequence[Mapping[Column, float]]) -> Spread:
     return min(matches, key=lambda part: (part.high, part.column[1] != WHOLE), default=none)
 
 
-def _gain_text(starts: Sequence[Mapping[Column, float]], figure: str) -> str:
-    """How much less a setting errs in the column where it errs least, from all starts."""
+def _gain_text(
+    starts: Sequence[Mapping[Column, float]], figure: str, *, is_least: bool = False
+) -> str:
+    """How much less a setting errs in the column where it errs least, from all starts.
+
+    `is_least`: so much at least.
+    """
     gain = _gain(starts)
     if gain.high >= 1 / (1 + ERROR_SLACK):
         return "errs no more in any column"
     if gain.high < 1e-4:
         return "errs far less"
-    less = times_text(1 / gain.high, 1 / max(gain.low, 1e-300))
+    less = times_text(1 / gain.high, math.inf if is_least else 1 / max(gain.low, 1e-300))
     return f"errs {less} less ({gain.label(figure)} {gain.column[1]})"
 
 

@@ -285,7 +285,10 @@ class Theory(Struct, frozen=True, eq=False):
         limit = self.formula(integrator) if self.formula is not None else None
         if limit is None and self.rest is not None:
             wide = search[0] / _SHORTER, search[1] * _LONGER
-            timestep = rest_limit(self.model, self.rest, integrator, wide)
+            try:
+                timestep = rest_limit(self.model, self.rest, integrator, wide)
+            except mujoco.FatalError:  # the integrator does not run the model
+                timestep = None
             limit = None if timestep is None else Limit(timestep, AT_REST)
         return limit
 

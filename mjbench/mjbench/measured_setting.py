@@ -69,7 +69,7 @@ def measure_setting(
     steps, energy = round(pilot.scene.scenario.duration / setting.timestep), basis.energy
     figures: dict[str, Any] = dict.fromkeys(scene_report.WorkPrecisionRow.__struct_fields__) | {
         "setting": setting,
-        "status": "diverged",  # as of a run that MuJoCo refuses
+        "status": "refused",
         "reasons": (),
         "penetration": 0.0,
         "model_error": cone.model_error,
@@ -86,7 +86,7 @@ def measure_setting(
     try:
         run = simulation.simulate(pilot.setup, variant, iterations)
     except mujoco.FatalError as error:
-        return replace(row, reasons=(f"MuJoCo does not run it: {error}",)), None
+        return replace(row, reasons=(str(error),)), None
     row = replace(
         row,
         status=run.judgement.status.value,

@@ -144,9 +144,9 @@ def run_trial(
         try:
             if stop > count:
                 watch_steps(model, data, stop - count, passages)
-        except mujoco.FatalError:  # MuJoCo does not run it
+        except mujoco.FatalError:
             reason = "MuJoCo does not run it"
-            return StabilityTrial(timestep, RunStatus.DIVERGED, reason, reason)
+            return StabilityTrial(timestep, RunStatus.REFUSED, reason, reason)
         count, now = stop, update_peaks(data, Peaks())
         if not count:  # before the first step MuJoCo has computed no energy: it says 0
             now = replace(now, energy=-math.inf)

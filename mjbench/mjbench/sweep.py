@@ -41,6 +41,7 @@ from mjbench.scene import Scene, SceneError
 from mjbench.simulation import (
     EngineStates,
     advance,
+    expect_passages,
     initial_data,
     nudged,
     runnable,
@@ -76,10 +77,16 @@ def measure_sweep(
         for part in sweep.variations
         for value in part.values
     ]
-    base_run = simulate(Setup(scenario=scene.scenario), base)
+    setup = Setup(scenario=scene.scenario)
+    base_run = simulate(setup, base)
+    if base_run.passing:
+        setup = expect_passages(setup, base)
+        base_run = simulate(setup, base)
     states = base_run.states if base_run.judgement.ok else None
-    chaotic = states is not None and _is_chaotic(scene, base, states)
-    rows = [_measure_variant(scene, base, states, chaotic, row, model) for row, model in variants]
+    chaotic = states is not None and _is_chaotic(scene, setup, base, states)
+    rows = [
+        _measure_variant(scene, setup, base, states, chaotic, row, model) for row, model in variants
+    ]
     if clock is not None:
         with silent():
             usable = [n for n, row in enumerate(rows) if row.status == "ok"]
@@ -94,10 +101,11 @@ def measure_sweep(
     return SweepReport(sweep.name, sweep.title or sweep.name, scene.name, show, tuple(rows))
 
 
-def _is_chaotic(scene: Scene, model: Any, states: EngineStates) -> bool:
+def _is_chaotic(scene: Scene, setup: Setup, model: Any, states: EngineStates) -> bool:
     """Whether a run whose beginning is off by 1e-10 comes to be visibly elsewhere."""
     for change in nudges(model, 2, NUDGE):
-        run = simulate(Setup(scenario=nudged(scene.scenario, model, change)), model)
+        aside = replace(setup, scenario=nudged(scene.scenario, model, change))
+        run = simulate(aside, model)
         if run.judgement.ok and visible_error(model, scene, run.states, states) >= 1:
             return True
     return False
@@ -176,9 +184,12 @@ def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], l
         message = f"the model has no parameter `{part.parameter}`"
         help = "it is named as in `mujoco.MjSpec`: `option.timestep`, `geom:ball.solref[0]`"
         raise SceneError(message, part.place, help)
-    at, before, after = match["at"], [], []
+    before, after = [], []
     for element in elements:
         old = getattr(element, field)
+        at: Any = None if match["at"] is None else int(match["at"])
+        if at is None and isinstance(old, np.ndarray):  # a number alone is the first, as in MJCF
+            at = slice(None) if part.relative or isinstance(value, tuple) else 0
         before.append(np.array(old, copy=True))
         try:
             new: Any = value
@@ -187,9 +198,7 @@ def _change(spec: Any, part: Variation, value: SweepValue) -> tuple[list[Any], l
                 numbers = {name.partition("_")[2].lower(): m for name, m in members.items()}
                 new = int(numbers[value.lower()])
             if at is not None:
-                old[int(at)] = old[int(at)] * new if part.relative else new
-            elif isinstance(old, np.ndarray):
-                old[:] = old * new if part.relative else new
+                old[at] = old[at] * new if part.relative else new
             else:
                 setattr(element, field, type(old)(old * new if part.relative else new))
         except (TypeError, ValueError, KeyError, IndexError):
@@ -210,6 +219,7 @@ def _value_text(value: SweepValue) -> str:
 
 def _measure_variant(
     scene: Scene,
+    setup: Setup,
     base: Any,
     base_states: EngineStates | None,
     chaotic: bool,
@@ -218,9 +228,9 @@ def _measure_variant(
 ) -> SweepRow:
     """Run a model and fill its row; `base_states` is `None` where the model as it is was lost."""
     try:
-        run = simulate(Setup(scenario=scene.scenario), model)
+        run = simulate(setup, model)
     except mujoco.FatalError as error:
-        return replace(row, status="diverged", reasons=(f"MuJoCo does not run it: {error}",))
+        return replace(row, status="refused", reasons=(str(error),))
     judgement = run.judgement
     row = replace(row, status=judgement.status.value, reasons=judgement.reasons)
     if not judgement.ok:

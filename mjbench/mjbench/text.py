@@ -160,10 +160,6 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("near small steps", [reach_text(row.near, row.searched) for row in rows]),
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
         ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
-        (
-            "stable again",
-            [" to ".join(seconds_text(step, 3) for step in row.islands or ()) for row in rows],
-        ),
     ]
     yield from fitted_table(columns, style.width)
     reasons: dict[str, list[str]] = {}

@@ -47,7 +47,8 @@ def test_a_model_is_measured_recorded_and_checked(model: Path, capsys: Capture) 
         assert text in out, text
     assert main(["bench", str(model), "--check", record]) == 0
     assert capsys.readouterr().out == "as recorded\n"
-    model.write_text(ARM.replace(".3 0 0", ".4 0 0"))
+    longer_arm = ARM.replace('pos=".3 0 0"/>', 'pos=".4 0 0"/><!-- länger -->')
+    model.write_bytes(longer_arm.encode("latin-1"))
     assert main(["bench", str(model), "--check", record]) == 1
     assert "± 5 %" in capsys.readouterr().out
 
@@ -88,10 +89,13 @@ def test_what_a_model_does_not_need_is_taken_out_and_its_interface_stays(
         "sensor-unread": ("interface", ""),
     }
     assert main(["show", record]) == 0 and "kept: for the plot" in capsys.readouterr().out
-    model.with_suffix(".toml").write_text(SWING + keep.replace("energy-flag", "unused-mesh"))
+    motor = '<actuator><motor joint="pivot"/></actuator></mujoco>'
+    model.write_text(ENERGY.replace("</mujoco>", motor))
+    model.with_suffix(".toml").write_text(keep.replace("energy-flag", "unused-mesh"))
     assert main(["diet", str(model), "--quick"]) == 1
     out = capsys.readouterr().out
-    assert "`unused-mesh` no longer keeps anything: remove the entry (arm.toml:7:12)" in out
+    assert "`unused-mesh` no longer keeps anything: remove the entry (arm.toml:2:12)" in out
+    assert out.startswith("arm  (quick: short runs and rough times)\n  in seed-1, seed-2\n")
 
 
 URDF = """\
@@ -114,6 +118,8 @@ def test_a_package_of_urdf_is_the_folder_of_its_name(tmp_path: Path, capsys: Cap
     subject = read_subject(file)
     compiled_model = compile_subject(subject, LocalHost(tmp_path, lambda _: None), quick=True)
     assert compiled_model.model.nmesh == compiled_model.spec.compile().nmesh == 1
+    assert main(["diet", str(file)]) == 2
+    assert f"the diet edits MJCF, and {file} is none" in capsys.readouterr().err
     file.write_text(URDF.replace("kit", "kat"), "utf-8")
     assert main([str(file)]) == 2
     assert "from the package `kat`, and no folder of that name lies" in capsys.readouterr().err
@@ -122,7 +128,7 @@ def test_a_package_of_urdf_is_the_folder_of_its_name(tmp_path: Path, capsys: Cap
 @pytest.mark.parametrize(
     ("arguments", "toml", "status", "message"),
     [
-        (["{}.txt"], "", 2, "there is no file "),
+        (["--quick", "{}.txt"], "", 2, "there is no file "),
         (["{}", "--quick", "--record", "a"], "", 2, "--quick measures only a part"),
         (["{}", "--engines", "mjocuo"], "", 2, "there is no engine `mjocuo`: known are mujoco, "),
         (["diet", "{}", "--only", "x"], "", 1, "arm.xml: no finding is of the kind `x`"),

@@ -69,16 +69,6 @@ def test_a_state_that_was_no_number_on_the_way_is_lost() -> None:
     assert (judgement.status, *judgement.reasons) == (RunStatus.DIVERGED, "the state is not finite")
 
 
-def test_peaks_may_reach_every_bound_and_pass_none() -> None:
-    bounds = {"position_bound": 1.0, "velocity_bound": 2.0}
-    setup = Setup(scenario=Scenario(0.0, 0.0), energy_bound=4.0, **bounds)
-    peaks = Peaks(position=1.0, velocity=2.0, penetration=3.0, sunk=9.0, energy=4.0)
-    assert peaks.is_within(setup)
-    for name in ("position", "velocity", "energy"):
-        assert not replace(peaks, **{name: getattr(peaks, name) + 0.1}).is_within(setup), name
-    assert not replace(peaks, position=np.nan).is_within(setup)
-
-
 BALL = """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>{wall}
   <body name="ball" pos="0 0 {height}"><freejoint/><geom type="sphere" size=".01037"/></body>
 </worldbody></mujoco>"""

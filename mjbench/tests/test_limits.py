@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from msgspec.structs import replace
 
-from mjbench.reports import reach, reach_bound
-from mjbench.reports.limits import limit_text, reach_text, stability_text
+from mjbench.reports.limits import limit_text, stability_text
 from mjbench.reports.scene_report import StableRow
 from samples.reports import row as setting_row
 from samples.reports import scenario
@@ -58,14 +55,6 @@ def test_the_sentence_tells_which_starts_it_speaks_of() -> None:
     assert sentence(largest="all", bracket=(19.0, HIGH)) == text
     text = f"RK4 stays bounded from every start at no step from 1 s on; {near} from its own at "
     assert sentence(largest="all", bracket=(0.0, HIGH)) == f"{text}{all_steps}"
-
-
-def test_all_and_none_are_values_of_their_own() -> None:
-    assert [reach(h) for h in (math.inf, 0.0, 0.5)] == ["all", "none", 0.5]
-    assert [reach_bound(limit) for limit in ("all", "none", 0.5)] == [math.inf, 0.0, 0.5]
-    assert reach_text("all", (LOW, HIGH)) == "all to 1000 s"
-    assert reach_text("none", (LOW, HIGH)) == "none from 1 s on"
-    assert reach_text(None, (LOW, HIGH)) == "", "not measured"
 
 
 def test_where_limits_have_islands_two_digits_are_known() -> None:

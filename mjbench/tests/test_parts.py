@@ -7,13 +7,10 @@ from collections.abc import Iterator
 import mujoco
 import pytest
 
-from mjbench.derive import derive_scenario
 from mjbench.loop import step, time_left, time_limit
 from mjbench.parts import LATE, STOPPED, Parts
-from mjbench.reports import PartFailure
 from mjbench.scene import SceneError, scenes
 from mjbench.work_precision import StoppedError, measure_scenario
-from samples.reports import row, scenario
 from samples.surveys import parse_declared
 
 
@@ -70,14 +67,6 @@ def test_a_part_whose_share_of_the_time_is_over_leaves_the_rest_to_others() -> N
         with time_limit(7200):
             assert time_left() < 3601, "an outer limit holds too"
     assert [(f.part, f.reason) for f in parts.failures] == [("what never ends", LATE)]
-
-
-def test_a_verdict_claims_nothing_of_settings_that_there_was_no_time_for() -> None:
-    rows = [row("Euler", 0.01, cost=1.0, seen=0.1, own=True)]
-    report = scenario(rows, failures=(PartFailure("drop: settings", LATE),))
-    verdict = derive_scenario(report, lambda _: ()).verdict
-    sentence = "no other setting that was measured is cheaper without being less accurate"
-    assert verdict.text.startswith(f"{sentence};")
 
 
 SPRING = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody><body>

@@ -292,6 +292,14 @@ def test_what_is_unstable_by_itself_has_no_theory_at_rest() -> None:
     assert find_rest(model, replace(problem.scenario, qpos=(math.pi,))) is None, "upright"
 
 
+def test_a_setting_that_mujoco_refuses_is_told_as_that() -> None:
+    asleep = """<mujoco><option><flag sleep="enable" island="disable"/></option><worldbody><body>
+      <freejoint/><geom size=".1"/></body></worldbody></mujoco>"""
+    model = with_integrator(mujoco.MjModel.from_xml_string(asleep), Integrator.DISCRETE, 0.002)
+    trial = run_trial(Setup(scenario=Scenario(0.02, 0.02)), model, 0.02)
+    assert (trial.status, trial.reason) == (RunStatus.REFUSED, "MuJoCo does not run it")
+
+
 TOPPLING = """<mujoco><option timestep="0.002"/><worldbody><body>
   <joint type="slide" axis="0 0 1" stiffness="{}"/><geom size=".1" mass="1e4" contype="0"/>
   <body><joint axis="0 1 0"/><geom size=".02" pos="0 0 .1" mass=".1" contype="0"/></body>

@@ -143,6 +143,23 @@ def test_a_cylinder_that_hops_as_it_rolls_slides_all_the_way() -> None:
         assert row.slip == pytest.approx(distance, rel=0.05), row.value
 
 
+def test_a_number_alone_is_the_first_of_several() -> None:
+    """The others are of damping that grows with a power of speed."""
+    vary = 'vary = { "joint.damping" = [0.5, 1, [0, 1, 0]] }'
+    toml = TOML.replace("0.4", "0.02")
+    rows = run_sweep(vary, BALL.replace('name="rail"', 'name="rail" damping="0.5"'), toml=toml).rows
+    assert [row.own for row in rows] == [True, False, False] and rows[1].change
+    model = draw_models('draw = { "joint.damping" = [1, 2] }')[0].model
+    assert model.dof_damping[0] >= 1 and not model.dof_dampingpoly.any()
+
+
+def test_what_begins_inside_something_goes_through_nothing() -> None:
+    vary = 'vary = { "joint.damping" = [0, 1] }'
+    column = '<geom name="column" type="capsule" size="0.1" fromto="0 0 -1 0 0 1"/>'
+    rows = run_sweep(vary, BALL.replace("<body", f"{column}<body")).rows
+    assert [row.status for row in rows] == ["ok", "ok"]
+
+
 def draw_models(lines: str, mjcf: str = BALL) -> tuple[DrawnModel, ...]:
     (scenario,) = parse_declared(f"{TOML}{lines}\n").scenarios
     return drawn_models(mujoco.MjSpec.from_string(mjcf), scenario)

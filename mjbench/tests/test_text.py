@@ -34,7 +34,7 @@ def test_the_verdict_comes_first_then_the_table_then_the_plot() -> None:
         "RK4 at 10 ms is better",
         "\n    >",
         "│",
-        "bounded  ",
+        "  bounded",
     )
     places = [text.index(part) for part in parts]
     assert places == sorted(places)

@@ -30,13 +30,10 @@ from mjbench.scene import Scene, SceneError, scenes
 from mjbench.simulation import (
     STATE,
     advance,
+    expect_passages,
     full_state,
     initial_data,
-    integrator_of,
     nudged,
-    simulate,
-    with_integrator,
-    without_sleep,
 )
 
 Places: TypeAlias = NDArray[np.int64]
@@ -224,17 +221,10 @@ def watch(model: Any, scene: Scene) -> WatchedRun:
             gauge.look(data, twin)
             horizon = float(data.time) if gauge.seen > ALIKE else horizon
     setup = Setup(scenario=scene.scenario)
-    if peaks.sunk > 1:  # small steps say what goes through what there too
-        step = scene.timestep / _FINER
-        fine = without_sleep(with_integrator(model, integrator_of(model), step))
-        setup = replace(setup, passing=simulate(setup, fine).passing)
-        passages.setup = setup
+    if peaks.sunk > 1:
+        passages.setup = setup = expect_passages(setup, model)
     judgement = judge(data, peaks, setup, passages.texts())
     return WatchedRun(scene, judgement, frozenset(touching), displacements, speeds, horizon)
-
-
-_FINER = 8
-"""How many times shorter the steps are that tell a soft contact from a lost run."""
 
 
 def nearby_scenes(model: Any, run: WatchedRun, count: int) -> Iterator[Scene]:

@@ -18,7 +18,7 @@ class SweepRow(Record, frozen=True):
     own: bool
     """Whether it is the value that the model has."""
     status: str
-    """`ok`, `slow-growth`, `diverged` or `reset`, as of a setting."""
+    """`ok`, `slow-growth`, `diverged` or `refused` by MuJoCo, as of a setting."""
     reasons: tuple[str, ...] = ()
     change: float | None = None
     """How far the motion is from that of the model as it is, in a picture: 1 is just visible.
@@ -97,7 +97,7 @@ class MeasuredRun(Errors, frozen=True):
     """One run against its reference."""
 
     status: str
-    """`ok`, `slow-growth`, `diverged` or `reset`."""
+    """`ok`, `slow-growth`, `diverged` or `refused` by MuJoCo."""
     reasons: tuple[str, ...]
     """Why it is not `ok`."""
     energy_drift: float | None

@@ -85,4 +85,4 @@ def fitted_table(columns: Sequence[tuple[str, Sequence[str]]], width: int) -> It
         cells = [(title if row < 0 else cells[row]).ljust(wide) for title, cells, wide in fitting]
         yield "".join(cells).rstrip()
     if left:
-        yield f"no room for: {'; '.join(left)}; --format json has all"
+        yield f"no room for: {'; '.join(left)}; the JSON has all"
