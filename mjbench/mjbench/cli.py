@@ -24,6 +24,7 @@ from mjbench.loop import LoopError, TimeLimitError, read_loop, time_limit
 from mjbench.machine import one_processor, package_version, this_machine
 from mjbench.parts import LATE, Parts
 from mjbench.problems import all_problems
+from mjbench.pruning.survey import StoppedSurvey
 from mjbench.reports import PartFailure
 from mjbench.reports.diet_report import DietReport, Keep
 from mjbench.reports.model_report import SceneReport
@@ -319,28 +320,33 @@ def _diet(arguments: argparse.Namespace) -> int:
         diet.ReaderSource(file.name, file.read_text("utf-8", "replace")) for file in arguments.code
     ]
     modules = frozenset(file.stem for file in arguments.code if file.suffix == ".py")
+    command = f"mjbench diet {arguments.model}"
+    table = arguments.model.with_suffix(".toml").name
     while True:
         subject = read_subject(arguments.model)
         if subject.path.endswith((".mjb", ".urdf")):
             raise UsageError(f"the diet edits MJCF, and {arguments.model} is none")
-        keeps = tuple(_keeps(subject))
-        result = diet.look_at(
-            _host(subject),
-            subject=subject,
-            readers=readers,
-            modules=modules,
-            keeps=keeps,
-            only=arguments.only,
-            quick=arguments.quick,
-        )
+        try:
+            result = diet.look_at(
+                _host(subject),
+                subject=subject,
+                readers=readers,
+                modules=modules,
+                keeps=tuple(_keeps(subject)),
+                only=arguments.only,
+                quick=arguments.quick,
+            )
+        except StoppedSurvey as stopped:
+            words = diet_text(stopped.report, command, table, _style(), is_stopped=True)
+            _print(arguments, DIET.encode(stopped.report), words, record=False)
+            print("mjbench: stopped; this is what is known", file=sys.stderr)
+            return _STOPPED
         if not (arguments.fix and result.changes):
             break
         for change in result.changes:
             Path(subject.folder, change.path).write_bytes(change.after)
             print(f"changed {change.path}", file=sys.stderr)
     report: DietReport = result.report
-    command = f"mjbench diet {arguments.model}"
-    table = arguments.model.with_suffix(".toml").name
     _print(arguments, DIET.encode(report), diet_text(report, command, table, _style()))
     return 0 if report.ok else 1
 

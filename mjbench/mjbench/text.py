@@ -298,8 +298,13 @@ _FOOTNOTE = (
 )
 
 
-def diet_text(report: DietReport, command: str, declarations: str, style: Style) -> str:
-    """A model; `command` looks at it, and `declarations` may say what is kept."""
+def diet_text(
+    report: DietReport, command: str, declarations: str, style: Style, *, is_stopped: bool = False
+) -> str:
+    """A model; `command` looks at it, and `declarations` may say what is kept.
+
+    Of one at which it stopped looking nothing is summed up.
+    """
     quick = "  (quick: short runs and rough times)" if report.quick else ""
     lines = [style.strong(report.model) + quick]
     names = [scenario.name for scenario in report.scenarios if scenario.status == "ok"]
@@ -325,9 +330,8 @@ def diet_text(report: DietReport, command: str, declarations: str, style: Style)
         place = f"{entry.path}:{entry.line}:{entry.column}"
         text = f"`{entry.finding}` no longer keeps anything: remove the entry ({place})"
         lines += ["", *style.wrap(text, "  ")]
-    summary = [
-        line for text in _summary(report, command, declarations) for line in style.wrap(text, "  ")
-    ]
+    texts = () if is_stopped else _summary(report, command, declarations)
+    summary = [line for text in texts for line in style.wrap(text, "  ")]
     lines += ["", *summary] if summary else []
     return printable("\n".join([*lines, "", *style.wrap(_FOOTNOTE)]) + "\n")
 

@@ -13,6 +13,7 @@ import pytest
 from mjbench.bench import compile_subject, read_subject
 from mjbench.cli import main
 from mjbench.host import LocalHost
+from mjbench.pruning import survey
 from mjbench.reports.records import DIET
 
 Capture = pytest.CaptureFixture[str]
@@ -226,6 +227,21 @@ def test_what_is_known_is_printed_when_the_user_interrupts(tmp_path: Path) -> No
     assert f"not known: {', '.join(parts)}, " in out
     assert "delays: stopped before it was done" in out
     assert "the scenario step was not measured" not in out
+
+
+def test_a_diet_that_is_stopped_says_what_it_has_found(
+    model: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    model.write_text(ENERGY)
+    monkeypatch.setattr(survey, "far_bodies", stop)
+    assert main(["diet", str(model), "--quick"]) == 130
+    out, err = capsys.readouterr()
+    assert "energy-flag: " in out
+    assert "not explained" not in out
+    assert err == "mjbench: stopped; this is what is known\n"
 
 
 def test_minutes_that_are_over_stop_it_as_the_user_does(tmp_path: Path, capsys: Any) -> None:

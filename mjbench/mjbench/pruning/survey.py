@@ -78,6 +78,14 @@ class Survey(Struct, frozen=True):
     """All that `--fix` changes."""
 
 
+class StoppedSurvey(KeyboardInterrupt):
+    """The user stopped a survey; `report` has what is known."""
+
+    def __init__(self, report: DietReport) -> None:
+        super().__init__("stopped")
+        self.report = report
+
+
 class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     """Looks for everything that a model can be without."""
 
@@ -108,9 +116,15 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     nearby_runs: tuple[WatchedRun, ...] = ()
     """The same from starts nearby."""
     rejected: list[RejectedTrial] = field(default_factory=list)
+    groups: list[PrunedGroup] = field(default_factory=list)
+    """Those with a finding."""
 
     def survey(self) -> Survey:
-        """Run the model in its scenarios, then without what it may not need."""
+        """Run the model in its scenarios, then without what it may not need.
+
+        Raises:
+            StoppedSurvey: the user does not wait for all.
+        """
         runs = [watch(self.text.model, scene) for scene in self.scenes]
         self.good_runs = tuple(run for run in runs if run.judgement.ok)
         starts = _QUICK_STARTS if self.quick else _STARTS
@@ -145,37 +159,46 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
 
     def _try_all(self, report: DietReport) -> Survey:
         """Try every candidate, then all findings together."""
+        try:
+            self._find()
+        except KeyboardInterrupt:
+            raise StoppedSurvey(self._with_findings(report)) from None
+        fixable = [i for group in self.groups if group.finding.fixable for i in group.items]
+        fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None
+        used_keys = {group.finding.kind for group in self.groups}
+        used_keys |= {f"{item.kind} {item.name}" for group in self.groups for item in group.items}
+        stale = {key: keep for key, keep in self.keeps.items() if key not in used_keys}
+        report = replace(
+            self._with_findings(report),
+            stale=tuple(StaleKeep(k, at.path, at.line, at.column) for k, at in stale.items()),
+        )
+        return Survey(report, self.text, () if fixed is None else fixed.edits)
+
+    def _with_findings(self, report: DietReport) -> DietReport:
+        findings = (group.finding for group in self.groups)
+        by_saving = sorted(findings, key=lambda finding: -(finding.saving.time or 0.0))
+        return replace(report, findings=tuple(by_saving), tried=tuple(self.rejected))
+
+    def _find(self) -> None:
+        """Find the groups of things that the model can be without."""
         text, runs = self.text, self.trials.runs
-        groups = self._settle(self._prove())
-        proved = {item.element for group in groups for item in group.items}
+        self.groups += self._settle(self._prove())
+        proved = {item.element for group in self.groups for item in group.items}
         self.tell("what the scene is not about")
         names = {name for reader in self.readers for name in reader.names}
         scenarios = [run.scene.scenario for run in self.good_runs]
         far_items = far_bodies(text, names, scenarios, runs)
-        groups += self._settle(self._try_by_running([far_items]))
+        self.groups += self._settle(self._try_by_running([far_items]))
         candidates = [[item for item in couplings(text) if item.element not in proved]]
-        if not any(group.finding.kind == "contact-off" for group in groups):
+        if not any(group.finding.kind == "contact-off" for group in self.groups):
             candidates += [idle_contacts(text, runs), primitive_meshes(text)]
-        groups += self._try_by_running(candidates)
+        self.groups += self._try_by_running(candidates)
         kinds = ("far-body", "coupling-idle")
-        removed_items = [i for group in groups for i in group.items if i.kind in kinds]
-        if not any(group.finding.kind in ("contact-off", "contact-idle") for group in groups):
-            groups += self._try_by_running([contact_of_rest(text, removed_items)])
-        groups = self._confirm(groups)
-        fixable = [item for group in groups if group.finding.fixable for item in group.items]
-        fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None
-        used_keys = {group.finding.kind for group in groups}
-        used_keys |= {f"{item.kind} {item.name}" for group in groups for item in group.items}
-        stale = {key: keep for key, keep in self.keeps.items() if key not in used_keys}
-        report = replace(
-            report,
-            findings=tuple(
-                sorted((group.finding for group in groups), key=lambda f: -(f.saving.time or 0.0))
-            ),
-            tried=tuple(self.rejected),
-            stale=tuple(StaleKeep(k, at.path, at.line, at.column) for k, at in stale.items()),
-        )
-        return Survey(report, self.text, () if fixed is None else fixed.edits)
+        removed_items = [i for group in self.groups for i in group.items if i.kind in kinds]
+        contact_kinds = ("contact-off", "contact-idle")
+        if not any(group.finding.kind in contact_kinds for group in self.groups):
+            self.groups += self._try_by_running([contact_of_rest(text, removed_items)])
+        self.groups = self._confirm(self.groups)
 
     def _settle(self, groups: Sequence[PrunedGroup]) -> list[PrunedGroup]:
         """Confirm groups, and try the rest without them, but for what is kept."""
