@@ -113,14 +113,16 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
     if error.position is not None:
         at = min(error.position, len(tex.text) - 1)
         span = tex.span(at, at + 1)
-    help = ""
+    help: str | Fix = ""
     if command := re.search(r"unknown command \\([A-Za-z]+)", error.message):
         likely = nearest(command[1], SYMBOLS | _FUNCTIONS | _WITH_BRACES)
         at = tex.text.find(command[1])
+        definition = rf"\newcommand{{\{command[1]}}}…"
+        help = f"it may be one of MathJax's; `{definition}` in the formula defines it"
         if likely is not None and at >= 0:
             place = tex.span(at, at + len(command[1]))
             help = Fix(f"did you mean `\\{likely}`?", likely).at(place)
-    message = f"the formula does not parse: {error.message}"
+    message = f"the formula cannot be typeset: {error.message}"
     return diagnose("math-syntax", span, message, help=help)
 
 
