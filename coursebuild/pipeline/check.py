@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import time
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -339,16 +340,40 @@ def _refuse_unproven(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Di
         )
 
 
+_LOSSES = frozenset(
+    "anchor-repeated fence-unclosed heading-attributes html-unbalanced label-attribute "
+    "math-unclosed output-unmarked recording-body script-kind".split()
+)
+"""Rules of a part of a page that is not read as what it was meant to be."""
+_ABSENCES = frozenset(
+    "binding-orphan footnote-undefined footnote-unused link-anchor shown-as-written".split()
+)
+"""Rules of what has no other half on its page, which may be in a part that is lost."""
+
+
 def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
-    """The diagnostics without what only follows from a merge conflict or a wrong encoding."""
-    broken = {d.span.path for d in diagnostics if d.rule == "merge-conflict"}
-    misread = {d.span.path for d in diagnostics if d.rule == "file-encoding"}
+    """The diagnostics without what only follows from another one of the same page."""
+    rules_by_path: dict[str, set[str]] = defaultdict(set)
     for diagnostic in diagnostics:
-        rule, path = diagnostic.rule, diagnostic.span.path
-        if rule == "merge-conflict" or (
-            path not in broken and not (rule == "control-character" and path in misread)
+        rules_by_path[diagnostic.span.path].add(diagnostic.rule)
+    forbidden_html = {_start(d) for d in diagnostics if d.rule == "html-forbidden"}
+    error_lines = {(d.span.path, d.span.line) for d in diagnostics if d.is_error}
+    for diagnostic in diagnostics:
+        rule, span = diagnostic.rule, diagnostic.span
+        others = rules_by_path[span.path] - {rule}
+        if not (
+            "merge-conflict" in others
+            or (rule == "control-character" and "file-encoding" in others)
+            or (rule == "recording-body" and "fence-unclosed" in others)
+            or (rule == "html-unbalanced" and _start(diagnostic) in forbidden_html)
+            or (rule in _ABSENCES and others & _LOSSES)
+            or (rule == "shown-as-written" and (span.path, span.line) in error_lines)
         ):
             yield diagnostic
+
+
+def _start(diagnostic: Diagnostic) -> tuple[str, int]:
+    return diagnostic.span.path, diagnostic.span.start
 
 
 def depends_on(

@@ -194,9 +194,12 @@ class Fence(Struct, frozen=True):
         name = words.pop(0) if has_name and words and words[0].value is None else None
         keys = [*values, *flags]
         words_by_key: dict[str, Word] = {}
+        needs_value = False
         for word in words:
-            key = word.key
-            if key not in keys:
+            key, is_value, needs_value = word.key, needs_value, False
+            if key not in keys and is_value:
+                pass  # of the key before it, which lost its `=`
+            elif key not in keys:
                 message = f"`{kind}` has no key `{key}`" if keys else f"`{kind}` takes no keys"
                 help = did_you_mean(key, keys, most=len(keys))
                 diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
@@ -214,6 +217,7 @@ class Fence(Struct, frozen=True):
                 help = Fix(f"write `{key}` alone", key if is_yes else None, safe=True)
                 diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
             elif word.value == "" or (key not in flags and word.value is None):
+                needs_value = True
                 message, help = f"`{key}` needs a value", f"write `{key}=…`"
                 diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
             else:
