@@ -66,7 +66,8 @@ class Proof(Struct, frozen=True):
     line: int = 0
     """The line where it stood."""
     label: str = ""
-    """What readers see of a link, in its brackets: it stays where its address is misspelt."""
+    """What stays where its text is misspelt: a link's words in their brackets, the number of a
+    value, what stands before a result."""
     labels: int = 0
     """How often the label stood in the document."""
 
@@ -163,7 +164,8 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
         above = [r.script for r in recordings if r.body_span.end <= binding.span.start]
         if binding_script := binding.script or (above[-1] if above else None):
             name = f"`{binding.text}`"
-            yield _proved("value", name, binding.text, binding.span, binding_script)
+            number = "".join(_NUMBER.findall(binding.text)[:1])
+            yield _proved("value", name, binding.text, binding.span, binding_script, number)
     for figure in recorded_figures(document):
         name = f"the figure `{figure.name}`"
         yield _proved("figure", name, figure.name, figure.span, figure.script)
@@ -174,16 +176,21 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
             yield _proved("block", name, _fenced_line(block.span), block.span)
     for span in (s for f in features() if f.proofs is not None for s in f.proofs(document)):
         if numbers := _NUMBER.findall(span.text):
-            yield _proved("result", f"the result `{numbers[-1]}`", numbers[-1], span)
+            before = span.text.rpartition(numbers[-1])[0].strip()
+            name = f"the result `{numbers[-1]}`"
+            yield _proved("result", name, numbers[-1], span, label=before)
     for link in find_inlines(document, Link):
         text = link.target_span.text
         is_opaque = isinstance(link.target, UrlTarget) and _OPAQUE.match(text)
         if not link.mention and text and not is_opaque:
-            yield _proved("link", f"the link to `{text}`", text, link.span)
+            words = link.span.text.partition("](")[0] + "]"
+            label = words if words[0] == "[" else ""
+            yield _proved("link", f"the link to `{text}`", text, link.span, label=label)
 
 
-def _proved(kind: Kind, name: str, text: str, span: Span, script: str | None = None) -> ProvedText:
-    label = span.text.partition("](")[0] + "]" if kind == "link" and span.text[:1] == "[" else ""
+def _proved(
+    kind: Kind, name: str, text: str, span: Span, script: str | None = None, label: str = ""
+) -> ProvedText:
     places = [*_places(span.source, text)]
     place = next(filter(span.contains, places), span)
     labels = [*_places(span.source, label)] if label else []

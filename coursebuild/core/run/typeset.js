@@ -139,7 +139,7 @@ const typeset = (() => {
       'papayawhip peachpuff peru pink plum powderblue purple rebeccapurple red rosybrown royalblue ' +
       'saddlebrown salmon sandybrown seagreen seashell sienna silver skyblue slateblue slategray slategrey ' +
       'snow springgreen steelblue tan teal thistle tomato transparent turquoise violet wheat white ' +
-      'whitesmoke yellow yellowgreen currentcolor'
+      'whitesmoke yellow yellowgreen currentcolor inherit'
     ).split(' '),
   )
 
