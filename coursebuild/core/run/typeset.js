@@ -88,8 +88,11 @@ const typeset = (() => {
 
   // What no macro can replace: the name of an environment, the columns of an array, a font's name as an index.
   const REWRITES = [
-    // A formula may define a name that is defined here, as MathJax lets it.
-    [/\\newcommand\s*(?:\{\s*)?(\\[A-Za-z]+)\s*\}?/g, (_, name) => `\\providecommand{${name}}{}\\renewcommand{${name}}`],
+    // A formula may define a name that is defined here, and leave out its backslash, as MathJax lets it.
+    [
+      /\\newcommand\*?\s*(?:\{\s*\\?([A-Za-z]+)\s*\}|\\([A-Za-z]+))/g,
+      (_, inner, bare) => `\\providecommand{\\${inner ?? bare}}{}\\renewcommand{\\${inner ?? bare}}`,
+    ],
     [/\\begin\{eqnarray\*?\}/g, () => '\\begin{array}{rcl}'],
     [/\\end\{eqnarray\*?\}/g, () => '\\end{array}'],
     [/\\(begin|end)\{flalign(\*?)\}/g, (_, edge, star) => `\\${edge}{align${star}}`],

@@ -50,10 +50,10 @@ _LEAD = re.compile(r"\n[ \t>]*\Z")
 """What stands before the mark that ends a formula, on a line of its own."""
 _WORDS_BEFORE = re.compile(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
 DEFINITION = re.compile(
-    r"\\(?:(?:(?:re)?newcommand|DeclareMathOperator)\*?[ ]*\{?(\\[A-Za-z]+)\}?(?:\[\d\]){0,2}"
-    r"|def[ ]*(\\[A-Za-z]+)(?:#\d)*)[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
+    r"\\(?:(?:(?:re)?newcommand|DeclareMathOperator)\*?[ ]*\{?\\?([A-Za-z]+)\}?(?:\[\d\]){0,2}"
+    r"|def[ ]*\\([A-Za-z]+)(?:#\d)*)[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
 )
-"""A macro of LaTeX."""
+"""A macro of LaTeX; MathJax takes its name without a backslash, too."""
 _DOXYGEN = re.compile(
     rf"{_CODE}|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<tex>[^$]+?)\\f\])", re.DOTALL
 )
