@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import functools
 import time
-from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -345,35 +344,28 @@ _LOSSES = frozenset(
     "math-unclosed output-unmarked recording-body script-kind".split()
 )
 """Rules of a part of a page that is not read as what it was meant to be."""
-_ABSENCES = frozenset(
-    "binding-orphan footnote-undefined footnote-unused link-anchor shown-as-written".split()
-)
+_ABSENCES = "binding-orphan footnote-undefined footnote-unused link-anchor shown-as-written"
 """Rules of what has no other half on its page, which may be in a part that is lost."""
+_CAUSES = {
+    **dict.fromkeys(_ABSENCES.split(), _LOSSES),
+    "control-character": {"file-encoding"},
+    "recording-body": {"fence-unclosed"},
+}
 
 
 def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
-    """The diagnostics without what only follows from another one of the same page."""
-    rules_by_path: dict[str, set[str]] = defaultdict(set)
-    for diagnostic in diagnostics:
-        rules_by_path[diagnostic.span.path].add(diagnostic.rule)
-    forbidden_html = {_start(d) for d in diagnostics if d.rule == "html-forbidden"}
-    error_lines = {(d.span.path, d.span.line) for d in diagnostics if d.is_error}
+    """The diagnostics without what only follows from another one, of the same page or line."""
+    rules = {(d.span.path, d.rule) for d in diagnostics}
+    mild = ("html-unbalanced", "shown-as-written")
+    error_lines = {
+        (d.span.path, d.span.line) for d in diagnostics if d.is_error and d.rule not in mild
+    }
     for diagnostic in diagnostics:
         rule, span = diagnostic.rule, diagnostic.span
-        others = rules_by_path[span.path] - {rule}
-        if not (
-            "merge-conflict" in others
-            or (rule == "control-character" and "file-encoding" in others)
-            or (rule == "recording-body" and "fence-unclosed" in others)
-            or (rule == "html-unbalanced" and _start(diagnostic) in forbidden_html)
-            or (rule in _ABSENCES and others & _LOSSES)
-            or (rule == "shown-as-written" and (span.path, span.line) in error_lines)
-        ):
+        causes = {"merge-conflict", *_CAUSES.get(rule, ())} - {rule}
+        follows = any((span.path, cause) in rules for cause in causes)
+        if not follows and (rule not in mild or (span.path, span.line) not in error_lines):
             yield diagnostic
-
-
-def _start(diagnostic: Diagnostic) -> tuple[str, int]:
-    return diagnostic.span.path, diagnostic.span.start
 
 
 def depends_on(

@@ -164,8 +164,7 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
         above = [r.script for r in recordings if r.body_span.end <= binding.span.start]
         if binding_script := binding.script or (above[-1] if above else None):
             name = f"`{binding.text}`"
-            number = "".join(_NUMBER.findall(binding.text)[:1])
-            yield _proved("value", name, binding.text, binding.span, binding_script, number)
+            yield _proved("value", name, binding.text, binding.span, binding_script)
     for figure in recorded_figures(document):
         name = f"the figure `{figure.name}`"
         yield _proved("figure", name, figure.name, figure.span, figure.script)
@@ -176,21 +175,21 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
             yield _proved("block", name, _fenced_line(block.span), block.span)
     for span in (s for f in features() if f.proofs is not None for s in f.proofs(document)):
         if numbers := _NUMBER.findall(span.text):
-            before = span.text.rpartition(numbers[-1])[0].strip()
-            name = f"the result `{numbers[-1]}`"
-            yield _proved("result", name, numbers[-1], span, label=before)
+            yield _proved("result", f"the result `{numbers[-1]}`", numbers[-1], span)
     for link in find_inlines(document, Link):
         text = link.target_span.text
         is_opaque = isinstance(link.target, UrlTarget) and _OPAQUE.match(text)
         if not link.mention and text and not is_opaque:
-            words = link.span.text.partition("](")[0] + "]"
-            label = words if words[0] == "[" else ""
-            yield _proved("link", f"the link to `{text}`", text, link.span, label=label)
+            yield _proved("link", f"the link to `{text}`", text, link.span)
 
 
-def _proved(
-    kind: Kind, name: str, text: str, span: Span, script: str | None = None, label: str = ""
-) -> ProvedText:
+def _proved(kind: Kind, name: str, text: str, span: Span, script: str | None = None) -> ProvedText:
+    labels_by_kind = {
+        "link": span.text.partition("](")[0] + "]",
+        "value": text.partition(" ")[0],
+        "result": span.text.rpartition(text)[0].strip(),
+    }
+    label = labels_by_kind.get(kind, "")
     places = [*_places(span.source, text)]
     place = next(filter(span.contains, places), span)
     labels = [*_places(span.source, label)] if label else []

@@ -130,9 +130,7 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
             advice: str
             if text[end] == '"' and text.count('"', end) == 1:
                 start, end, message = end, len(text), "a quoted value is never closed"
-                place = info.span(start, end)
-                edit = Edit(Span(place.source, place.end, place.end), '"')
-                advice = Fix('close it with `"`', edits=(edit,))
+                advice = Fix('close it with `"`', edits=(Edit(info.span(end, end), '"'),))
             else:
                 end = rest.end() if rest else end
                 message = f"`{text[at:end]}` cannot be read"
@@ -207,10 +205,9 @@ class Fence(Struct, frozen=True):
                 notes = [Note("first given here", words_by_key[key].key_span)]
                 message, is_same = f"`{key}` is given twice", words_by_key[key].value == word.value
                 help = Fix("delete one of them", edits=word.removal if is_same else (), safe=True)
-                diagnostic = diagnose(
-                    "fence-key-repeated", word.key_span, message, help=help, notes=notes
+                diagnostics.append(
+                    diagnose("fence-key-repeated", word.key_span, message, help=help, notes=notes)
                 )
-                diagnostics.append(diagnostic)
             elif key not in values and word.value is not None:
                 is_yes = (word.value or "").lower() in ("true", "yes", "on", "1", key)
                 message = f"`{key}` takes no value"
