@@ -339,15 +339,32 @@ def _refuse_unproven(course: Course, lines: Iterable[ScriptLine]) -> Iterator[Di
         )
 
 
+_LOSSES = frozenset(
+    "anchor-repeated fence-unclosed heading-attributes html-unbalanced label-attribute "
+    "math-unclosed output-unmarked recording-body script-kind".split()
+)
+"""Rules of a part of a page that is not read as what it was meant to be."""
+_ABSENCES = "binding-orphan footnote-undefined footnote-unused link-anchor shown-as-written"
+"""Rules of what has no other half on its page, which may be in a part that is lost."""
+_CAUSES = {
+    **dict.fromkeys(_ABSENCES.split(), _LOSSES),
+    "control-character": {"file-encoding"},
+    "recording-body": {"fence-unclosed"},
+}
+
+
 def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnostic]:
-    """The diagnostics without what only follows from a merge conflict or a wrong encoding."""
-    broken = {d.span.path for d in diagnostics if d.rule == "merge-conflict"}
-    misread = {d.span.path for d in diagnostics if d.rule == "file-encoding"}
+    """The diagnostics without what only follows from another one, of the same page or line."""
+    rules = {(d.span.path, d.rule) for d in diagnostics}
+    mild = ("html-unbalanced", "shown-as-written")
+    error_lines = {
+        (d.span.path, d.span.line) for d in diagnostics if d.is_error and d.rule not in mild
+    }
     for diagnostic in diagnostics:
-        rule, path = diagnostic.rule, diagnostic.span.path
-        if rule == "merge-conflict" or (
-            path not in broken and not (rule == "control-character" and path in misread)
-        ):
+        rule, span = diagnostic.rule, diagnostic.span
+        causes = {"merge-conflict", *_CAUSES.get(rule, ())} - {rule}
+        follows = any((span.path, cause) in rules for cause in causes)
+        if not follows and (rule not in mild or (span.path, span.line) not in error_lines):
             yield diagnostic
 
 

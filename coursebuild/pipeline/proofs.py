@@ -66,7 +66,8 @@ class Proof(Struct, frozen=True):
     line: int = 0
     """The line where it stood."""
     label: str = ""
-    """What readers see of a link, in its brackets: it stays where its address is misspelt."""
+    """What stays where its text is misspelt: a link's words in their brackets, the number of a
+    value, what stands before a result."""
     labels: int = 0
     """How often the label stood in the document."""
 
@@ -183,7 +184,12 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
 
 
 def _proved(kind: Kind, name: str, text: str, span: Span, script: str | None = None) -> ProvedText:
-    label = span.text.partition("](")[0] + "]" if kind == "link" and span.text[:1] == "[" else ""
+    labels_by_kind = {
+        "link": span.text.partition("](")[0] + "]",
+        "value": text.partition(" ")[0],
+        "result": span.text.rpartition(text)[0].strip(),
+    }
+    label = labels_by_kind.get(kind, "")
     places = [*_places(span.source, text)]
     place = next(filter(span.contains, places), span)
     labels = [*_places(span.source, label)] if label else []

@@ -277,7 +277,7 @@ def test_mistakes_are_shown_and_clear_by_themselves(
             expect(note).to_have_count(2)
             expect(page.locator(".prose code.tex")).to_have_text("\\frac{1")
             folder.write(folder.lesson(2), "## Two\n\nText.\n")
-            expect(panel).to_contain_text("the formula does not parse")
+            expect(panel).to_contain_text("the formula cannot be typeset")
             folder.write(folder.lesson(), GOOD.replace("## Hello", "## Mended"))
             expect(panel).to_have_count(0)
             expect(page.locator(".prose h2").first).to_contain_text("Mended")

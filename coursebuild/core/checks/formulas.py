@@ -113,14 +113,15 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
     if error.position is not None:
         at = min(error.position, len(tex.text) - 1)
         span = tex.span(at, at + 1)
-    help = ""
-    if command := re.search(r"unknown command \\([A-Za-z]+)", error.message):
-        likely = nearest(command[1], SYMBOLS | _FUNCTIONS | _WITH_BRACES)
-        at = tex.text.find(command[1])
-        if likely is not None and at >= 0:
-            place = tex.span(at, at + len(command[1]))
+    help: str | Fix = ""
+    if command := re.search(r"unknown command (\\([A-Za-z]+))", error.message):
+        likely = nearest(command[2], SYMBOLS | _FUNCTIONS | _WITH_BRACES)
+        help = rf"MathJax may have it; `\newcommand{{{command[1]}}}…` in the formula defines it"
+        start = tex.text.find(command[2])
+        if likely is not None and start >= 0:
+            place = tex.span(start, start + len(command[2]))
             help = Fix(f"did you mean `\\{likely}`?", likely).at(place)
-    message = f"the formula does not parse: {error.message}"
+    message = f"the formula cannot be typeset: {error.message}"
     return diagnose("math-syntax", span, message, help=help)
 
 

@@ -239,7 +239,7 @@ class Formula(Struct, frozen=True):
 
 
 class MathError(Struct, frozen=True):
-    """Why a formula does not parse; the position is in code points of its TeX, if it is known."""
+    """Why a formula cannot be typeset; the position is in code points of its TeX, if known."""
 
     message: str
     position: int | None

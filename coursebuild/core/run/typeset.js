@@ -21,8 +21,27 @@ const typeset = (() => {
 
   const OPTIONS = { throwOnError: true, trust: false, strict: false, annotate: true, maxExpand: 1000 }
 
-  // Commands of LaTeX, MathJax and KaTeX that Temml has under another name.
+  // Commands of LaTeX, MathJax and KaTeX that Temml lacks, or has under another name; a function reads its own arguments.
   const MACROS = {
+    '\\DeclareMathOperator': '\\@ifstar{\\@operator*}{\\@operator{}}',
+    '\\@operator': '\\def#2{\\operatorname#1{#3}}',
+    '\\abs': '\\@ifstar\\@abs\\@abs',
+    '\\@abs': '\\left\\lvert #1\\right\\rvert',
+    '\\norm': '\\@ifstar\\@norm\\@norm',
+    '\\@norm': '\\left\\lVert #1\\right\\rVert',
+    '\\dd': (context) => `\\mathrm{d}${readPower(context)}`,
+    '\\dv': (context) => derivative('\\mathrm{d}', context),
+    '\\pdv': (context) => derivative('\\partial', context),
+    '\\braket': (context) => `\\mathinner{\\langle{${readArguments(context, 2).join('|')}}\\rangle}`,
+    '\\Braket': (context) => `\\left\\langle{${readArguments(context, 2).join('|').replaceAll('|', '}\\,\\middle|\\,{')}}\\right\\rangle`,
+    '\\ketbra': '\\ket{#1}\\!\\bra{#2}',
+    '\\vb': '\\@ifstar\\boldsymbol\\mathbf',
+    '\\cross': '\\times',
+    '\\grad': '\\nabla',
+    '\\curl': '\\grad\\times',
+    '\\laplacian': '\\nabla^2',
+    '\\tr': '\\operatorname{tr}',
+    '\\Tr': '\\operatorname{Tr}',
     '\\mbox': '\\text{#1}',
     '\\mathds': '\\mathbb{#1}',
     '\\mathbbm': '\\mathbb{#1}',
@@ -36,13 +55,49 @@ const typeset = (() => {
   }
   for (const name in MACROS) temml.__defineMacro(name, MACROS[name])
 
+  /** TeX of tokens that are yet to be read, the last one first. */
+  const texOf = (tokens) => tokens.map(({ text }) => (/^\\[A-Za-z@]+$/.test(text) ? `${text} ` : text)).reverse().join('')
+
+  /** An exponent from what stands in square brackets, if anything does. */
+  function readPower(context) {
+    context.consumeSpaces()
+    if (context.future().text !== '[') return ''
+    context.popToken()
+    return `^{${texOf(context.consumeArg([']']).tokens)}}`
+  }
+
+  /** An argument, and more of them as long as there are braces. */
+  function readArguments(context, most) {
+    const values = []
+    do values.push(texOf(context.consumeArg().tokens))
+    while (values.length < most && context.future().text === '{')
+    return values
+  }
+
+  /** A derivative: `\dv{x}`, `\dv[2]{f}{x}`, `\pdv{f}{x}{y}`; in LaTeX's `derivative` it is `\pdv{f}{x,y}`. */
+  function derivative(sign, context) {
+    const star = context.future().text === '*' && context.popToken()
+    let power = readPower(context)
+    const values = readArguments(context, 3)
+    const of = values.length > 1 ? values.shift() : ''
+    const variables = values.flatMap((value) => value.split(','))
+    if (variables.length > 1) power = `^{${variables.length}}`
+    const below = variables.map((name) => `${sign} ${name}`).join('\\,') + (variables.length > 1 ? '' : power)
+    return star ? `\\frac{${sign}${power}}{${below}}{${of}}` : `\\frac{${sign}${power}{${of}}}{${below}}`
+  }
+
   // What no macro can replace: the name of an environment, the columns of an array, a font's name as an index.
   const REWRITES = [
-    // A formula may define a name that is defined here, as MathJax lets it.
-    [/\\newcommand\s*(?:\{\s*)?(\\[A-Za-z]+)\s*\}?/g, (_, name) => `\\providecommand{${name}}{}\\renewcommand{${name}}`],
+    // A formula may define a name that is defined here, and leave out its backslash, as MathJax lets it.
+    [
+      /\\newcommand\*?\s*(?:\{\s*\\?([A-Za-z]+)\s*\}|\\([A-Za-z]+))/g,
+      (_, inner, bare) => `\\providecommand{\\${inner ?? bare}}{}\\renewcommand{\\${inner ?? bare}}`,
+    ],
     [/\\begin\{eqnarray\*?\}/g, () => '\\begin{array}{rcl}'],
     [/\\end\{eqnarray\*?\}/g, () => '\\end{array}'],
     [/\\(begin|end)\{flalign(\*?)\}/g, (_, edge, star) => `\\${edge}{align${star}}`],
+    [/\\root(?![A-Za-z])((?:(?!\\root).)*?)\\of(?![A-Za-z])/gs, (_, index) => `\\sqrt[${index.trim()}]`],
+    [/\\unicode\s*\{x([0-9A-Fa-f]+)\}/g, (_, number) => `\\char"${number} `],
     [/\\(begin|end)\{split\}/g, (_, edge) => `\\${edge}{aligned}`], // which may also stand in a line
     [/\\(?:begin|end)\{(?:math|displaymath)\}|\\(?:require|vspace\*?)\{[^{}]*\}/g, () => ''],
     [/(\\begin\{array\})(?:\[[tcb]\])?\{((?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}/g, (_, begin, columns) => `${begin}{${plainColumns(columns)}}`],
@@ -87,7 +142,7 @@ const typeset = (() => {
       'papayawhip peachpuff peru pink plum powderblue purple rebeccapurple red rosybrown royalblue ' +
       'saddlebrown salmon sandybrown seagreen seashell sienna silver skyblue slateblue slategray slategrey ' +
       'snow springgreen steelblue tan teal thistle tomato transparent turquoise violet wheat white ' +
-      'whitesmoke yellow yellowgreen currentcolor'
+      'whitesmoke yellow yellowgreen currentcolor inherit'
     ).split(' '),
   )
 
@@ -246,6 +301,8 @@ const typeset = (() => {
       if (error instanceof RangeError && /call stack/.test(error.message)) {
         return { message: 'it is nested too deeply', position: null }
       }
+      // Temml's parser takes a part for written that is not there.
+      if (error instanceof TypeError) return { message: 'a `_`, a `^` or an accent has no argument', position: null }
       return { message: `it cannot be typeset (${error.message ?? [error].flat().at(-1)})`, position: null } // mhchem throws lists
     }
   }

@@ -121,7 +121,10 @@ def _start() -> Any:
 
 
 _WORDING = (
-    (re.compile(r"^Unsupported function name: "), "unknown command "),
+    (
+        re.compile(r"""^(?:Unsupported [\w ]+: |Function "|Got [\w ]+: ')\\?(.+?)(?:" is.*|')?$"""),
+        r"unknown command \\\1",
+    ),
     (re.compile(r"^Expected 'EOF', got (.*)$", re.DOTALL), r"unexpected \1"),
     (re.compile(r"^Too many expansions.*$", re.DOTALL), "a macro expands without end"),
     (re.compile(r"'EOF'"), "the end of the formula"),

@@ -130,9 +130,7 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
             advice: str
             if text[end] == '"' and text.count('"', end) == 1:
                 start, end, message = end, len(text), "a quoted value is never closed"
-                place = info.span(start, end)
-                edit = Edit(Span(place.source, place.end, place.end), '"')
-                advice = Fix('close it with `"`', edits=(edit,))
+                advice = Fix('close it with `"`', edits=(Edit(info.span(end, end), '"'),))
             else:
                 end = rest.end() if rest else end
                 message = f"`{text[at:end]}` cannot be read"
@@ -194,9 +192,12 @@ class Fence(Struct, frozen=True):
         name = words.pop(0) if has_name and words and words[0].value is None else None
         keys = [*values, *flags]
         words_by_key: dict[str, Word] = {}
+        needs_value = False
         for word in words:
-            key = word.key
-            if key not in keys:
+            key, is_value, needs_value = word.key, needs_value, False
+            if key not in keys and is_value:
+                pass  # of the key before it, which lost its `=`
+            elif key not in keys:
                 message = f"`{kind}` has no key `{key}`" if keys else f"`{kind}` takes no keys"
                 help = did_you_mean(key, keys, most=len(keys))
                 diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
@@ -204,16 +205,16 @@ class Fence(Struct, frozen=True):
                 notes = [Note("first given here", words_by_key[key].key_span)]
                 message, is_same = f"`{key}` is given twice", words_by_key[key].value == word.value
                 help = Fix("delete one of them", edits=word.removal if is_same else (), safe=True)
-                diagnostic = diagnose(
-                    "fence-key-repeated", word.key_span, message, help=help, notes=notes
+                diagnostics.append(
+                    diagnose("fence-key-repeated", word.key_span, message, help=help, notes=notes)
                 )
-                diagnostics.append(diagnostic)
             elif key not in values and word.value is not None:
                 is_yes = (word.value or "").lower() in ("true", "yes", "on", "1", key)
                 message = f"`{key}` takes no value"
                 help = Fix(f"write `{key}` alone", key if is_yes else None, safe=True)
                 diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
             elif word.value == "" or (key not in flags and word.value is None):
+                needs_value = True
                 message, help = f"`{key}` needs a value", f"write `{key}=…`"
                 diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
             else:

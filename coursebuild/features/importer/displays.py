@@ -50,17 +50,14 @@ _LEAD = re.compile(r"\n[ \t>]*\Z")
 """What stands before the mark that ends a formula, on a line of its own."""
 _WORDS_BEFORE = re.compile(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
 DEFINITION = re.compile(
-    r"\\(?:(?:re)?newcommand\*?[ ]*\{?(\\[A-Za-z]+)\}?(?:\[\d\]){0,2}|def[ ]*(\\[A-Za-z]+)(?:#\d)*)"
-    r"[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
+    r"\\(?:(?:(?:re)?newcommand|DeclareMathOperator)\*?[ ]*\{?\\?([A-Za-z]+)\}?(?:\[\d\]){0,2}"
+    r"|def[ ]*\\([A-Za-z]+)(?:#\d)*)[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
 )
-"""A macro of LaTeX."""
-_OPERATOR = re.compile(
-    r"(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)"
-    r"|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<display>[^$]+?)\\f\])"
-    r"|\\DeclareMathOperator(?P<star>\*?)[ ]*\{?(?P<name>\\[A-Za-z]+)\}?[ ]*\{(?P<word>[^{}]*)\}",
-    re.DOTALL,
+"""A macro of LaTeX; MathJax takes its name without a backslash, too."""
+_DOXYGEN = re.compile(
+    rf"{_CODE}|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<tex>[^$]+?)\\f\])", re.DOTALL
 )
-"""An operator that is declared, a formula of Doxygen; or code, in which there is neither."""
+"""A formula of Doxygen; or code, in which there is none."""
 _MACROS = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
 """Where MyST and Sphinx have macros by their names."""
 _WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
@@ -80,7 +77,7 @@ def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
     text = re.sub(r"(?<!\\)\\[ \t]*(?=\n[ \t>]*\$\$)", "", text)  # a blank, at its end
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
-    text = define_operators(_DISPLAY.sub(_drop_empty, text))
+    text = _DOXYGEN.sub(_write_doxygen, _DISPLAY.sub(_drop_empty, text))
     return _DISPLAY.sub(_label_formula, _ENVIRONMENT.sub(_write_environment, text))
 
 
@@ -91,18 +88,11 @@ def _write_environment(match: re.Match[str]) -> str:
     return f"{words}$${tex}$$" if tex else match[0]
 
 
-def define_operators(text: str) -> str:
-    r"""Write LaTeX's `\DeclareMathOperator` as a macro, formulas of Doxygen between dollars."""
-
-    def define(match: re.Match[str]) -> str:
-        if match["inline"] or match["display"]:
-            inline = re.sub(r"\n(?:[ \t]*\n)+", "\n", (match["inline"] or "").strip())
-            inline = re.sub(r"(\\(?:begin|end)\{align)\*?\}", r"\1ed}", inline)
-            return f"${inline}$" if inline else f"$${match['display']}$$"
-        operator = rf"\operatorname{match['star']}{{{match['word']}}}"
-        return rf"\def{match['name']}{{{operator}}}" if match["name"] else match[0]
-
-    return _OPERATOR.sub(define, text)
+def _write_doxygen(match: re.Match[str]) -> str:
+    if match["tex"] or match["inline"] is None:
+        return f"$${match['tex']}$$" if match["tex"] else match[0]
+    inline = re.sub(r"\n(?:[ \t]*\n)+", "\n", match["inline"].strip())
+    return "$" + re.sub(r"(\\(?:begin|end)\{align)\*?\}", r"\1ed}", inline) + "$"
 
 
 def display_formula(tex: str, label: str) -> str:
@@ -145,13 +135,9 @@ def _label_formula(match: re.Match[str]) -> str:
 def read_macros(settings: Mapping[str, Any]) -> str:
     """Return the definitions of the macros that settings or front matter have."""
     header = settings.get("header-includes")
-    lines = (
-        define_operators(str(line)) for line in (header if isinstance(header, list) else [header])
-    )
-    return "".join(
-        [match[0] for line in lines for match in DEFINITION.finditer(line)]
-        + [*_named_macros(settings)]
-    )
+    lines = header if isinstance(header, list) else [header]
+    definitions = [match[0] for line in lines for match in DEFINITION.finditer(str(line))]
+    return "".join([*definitions, *_named_macros(settings)])
 
 
 def _named_macros(settings: Mapping[str, Any]) -> Iterator[str]:

@@ -25,7 +25,7 @@ from coursebuild.features.importer.source_files import find_group, title_of_file
 
 _GONE = re.compile(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
 _REFERENCE = re.compile(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
-_COMMAND = re.compile(r"\\[A-Za-z]+")
+_COMMAND = re.compile(r"\\([A-Za-z]+)")
 
 
 class _Text(Struct, frozen=True):
