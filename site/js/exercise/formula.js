@@ -50,11 +50,17 @@ export function formulaCode(text, { names, maths }) {
     const [name] = tokens[next] ?? stop()
     if (take(...names) !== '') return name
     if (take('pi', 'π') !== '') return 'Math.PI'
-    if (take(...maths) !== '') return `Math.${name}${take('(') || stop()}${chain(sum, ',')}${close()}`
+    if (take(...maths) !== '') return `Math.${name}${take('(') || stop()}${list(Math[name].length)}${close()}`
     if (/^[\p{L}_]/u.test(name)) throw new FormulaError('name', name)
     if (!/\d/.test(name)) stop()
     next += 1
     return String(Number(name))
+  }
+  /** The arguments of a function that has so many; one of several, such as `max`, may have more. */
+  const list = (count) => {
+    let code = sum()
+    for (let n = 1; n < count || (count > 1 && tokens[next]?.[0] === ','); n += 1) code += (take(',') || stop()) + sum()
+    return code
   }
   const code = sum()
   if (next < tokens.length) stop()

@@ -70,10 +70,11 @@ export class Exercise extends Instrument {
     const { config, words, simulation, editor } = this
     this.stopJudging()
     for (const row of this.rows) this.showVerdict(row, 'waiting')
-    if (!this.read(editor.text)) return this.summary.replaceChildren()
+    this.showState('')
+    if (!this.read(editor.text)) return
     this.tries += 1
     this.checkedText = editor.text
-    this.summary.replaceChildren(words('exercise.live.checking'))
+    this.showState(words('exercise.live.checking'))
     const { address } = simulation
     const addresses = { worker: address(config.worker), module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
     const results = []
@@ -126,8 +127,7 @@ export class Exercise extends Instrument {
     const passed = results.filter(Boolean).length
     const isSolved = passed === rows.length
     const isJudged = results.length === rows.length
-    this.stateText = isJudged ? words(isSolved ? 'exercise.live.solved' : 'exercise.live.unsolved', { n: passed, all: rows.length }) : ''
-    this.showState()
+    this.showState(isJudged ? words(isSolved ? 'exercise.live.solved' : 'exercise.live.unsolved', { n: passed, all: rows.length }) : '')
     if (!isSolved) return
     const { id } = config.exercise
     const lesson = document.querySelector('main')?.dataset.lesson ?? ''
@@ -136,11 +136,12 @@ export class Exercise extends Instrument {
     element.dispatchEvent(new CustomEvent('coursebuild:answered', { bubbles: true, detail: { quiz: id, key: id, answer } }))
   }
 
-  /** Show how many trials are passed, or else whether the reader has solved the exercise before. */
-  showState() {
+  /** Show how far the trials are, or else whether the reader has solved the exercise before. */
+  showState(state = this.stateText) {
+    this.stateText = state
     const { id } = this.config.exercise
     const isKept = this.progress?.get(id, id)?.right === true
-    const text = this.stateText || (isKept ? this.words('exercise.live.kept') : '')
+    const text = state || (isKept ? this.words('exercise.live.kept') : '')
     this.summary.replaceChildren(...(isKept ? [sign('read'), text] : [text]))
   }
 
