@@ -26,10 +26,8 @@ export class Exercise extends Instrument {
     const { exercise } = config
     this.controls.element?.remove() // its buttons belong to the trials
     this.loadedText = null
-    this.checkedText = null
     this.tries = 0
     this.stopJudging = () => {}
-    this.stateText = ''
     const texts = {
       label: words(`exercise.live.${exercise.subject}`, { names: exercise.names.join(', ') }),
       run: words('exercise.live.check'),
@@ -47,15 +45,15 @@ export class Exercise extends Instrument {
     this.body.prepend(this.editor.element)
   }
 
-  makeRow({ name, hint }, i) {
+  makeRow(trial, i) {
     const { words } = this
     const verdict = h('span', { class: 'exercise-verdict' }, words('exercise.live.waiting'))
     const seen = h('span', { class: 'exercise-seen' })
-    const advice = h('p', { class: 'exercise-hint', hidden: true }, hint)
+    const advice = h('p', { class: 'exercise-hint', hidden: true }, trial.hint)
     const watch = textButton(words('exercise.live.watch'), () => this.watch(i), 'lab-text')
     watch.hidden = true
-    const element = h('li', {}, h('p', {}, h('b', {}, name), ' ', verdict, ' ', seen, ' ', watch), advice)
-    return { element, verdict, seen, advice, watch, hint }
+    const element = h('li', {}, h('p', {}, h('b', {}, trial.name), ' ', verdict, ' ', seen, ' ', watch), advice)
+    return { trial, element, verdict, seen, advice, watch }
   }
 
   makeFoot() {
@@ -67,7 +65,7 @@ export class Exercise extends Instrument {
   // --- judging
 
   check() {
-    const { config, words, simulation, editor } = this
+    const { config, words, editor } = this
     this.stopJudging()
     for (const row of this.rows) this.showVerdict(row, 'waiting')
     this.showState('')
@@ -75,7 +73,7 @@ export class Exercise extends Instrument {
     this.tries += 1
     this.checkedText = editor.text
     this.showState(words('exercise.live.checking'))
-    const { address } = simulation
+    const { address } = this.simulation
     const addresses = { worker: address(config.worker), module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
     const results = []
     const next = () => results.length < this.rows.length && this.showVerdict(this.rows[results.length], 'running')
@@ -105,18 +103,17 @@ export class Exercise extends Instrument {
     }
   }
 
-  showVerdict({ element, verdict, seen, advice, watch, hint }, state, result = null) {
+  showVerdict({ trial, element, verdict, seen, advice, watch }, state, result = null) {
     const { words } = this
     element.dataset.state = state
     verdict.textContent = words(`exercise.live.${state}`)
-    seen.textContent = result === null ? '' : this.seenText(result, this.rows.findIndex((row) => row.element === element))
+    seen.textContent = result === null ? '' : this.seenText(result, trial)
     watch.hidden = result === null
-    advice.hidden = state !== 'failed' || hint === ''
+    advice.hidden = state !== 'failed'
   }
 
-  seenText({ seen, failure }, i) {
+  seenText({ seen, failure }, { digits, unit }) {
     if (seen === null) return this.words('exercise.live.unseen', { message: failure })
-    const { digits, unit } = this.config.exercise.trials[i]
     return this.words('exercise.live.seen', { value: withUnit(formatReadout(seen, digits).trim(), unit) })
   }
 

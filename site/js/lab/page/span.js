@@ -16,7 +16,7 @@ export function spanOf({ ymin, ymax, refLines = [] }, low, high) {
   const marks = refLines.map(({ y }) => y)
   const bottom = ymin ?? Math.min(low ?? Infinity, ...marks)
   const top = ymax ?? Math.max(high ?? -Infinity, ...marks)
-  if (top - bottom > SEEN * Math.max(Math.abs(top), Math.abs(bottom)) && Number.isFinite(top - bottom)) {
+  if (top - bottom > SEEN * Math.abs(top + bottom) && Number.isFinite(top - bottom)) {
     const room = ROOM * (top - bottom)
     return [ymin ?? bottom - room, ymax ?? top + room]
   }
