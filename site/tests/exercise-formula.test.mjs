@@ -34,6 +34,8 @@ test('what cannot be read is said at its place', () => {
     ['sin h', 'rest', 'h'],
     ['sqrt()', 'rest', ')'],
     ['9,81*h', 'rest', ',81*h'],
+    ['sqrt(2*9,81*h)', 'rest', ',81*h)'],
+    ['min(h)', 'rest', ')'],
     ['y = h', 'name', 'y'],
     ['h = 1', 'rest', '= 1'],
     ['constructor', 'name', 'constructor'],

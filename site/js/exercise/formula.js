@@ -32,30 +32,32 @@ export function formulaCode(text, { names, maths }) {
   const close = () => take(')') || stop()
   const chain = (read, ...signs) => {
     let code = read()
-    for (let sign = take(...signs); sign !== ''; sign = take(...signs)) code += sign + read()
+    for (let sign = take(...signs); sign; sign = take(...signs)) code += sign + read()
     return code
   }
   const sum = () => chain(product, '+', '-')
   const product = () => chain(signed, '*', '/', '%')
   const signed = () => {
     const sign = take('+', '-')
-    return sign === '' ? power() : `(${sign}${signed()})`
+    return sign ? `(${sign}${signed()})` : power()
   }
   const power = () => {
     const base = atom()
-    return take('^') === '' ? base : `(${base}**${signed()})`
+    return take('^') ? `(${base}**${signed()})` : base
   }
   const atom = () => {
-    if (take('(') !== '') return `(${sum()}${close()}`
+    if (take('(')) return `(${sum()}${close()}`
     const [name] = tokens[next] ?? stop()
-    if (take(...names) !== '') return name
-    if (take('pi', 'π') !== '') return 'Math.PI'
-    if (take(...maths) !== '') return `Math.${name}${take('(') || stop()}${chain(sum, ',')}${close()}`
+    if (take(...names)) return name
+    if (take('pi', 'π')) return 'Math.PI'
+    if (take(...maths)) return `Math.${name}${take('(') || stop()}${list(Math[name])}${close()}`
     if (/^[\p{L}_]/u.test(name)) throw new FormulaError('name', name)
     if (!/\d/.test(name)) stop()
     next += 1
     return String(Number(name))
   }
+  /** The arguments of a function: one, or of those such as `max` at least two. */
+  const list = ({ length }) => (length > 1 ? sum() + (take(',') || stop()) + chain(sum, ',') : sum())
   const code = sum()
   if (next < tokens.length) stop()
   return code

@@ -26,10 +26,8 @@ export class Exercise extends Instrument {
     const { exercise } = config
     this.controls.element?.remove() // its buttons belong to the trials
     this.loadedText = null
-    this.checkedText = null
     this.tries = 0
     this.stopJudging = () => {}
-    this.stateText = ''
     const texts = {
       label: words(`exercise.live.${exercise.subject}`, { names: exercise.names.join(', ') }),
       run: words('exercise.live.check'),
@@ -47,15 +45,15 @@ export class Exercise extends Instrument {
     this.body.prepend(this.editor.element)
   }
 
-  makeRow({ name, hint }, i) {
+  makeRow(trial, i) {
     const { words } = this
     const verdict = h('span', { class: 'exercise-verdict' }, words('exercise.live.waiting'))
     const seen = h('span', { class: 'exercise-seen' })
-    const advice = h('p', { class: 'exercise-hint', hidden: true }, hint)
+    const advice = h('p', { class: 'exercise-hint', hidden: true }, trial.hint)
     const watch = textButton(words('exercise.live.watch'), () => this.watch(i), 'lab-text')
     watch.hidden = true
-    const element = h('li', {}, h('p', {}, h('b', {}, name), ' ', verdict, ' ', seen, ' ', watch), advice)
-    return { element, verdict, seen, advice, watch, hint }
+    const element = h('li', {}, h('p', {}, h('b', {}, trial.name), ' ', verdict, ' ', seen, ' ', watch), advice)
+    return { trial, element, verdict, seen, advice, watch }
   }
 
   makeFoot() {
@@ -67,14 +65,15 @@ export class Exercise extends Instrument {
   // --- judging
 
   check() {
-    const { config, words, simulation, editor } = this
+    const { config, words, editor } = this
     this.stopJudging()
     for (const row of this.rows) this.showVerdict(row, 'waiting')
-    if (!this.read(editor.text)) return this.summary.replaceChildren()
+    this.showState('')
+    if (!this.read(editor.text)) return
     this.tries += 1
     this.checkedText = editor.text
-    this.summary.replaceChildren(words('exercise.live.checking'))
-    const { address } = simulation
+    this.showState(words('exercise.live.checking'))
+    const { address } = this.simulation
     const addresses = { worker: address(config.worker), module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
     const results = []
     const next = () => results.length < this.rows.length && this.showVerdict(this.rows[results.length], 'running')
@@ -104,18 +103,17 @@ export class Exercise extends Instrument {
     }
   }
 
-  showVerdict({ element, verdict, seen, advice, watch, hint }, state, result = null) {
+  showVerdict({ trial, element, verdict, seen, advice, watch }, state, result = null) {
     const { words } = this
     element.dataset.state = state
     verdict.textContent = words(`exercise.live.${state}`)
-    seen.textContent = result === null ? '' : this.seenText(result, this.rows.findIndex((row) => row.element === element))
+    seen.textContent = result === null ? '' : this.seenText(result, trial)
     watch.hidden = result === null
-    advice.hidden = state !== 'failed' || hint === ''
+    advice.hidden = state !== 'failed'
   }
 
-  seenText({ seen, failure }, i) {
+  seenText({ seen, failure }, { digits, unit }) {
     if (seen === null) return this.words('exercise.live.unseen', { message: failure })
-    const { digits, unit } = this.config.exercise.trials[i]
     return this.words('exercise.live.seen', { value: withUnit(formatReadout(seen, digits).trim(), unit) })
   }
 
@@ -126,8 +124,7 @@ export class Exercise extends Instrument {
     const passed = results.filter(Boolean).length
     const isSolved = passed === rows.length
     const isJudged = results.length === rows.length
-    this.stateText = isJudged ? words(isSolved ? 'exercise.live.solved' : 'exercise.live.unsolved', { n: passed, all: rows.length }) : ''
-    this.showState()
+    this.showState(isJudged ? words(isSolved ? 'exercise.live.solved' : 'exercise.live.unsolved', { n: passed, all: rows.length }) : '')
     if (!isSolved) return
     const { id } = config.exercise
     const lesson = document.querySelector('main')?.dataset.lesson ?? ''
@@ -136,11 +133,12 @@ export class Exercise extends Instrument {
     element.dispatchEvent(new CustomEvent('coursebuild:answered', { bubbles: true, detail: { quiz: id, key: id, answer } }))
   }
 
-  /** Show how many trials are passed, or else whether the reader has solved the exercise before. */
-  showState() {
+  /** Show how far the trials are, or else whether the reader has solved the exercise before. */
+  showState(state = this.stateText) {
+    this.stateText = state
     const { id } = this.config.exercise
     const isKept = this.progress?.get(id, id)?.right === true
-    const text = this.stateText || (isKept ? this.words('exercise.live.kept') : '')
+    const text = state || (isKept ? this.words('exercise.live.kept') : '')
     this.summary.replaceChildren(...(isKept ? [sign('read'), text] : [text]))
   }
 

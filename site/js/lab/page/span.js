@@ -2,6 +2,7 @@
 
 const ROOM = 0.06 // on either side of the data, as part of their range
 const FLAT = 0.05 // on either side of a flat line, as part of its value
+const SEEN = 1e-8 // of a value: what differs by less is a flat line, as labels of ten figures cannot tell it apart
 const LEAST = 1e-9
 
 /**
@@ -15,7 +16,7 @@ export function spanOf({ ymin, ymax, refLines = [] }, low, high) {
   const marks = refLines.map(({ y }) => y)
   const bottom = ymin ?? Math.min(low ?? Infinity, ...marks)
   const top = ymax ?? Math.max(high ?? -Infinity, ...marks)
-  if (top > bottom && Number.isFinite(top - bottom)) {
+  if (top - bottom > SEEN * Math.abs(top + bottom) && Number.isFinite(top - bottom)) {
     const room = ROOM * (top - bottom)
     return [ymin ?? bottom - room, ymax ?? top + room]
   }
