@@ -376,8 +376,10 @@ class TableMatcher:
             words = [*(name.before for name in names[1:]), tail] if are_behind else words
             likely = [n._replace(above=w.strip(" ,;")) for n, w in zip(names, words, strict=True)]
             verdicts = [*misplaced_titles(self.titles, likely, places)]
-            if len(verdicts) < 2:  # in one column alone it is a remark
-                likely, verdicts = names, [*misplaced_titles(self.titles, names, places)]
+            verdicts_before = [*misplaced_titles(self.titles, names, places)]
+            is_unit = bool(names[-1].unit) and not verdicts_before  # no name stands behind the last
+            if is_unit or len(verdicts) < 2:  # in one column alone it is a remark
+                likely, verdicts = names, verdicts_before
             for column, at, is_certain in verdicts:
                 if is_certain or not are_behind:
                     yield self.titles[column], likely[at].reading, is_certain
