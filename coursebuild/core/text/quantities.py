@@ -320,10 +320,10 @@ def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
 def title_of_column(line: str, start: int, header: str, *, has_names: bool = False) -> str:
     """The title in a header above a number of a row, in whose cell no words stand before it.
 
-    Empty where the two have other columns: not every number has a cell of its own, or one more
-    than the header has does not stand below its title. Words with single spaces may be a sentence:
-    they are titles only above a row of nothing but numbers, with `has_names` behind its first
-    cell, or where they line up with its cells.
+    Empty where the two may have other columns: where numbers share a cell that does not stand
+    below one title, or a row has one cell more and these do not stand below titles. Words with
+    single spaces may be a sentence: they are titles only above a row of nothing but numbers, with
+    `has_names` behind its first cell, or where they line up with its cells.
     """
     for pattern in _CELLS:
         row = [*pattern.finditer(_with_signs_of(header, line))]
@@ -334,12 +334,14 @@ def title_of_column(line: str, start: int, header: str, *, has_names: bool = Fal
             continue
         if not all(map(only_number, line[row[column].start() : start].split())):
             continue
-        if any(all(map(only_number, c[0].split()[-2:])) for c in row if " " in c[0].strip()):
-            continue  # two numbers in a cell
         pairs = [*zip(row[shift:], titles, strict=True)]
         are_aligned = all(a.start() == b.start() or a.end() == b.end() for a, b in pairs)
         are_below = all(a.start() < b.end() and b.start() < a.end() for a, b in pairs)
         are_parted = _SEPARATOR.search(line) is not None or are_below
+        if any(all(map(only_number, c[0].split()[-2:])) for c in row if " " in c[0].strip()):
+            counts = {len(_CELLS[1].findall(text)) for text in (line, header)}
+            if len(counts) == 1 or not are_below:
+                continue  # each of the numbers in one cell may have its own title
         is_table = pattern is _CELLS[0] and (shift == 0 or are_parted)
         are_numbers = shift == 0 and all(only_number(cell[0]) for cell in row[has_names:])
         if is_table or are_aligned or are_numbers:
