@@ -235,8 +235,8 @@ def diagnostics_of(
 ) -> tuple[Diagnostic, ...]:
     """Those that concern these lessons and pages; all where `documents` is `None`.
 
-    They are those in their files and in the map, and the errors in files that they use. `runs` are
-    those of their scripts.
+    They are those in their files and in the map, and the errors and hints in files that they use.
+    `runs` are those of their scripts.
     """
     if documents is None:
         return tuple(diagnostics)
@@ -255,7 +255,7 @@ def diagnostics_of(
     return tuple(
         d
         for d in diagnostics
-        if d.span.path in own_paths or (d.is_error and d.span.path in used_paths)
+        if d.span.path in own_paths or (d.severity != "warning" and d.span.path in used_paths)
     )
 
 

@@ -53,6 +53,14 @@ def test_errors_in_what_a_lesson_uses_are_errors_of_the_lesson(make: Make, use: 
     assert "holds" not in result.out.splitlines()[-1]
 
 
+def test_hints_on_a_model_that_a_lesson_uses_are_told_with_it(make: Make) -> None:
+    folder = make("## One\n\nSee [it](model:ball).\n", SECOND)
+    hinge = '<joint type="hinge" range="-1.5708 1.5708"/>'
+    folder.write("models/ball.xml", BALL.replace("<freejoint/>", hinge))
+    texts = [folder.main("check", lesson, "--hints").out for lesson in ("1.1", "1.2")]
+    assert ["hint[angle-unit]" in text for text in texts] == [True, False]
+
+
 def test_errors_in_what_a_lesson_does_not_use_are_none_of_its(make: Make) -> None:
     folder = make(FIRST, "## Two\n\n" + block("two.py", "print(2)", "3") + LAB)
     folder.write("models/ball.xml", BROKEN)

@@ -90,9 +90,10 @@ def test_what_the_map_says_of_a_lesson_is_in_its_language(make: Make) -> None:
     assert folder.main("check").status == 0
 
 
-def test_spaces_that_part_thousands_stay(make: Make) -> None:
+def test_spaces_between_digits_stay(make: Make) -> None:
     script = 'scale = 1\nprint("steps", 12000 * scale)\nprint(f"mass {1234567.5 * scale:,} kg")'
-    text = "`12\u202f000`{out}, `12 000`{out}, `1\u00a0234\u00a0568 kg`{out}"
+    script += '\nprint("ratio", 0.1250001 * scale)'
+    text = "`0.125 000 1`{out}, `12\u202f000`{out}, `12 000`{out}, `1\u00a0234\u00a0568 kg`{out}"
     german = f"{text}, `1\u202f234\u202f567,5 kg`{{out}}, `1 234 567,5`{{out}}"
     script = f"```python file=examples/a.py\n{script}\n```\n\n```output\n```\n\n"
     folder = make(f"{script}{text}\n", script.replace("a.py", "b.py") + f"{german}\n")
@@ -103,7 +104,7 @@ def test_spaces_that_part_thousands_stay(make: Make) -> None:
     for path in ("1.1-one", "1.2-two"):
         folder.replace(f"content/lessons/{path}.md", "scale = 1", "scale = 2")
     assert folder.main("update").status == 0
-    doubled = "`24\u202f000`{out}, `24 000`{out}, `2\u00a0469\u00a0135 kg`{out}"
+    doubled = "`0.250 000 2`{out}, `24\u202f000`{out}, `24 000`{out}, `2\u00a0469\u00a0135 kg`{out}"
     assert doubled in folder.text("content/lessons/1.1-one.md")
     german = f"{doubled}, `2\u202f469\u202f135,0 kg`{{out}}, `2 469 135,0`{{out}}"
     assert german in folder.text("content/lessons/1.2-two.md")

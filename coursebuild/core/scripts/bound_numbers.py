@@ -34,6 +34,8 @@ _STRAY = re.compile(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
 """What beside a number is neither a unit nor a word: `-9.81-` has a slip."""
 
 
+_DECIMALS = re.compile(r"\.?[0-9]{1,3}")
+"""Decimals in threes, the first with their point."""
 _STRAY_INSIDE = re.compile(r"[-+*/=_]+(?=\s)")
 
 
@@ -60,6 +62,8 @@ class BoundText(Struct, frozen=True):
     """Whether its numbers were written with a comma before the decimals; here it is a point."""
     space: str = ""
     """What parted thousands, if a space did; here it is a comma."""
+    decimal_space: str = ""
+    """What parted decimals in threes, if a space did; here nothing does."""
 
     @classmethod
     def of(cls, text: str, comma: bool = False, *, may_join: bool = False) -> BoundText:
@@ -67,8 +71,11 @@ class BoundText(Struct, frozen=True):
 
         `may_join`: spaces, also ordinary ones, may part thousands, and groups of decimals.
         """
-        if may_join:
-            text = replace_ranges(text, ((*gap, "") for gap in decimal_gaps(text, comma)))
+        if gaps := decimal_gaps(text, comma) if may_join else ():
+            joined = cls.of(
+                replace_ranges(text, ((*gap, "") for gap in gaps)), comma, may_join=True
+            )
+            return replace(joined, decimal_space=text[slice(*gaps[0])])
         pointed = as_printed(join_thousands(text) if may_join else text, comma)
         if pointed != text:
             return replace(cls.of(pointed), comma=comma, space=group_space(text))
@@ -101,7 +108,11 @@ class BoundText(Struct, frozen=True):
         return replace_ranges(self.text, places)
 
     def as_written(self, number: str) -> str:
-        """A printed number with the decimal comma, and the spaces of thousands, that it has."""
+        """A printed number with the decimal comma, and the spaces between digits, that it has."""
+        if self.decimal_space:
+            number = re.sub(
+                r"\.[0-9]{4,}", lambda m: self.decimal_space.join(_DECIMALS.findall(m[0])), number
+            )
         number = write_comma(number) if self.comma else number
         return number.replace("." if self.comma else ",", self.space) if self.space else number
 

@@ -259,13 +259,13 @@ class TableMatcher:
             )
             matches.append(best)
         are_all = layout is not None and len(lines) == len(self.rows)
+        are_only = [len({fit.line for fit in fits_of_row}) == 1 for fits_of_row in fits]
         are_named = all(
-            fit is not None and self._is_named(row, fit, fits[row])
+            fit is not None and (are_only[row] or self._is_named(row, fit, fits[row]))
             for row, fit in enumerate(matches)
         )
         for row, fit in enumerate(matches):
-            is_only = len({fit.line for fit in fits[row]}) == 1
-            is_certain = fit is None or fit.is_right or is_only or are_all or are_named
+            is_certain = fit is None or fit.is_right or are_only[row] or are_all or are_named
             yield self._row_match(row, fit, is_certain=is_certain)
 
     def _is_named(self, row: int, fit: Fit, fits: Iterable[Fit]) -> bool:
@@ -376,8 +376,10 @@ class TableMatcher:
             words = [*(name.before for name in names[1:]), tail] if are_behind else words
             likely = [n._replace(above=w.strip(" ,;")) for n, w in zip(names, words, strict=True)]
             verdicts = [*misplaced_titles(self.titles, likely, places)]
-            if len(verdicts) < 2:  # in one column alone it is a remark
-                likely, verdicts = names, [*misplaced_titles(self.titles, names, places)]
+            verdicts_before = [*misplaced_titles(self.titles, names, places)]
+            is_unit = bool(names[-1].unit) and not verdicts_before  # no name stands behind the last
+            if is_unit or len(verdicts) < 2:  # in one column alone it is a remark
+                likely, verdicts = names, verdicts_before
             for column, at, is_certain in verdicts:
                 if is_certain or not are_behind:
                     yield self.titles[column], likely[at].reading, is_certain

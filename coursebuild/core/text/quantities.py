@@ -91,6 +91,7 @@ _CELLS = (
 
 `\u2026` is one, without gaps: what varies from run to run stands there.
 """
+_SEPARATOR = re.compile(r"[\t|;,\u2026]")
 _RULE = re.compile(r"[\s\-=+|:─━═┼]*")
 
 
@@ -183,6 +184,7 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
         longer = read_unit(bare)
         may_not_follow = r"[=:\d.+−-]" if has_names or count > 1 else "[=:]"
         is_certain = re.match(may_not_follow, follows) is None
+        is_certain &= count == 1 or not word.endswith(":")  # a label, as in `3 kg N: 1`
         if longer and not unit:
             is_word = is_name(bare) and follows.strip("|") != ""
             is_word |= bare in ("d", "min") and _has_maximum(text)
@@ -306,31 +308,22 @@ def unit_of_column(line: str, start: int, above: Sequence[str]) -> UnitText:
 
     `above`: the lines above the row, the last of which stands right above.
     """
-    for pattern in _CELLS:
-        row = [*pattern.finditer(line)]
-        column = next((i for i, cell in enumerate(row) if cell.end() > start), 0)
-        # Single spaces part words as well
-        cells_that_tell = row[1:] if pattern is _CELLS[1] else row[column : column + 1]
-        are_numbers = all(only_number(c[0]) or c[0] == "\u2026" for c in cells_that_tell)
-        if len(row) < 2 or not are_numbers:
+    for header in reversed(above):
+        if _RULE.fullmatch(header) and header.strip():
             continue
-        for header in reversed(above):
-            places = pattern.finditer(_with_signs_of(line, header))
-            cells = [header[place.start() : place.end()] for place in places]
-            if _RULE.fullmatch(header) and header.strip():
-                continue
-            if len(cells) != len(row):
-                break
-            if not any(only_number(cell) for cell in cells):
-                return unit_of_header(cells[column])
+        title = title_of_column(line, start, header, has_names=True)
+        if not title or only_number(title) is None:
+            return unit_of_header(title)
     return NO_UNIT
 
 
-def title_of_column(line: str, start: int, header: str) -> str:
+def title_of_column(line: str, start: int, header: str, *, has_names: bool = False) -> str:
     """The title in a header above a number of a row, in whose cell no words stand before it.
 
-    Empty where the two have other columns. Words with single spaces may be a sentence: they are
-    titles only above a row of nothing but numbers, or where they line up with its cells.
+    Empty where the two may have other columns: where numbers share a cell that does not stand
+    below one title, or a row has one cell more and these do not stand below titles. Words with
+    single spaces may be a sentence: they are titles only above a row of nothing but numbers, with
+    `has_names` behind its first cell, or where they line up with its cells.
     """
     for pattern in _CELLS:
         row = [*pattern.finditer(_with_signs_of(header, line))]
@@ -343,8 +336,15 @@ def title_of_column(line: str, start: int, header: str) -> str:
             continue
         pairs = [*zip(row[shift:], titles, strict=True)]
         are_aligned = all(a.start() == b.start() or a.end() == b.end() for a, b in pairs)
-        are_numbers = shift == 0 and all(only_number(cell[0]) for cell in row)
-        if pattern is _CELLS[0] or are_aligned or are_numbers:
+        are_below = all(a.start() < b.end() and b.start() < a.end() for a, b in pairs)
+        are_parted = _SEPARATOR.search(line) is not None or are_below
+        if any(all(map(only_number, c[0].split()[-2:])) for c in row if " " in c[0].strip()):
+            counts = {len(_CELLS[1].findall(text)) for text in (line, header)}
+            if len(counts) == 1 or not are_below:
+                continue  # each of the numbers in one cell may have its own title
+        is_table = pattern is _CELLS[0] and (shift == 0 or are_parted)
+        are_numbers = shift == 0 and all(only_number(cell[0]) for cell in row[has_names:])
+        if is_table or are_aligned or are_numbers:
             title = titles[column - shift]
             return header[title.start() : title.end()]
     return ""

@@ -321,6 +321,12 @@ def _find_mistake_as_read(
         of_decimals = has_scale or (left, right)[1 - i].has_decimals()
         if decide(agrees(rounded, values[1 - i], relation, of_decimals=of_decimals), right):
             return None
+    if len(numerals) == 2 and not any(n.is_whole for n in numerals.values()):
+        a, b = numerals.values()
+        pairs = (a.unit_size, b.unit_size), (a.step, b.step)
+        is_converted = all((x - y).sign() != 0 for x, y in pairs)
+        if is_converted and (a.value.widen(a.step) - b.value.widen(b.step)).sign() is None:
+            return None  # one number rounds to both: 8.3144 J are 0.082057 L atm
     result = f"{numeral.express(value):.{max(numeral.digits + 2, 4)}g}"
     is_rounded = numeral.is_whole and relation == "=" and agrees(numeral, value, "≈")
     help = "write `\\approx` where a whole number is rounded" if is_rounded else ""

@@ -120,7 +120,7 @@ def test_the_numbers_of_a_table_are_replaced_in_place() -> None:
     )
     rows, printed = "| a | 1,234 | 1\u202f234 |", "a  1234567  3456.5\n"
     assert table_after(rows, printed) == "| a | 1,234,567 | 3\u202f456.5 |"
-    assert table_after("| a | 0.125 250 7 |", "a 0.1252508\n") == "| a | 0.1252508 |"
+    assert table_after("| a | 0.125 250 7 |", "a 0.1252508\n") == "| a | 0.125 250 8 |"
     assert table_after("| a | 3 m | 5% |", "a 4 m 6 %\n") == "| a | 4 m | 6% |"
     with pytest.raises(AssertionError, match="`mm` is not what is printed here"):
         table_after("| a | 3 mm | |", "a 4 m\n")
