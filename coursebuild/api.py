@@ -98,6 +98,7 @@ from coursebuild.core.text.diagnostics import Note as Note
 from coursebuild.core.text.diagnostics import Parsed as Parsed
 from coursebuild.core.text.diagnostics import diagnose as diagnose
 from coursebuild.core.text.diagnostics import did_you_mean as did_you_mean
+from coursebuild.core.text.regex import regex as regex
 from coursebuild.core.text.rules import Rule as Rule
 from coursebuild.core.text.source import Excerpt as Excerpt
 from coursebuild.core.text.source import Source as Source

@@ -22,9 +22,10 @@ import pytest
 from coursebuild.core.files.course_root import MAP, find_course_root
 from coursebuild.core.run import gate
 from coursebuild.core.text.characters import without_commands
+from coursebuild.core.text.regex import regex
 
 _PAGE, _MAP, _MODEL = "page", "map", "model"
-_PLACE = re.compile(r"^ *--> (.*):(\d+):\d+$", re.MULTILINE)
+_PLACE = regex(r"^ *--> (.*):(\d+):\d+$", re.MULTILINE)
 _HELP = "collect the scripts, labs, quizzes, models and pages of courses as tests"
 
 _Lines = tuple[tuple[int, int], ...]

@@ -6,7 +6,6 @@ import functools
 import hashlib
 import importlib
 import importlib.util
-import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import EntryPoint, entry_points
@@ -41,6 +40,7 @@ from coursebuild.core.pages.library import Library
 from coursebuild.core.run.script_environment import Interpreter
 from coursebuild.core.syntax.fence import Fence, TextParser
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.rules import RULES, Severity
 from coursebuild.core.text.source import Span
 
@@ -75,7 +75,7 @@ _INSTALLED_BY = {
 """Where the features come from that courses commonly use, for messages."""
 
 _NEWER = "install a newer coursebuild"
-_PAGE_NAME = re.compile("[a-z][a-z0-9-]*")
+_PAGE_NAME = regex("[a-z][a-z0-9-]*")
 
 _of_course: tuple[Feature, ...] = ()
 _digest = ""

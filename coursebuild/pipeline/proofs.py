@@ -10,7 +10,6 @@ Entry points: `proved_texts`, `find_losses`; `remarks_on_proofs`, which `check` 
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Literal, TypeAlias
@@ -35,6 +34,7 @@ from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.registry import feature_trials, features
 from coursebuild.core.scripts.bound_places import document_bindings, moved_values
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Source, Span
 from coursebuild.core.values import fingerprint
 from coursebuild.pipeline.verify import Verification
@@ -43,10 +43,10 @@ from coursebuild.report.values import plural
 Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "block", "link", "result"]
 KIND = "proofs"
 """That of entries of the store: what was proved of a document, by the hash of its path."""
-_OPAQUE = re.compile(r"[A-Za-z][\w+.-]*:(?!//)")
+_OPAQUE = regex(r"[A-Za-z][\w+.-]*:(?!//)")
 """An address that nothing looks up, as `mailto:` and a misspelt `lesson:`."""
-_FENCE = re.compile(r"(?:`{3,}|~{3,})[ ]*(?P<word>[\w-]+)")
-_NUMBER = re.compile(r"\d+(?:\.\d+)?")
+_FENCE = regex(r"(?:`{3,}|~{3,})[ ]*(?P<word>[\w-]+)")
+_NUMBER = regex(r"\d+(?:\.\d+)?")
 _TRIED = frozenset(("lab", "exercise"))
 """Blocks that are proved by a trial."""
 

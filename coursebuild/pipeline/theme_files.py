@@ -24,10 +24,11 @@ from coursebuild.core.pages.renderer import TemplateFailure, find_template_error
 from coursebuild.core.pages.theme import course_face
 from coursebuild.core.scripts.figures import prepare_figure
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose, did_you_mean
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Source
 
-_ORIGIN = re.compile(r"\{# Copied from coursebuild (\S+): (\w+)")
-_LOADS = re.compile(r"""@import[^;]*|url\(\s*["']?(?!#|data:|["'\s])[^()]*\)""", re.IGNORECASE)
+_ORIGIN = regex(r"\{# Copied from coursebuild (\S+): (\w+)")
+_LOADS = regex(r"""@import[^;]*|url\(\s*["']?(?!#|data:|["'\s])[^()]*\)""", re.IGNORECASE)
 """Parts of a style sheet that load another file."""
 
 

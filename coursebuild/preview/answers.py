@@ -28,9 +28,10 @@ from coursebuild.core.files.resources import Bundle, template_texts
 from coursebuild.core.pages.assets import page_script
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.core.pages.renderer import DEFAULT_LANGUAGE, Strings
+from coursebuild.core.text.regex import regex
 from coursebuild.preview.session import Session
 
-_HOST = re.compile(r"(?:[a-z0-9._-]+|\[[0-9a-f:.]+\])(?::(?P<port>[0-9]{1,5}))?")
+_HOST = regex(r"(?:[a-z0-9._-]+|\[[0-9a-f:.]+\])(?::(?P<port>[0-9]{1,5}))?")
 
 
 class Access(Struct, frozen=True):

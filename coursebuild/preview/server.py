@@ -40,6 +40,7 @@ import msgspec
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.trust import store_key
 from coursebuild.core.run import gate
+from coursebuild.core.text.regex import regex
 from coursebuild.preview.answers import HTML, PREFIX, TEXT, Access, Answers, digest, is_worker
 from coursebuild.preview.messages import accept, page_news
 from coursebuild.preview.session import Session
@@ -48,13 +49,13 @@ from coursebuild.report.text import location
 _HEARTBEAT = 15.0
 """Seconds between signs of life on an event stream, by which a browser that went away is noticed.
 """
-_IMMUTABLE = re.compile(r"/(?:[^?#]*/)?assets/[^?#]+\.[0-9a-f]{8}\.[a-z0-9]+")
+_IMMUTABLE = regex(r"/(?:[^?#]*/)?assets/[^?#]+\.[0-9a-f]{8}\.[a-z0-9]+")
 _LARGEST = 1 << 16
 """Bytes of a line of a request's head, and of its body."""
 _MOST_LINES = 100
 """Lines of a request's head."""
-_REQUEST_LINE = re.compile(rb"[A-Z]+ [!-~]+ HTTP/1\.[01]\r\n")
-_HEADER_LINE = re.compile(rb"([\w!#$%&'*+.^`|~-]+):[ \t]*+([\t -~\x80-\xff]*+)\r\n", re.ASCII)
+_REQUEST_LINE = regex(rb"[A-Z]+ [!-~]+ HTTP/1\.[01]\r\n")
+_HEADER_LINE = regex(rb"([\w!#$%&'*+.^`|~-]+):[ \t]*+([\t -~\x80-\xff]*+)\r\n", re.ASCII)
 _ONCE = (b"content-length", b"host", b"origin", b"sec-fetch-site", b"sec-fetch-mode")
 """Headers by which a request is judged."""
 _DRAWING_POLICY = "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'"

@@ -37,13 +37,14 @@ from coursebuild.core.text.diagnostics import (
     propose,
 )
 from coursebuild.core.text.near import nearest
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source, Span
 
-INCLUDED_ROOT = re.compile(r"\s*+(?>(?:<(?:\?.*?\?|!--.*?--)>\s*+)*)<mujocoinclude\b", re.DOTALL)
+INCLUDED_ROOT = regex(r"\s*+(?>(?:<(?:\?.*?\?|!--.*?--)>\s*+)*)<mujocoinclude\b", re.DOTALL)
 """How a file begins that is meant to be included by others."""
 
 
-_OPENING = re.compile(r"MISMATCHED_ELEMENT.*Line number=(\d+): XMLElement name=(\S+)")
+_OPENING = regex(r"MISMATCHED_ELEMENT.*Line number=(\d+): XMLElement name=(\S+)")
 
 
 class MjcfText(Struct, frozen=True):
@@ -253,7 +254,7 @@ def _find_fault(text: MjcfText) -> Iterator[Diagnostic]:
         yield text.diagnose(f"holds {fault}", place, help)
 
 
-_TEMPLATE = re.compile(r"\{\{|\{%|\$\{|\$\((?:arg|find)\b|\bxacro:")
+_TEMPLATE = regex(r"\{\{|\{%|\$\{|\$\((?:arg|find)\b|\bxacro:")
 
 
 def _check_text(

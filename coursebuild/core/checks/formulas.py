@@ -30,6 +30,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.near import nearest
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 
 SYMBOLS = frozenset(
@@ -53,14 +54,14 @@ _WITH_BRACES = frozenset(
     """.split()
 )
 """Commands whose argument stands in braces."""
-_LETTERS = re.compile(
+_LETTERS = regex(
     r"(?<![\\A-Za-z])((?:\\\\)?([A-Za-z]{2,}))(?![A-Za-z0-9])"
     r"(?=(\s*(?:\\(?:left|[bB]igg?l?)\s*)?\()|(\{)|)"
 )
-_COMMAND = re.compile(r"(?<!\\)\\([A-Za-z]+)")
-_LETTER = re.compile(r"(?<![A-Za-z\\])[A-Za-z](?![A-Za-z])")
-_BRACKET = re.compile(r"\\[{}]|\\.|[()\[\]]", re.DOTALL)
-_NAMED_BRACKET = re.compile(r"\\[lr](?:brack|brace|paren)(?![A-Za-z])")
+_COMMAND = regex(r"(?<!\\)\\([A-Za-z]+)")
+_LETTER = regex(r"(?<![A-Za-z\\])[A-Za-z](?![A-Za-z])")
+_BRACKET = regex(r"\\[{}]|\\.|[()\[\]]", re.DOTALL)
+_NAMED_BRACKET = regex(r"\\[lr](?:brack|brace|paren)(?![A-Za-z])")
 """The commands by which an author says that a bracket stands alone."""
 _STEPS = {"(": (1,), "{": (1,), ")": (-1,), "}": (-1,), "[": (1, -1), "]": (1, -1)}
 """By how much a bracket may change the number of those that are open."""

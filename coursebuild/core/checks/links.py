@@ -21,9 +21,10 @@ from coursebuild.core.text.diagnostics import (
     propose,
 )
 from coursebuild.core.text.near import nearest
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
-_HTML_ANCHOR = re.compile(
+_HTML_ANCHOR = regex(
     r"""<a\s[^>]*?\bhref\s*=\s*(\\?["'])?(#(?(1)(?:(?!\1).)+|[^"'\s>]+))""", re.IGNORECASE
 )
 

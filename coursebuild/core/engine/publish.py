@@ -18,7 +18,6 @@ import ctypes
 import errno
 import hashlib
 import os
-import re
 import stat
 import sys
 from collections.abc import Callable, Iterable
@@ -32,6 +31,7 @@ from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError, PublishRefusedError, reason
 from coursebuild.core.files.locks import folder_lock, remove_folder
 from coursebuild.core.model.results import FileFacts, FileList, OutputFile, SiteFile
+from coursebuild.core.text.regex import regex
 
 _EXCHANGE = {"linux": "renameat2", "darwin": "renameatx_np"}
 """The system's function that swaps two paths; it takes the same arguments on both systems."""
@@ -174,7 +174,7 @@ def _sibling(place: Path, suffix: str) -> Path:
 
 # --- the slot
 
-_NO_PATH = re.compile(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
+_NO_PATH = regex(r"(?:\A|/)\.{0,2}(?:/|\Z)|[\x00-\x1f\\]")
 """What no path may have: an empty part, `.` or `..`, a control character, a backslash."""
 _MIN_FOR_COPIES = 128
 """How many files make it worth starting copies of this process."""

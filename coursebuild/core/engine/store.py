@@ -16,7 +16,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
-import re
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -30,6 +29,7 @@ from coursebuild.core.engine.shared_place import SharedPlace, in_words
 from coursebuild.core.files import trust
 from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import reason
+from coursebuild.core.text.regex import regex
 from coursebuild.core.values import DAMAGE
 
 Value = TypeVar("Value")
@@ -37,7 +37,7 @@ T = TypeVar("T")
 
 SIZE = 1 << 30
 """Bytes that all entries may take together."""
-HASH = re.compile(r"[0-9a-f]{64}")
+HASH = regex(r"[0-9a-f]{64}")
 """The name of an entry or of a group of entries."""
 _USE_INTERVAL = 3600.0
 """Seconds after which the use of an entry is noted again, and a killed writer's file is removed."""

@@ -27,6 +27,7 @@ from coursebuild.core.model.inlines import (
     Term,
     UrlTarget,
 )
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Source, Span
 
 
@@ -62,11 +63,11 @@ AnchorOwner: TypeAlias = (
 )
 """What an anchor of a document leads to; a source for the title of a page."""
 
-_HTML_ID = re.compile(
+_HTML_ID = regex(
     r"""<(?:[^<>]*?\sid|a\s(?:[^<>]*?\s)?name)\s*=\s*(["'])?((?(1)(?:(?!\1).)+|[^"'\s>]+))""",
     re.IGNORECASE,
 )
-_NO_MARKUP = re.compile(
+_NO_MARKUP = regex(
     r"<!--.*?(?:-->|\Z)|(<(script|style|textarea|title)\b[^<>]*>).*?(?:</\2\s*>|\Z)",
     re.IGNORECASE | re.DOTALL,
 )
@@ -147,7 +148,7 @@ def scenario_anchor(name: str) -> str:
     return f"measured-{name}"
 
 
-_LINES = re.compile(r"(?P<stem>.+)\.L(?P<first>[1-9][0-9]{0,8})(?:-L(?P<last>[1-9][0-9]{0,8}))?")
+_LINES = regex(r"(?P<stem>.+)\.L(?P<first>[1-9][0-9]{0,8})(?:-L(?P<last>[1-9][0-9]{0,8}))?")
 
 
 def linked_lines(anchor: str) -> tuple[str, int, int] | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import re
 from collections.abc import Mapping
 from decimal import Decimal
 from itertools import accumulate
@@ -12,11 +11,12 @@ from typing import Annotated, ClassVar, Literal, TypeAlias, TypeVar
 from msgspec import Meta, Struct
 
 from coursebuild.core.model.inlines import Inline, Label, Located, RawHtml, SourceMark
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _S = TypeVar("_S", bound=Struct)
 
-_TITLE = re.compile(r"\ufeff?(?:[ \t\r]*\n)*# +(.*\S)")
+_TITLE = regex(r"\ufeff?(?:[ \t\r]*\n)*# +(.*\S)")
 
 
 class Labelled(Located, frozen=True, kw_only=True):

@@ -23,6 +23,7 @@ from coursebuild.core.model.fields import (
 from coursebuild.core.model.inlines import NumberBinding
 from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.scenarios import Declarations
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Source, Span, key_of
 
 CALLOUTS: tuple[str, ...] = tuple(
@@ -119,8 +120,8 @@ PICTURES = ("logo", "logo_dark", "icon", "touch_icon")
 TEMPLATES = "theme/templates/"
 
 
-_COMMENT = re.compile("<!--(.*?)-->", re.DOTALL)
-_LICENCE = re.compile("copyright|licen[cs]e", re.IGNORECASE)
+_COMMENT = regex("<!--(.*?)-->", re.DOTALL)
+_LICENCE = regex("copyright|licen[cs]e", re.IGNORECASE)
 
 LessonId: TypeAlias = Annotated[
     str,

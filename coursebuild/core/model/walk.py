@@ -7,7 +7,6 @@ on other pages too.
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple, TypeVar
@@ -48,6 +47,7 @@ from coursebuild.core.model.inlines import (
     RawInline,
     Term,
 )
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span, key_of
 
 Value = TypeVar("Value")
@@ -58,7 +58,7 @@ _BLOCK_CONTAINERS = (BlockQuote, Callout, ListBlock, FeatureBlock, Recording)
 """Blocks that may contain blocks."""
 _INLINE_CONTAINERS = (Parent, Link)
 """A tuple, since `Parent | Link` would be made anew at every step."""
-_COMMENTS = re.compile(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
+_COMMENTS = regex(r"(?:\s*<!--(?:(?!-->)[\s\S])*-->)*\s*")
 
 
 def child_blocks(block: Block) -> tuple[Block, ...]:

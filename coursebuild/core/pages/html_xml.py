@@ -22,6 +22,7 @@ from msgspec import Struct, field
 from selectolax.lexbor import LexborHTMLParser, LexborNode
 
 from coursebuild.core.text.characters import clean_xml
+from coursebuild.core.text.regex import regex
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
 _RAW = frozenset("script style xmp iframe noembed noframes plaintext".split())
@@ -33,7 +34,7 @@ _NAMESPACES = {
     "math": "http://www.w3.org/1998/Math/MathML",
 }
 _XLINK = "http://www.w3.org/1999/xlink"
-_XML_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
+_XML_NAME = regex(r"[A-Za-z_][A-Za-z0-9_.-]*")
 
 
 class HtmlElement(Struct):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
@@ -25,6 +24,7 @@ from coursebuild.core.model.script_download import ScriptDownload
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.renderer import Renderer, Strings, known_mathml
+from coursebuild.core.text.regex import regex
 
 Value = TypeVar("Value")
 
@@ -235,9 +235,9 @@ def links(course: model.Course, document: model.Document) -> Iterator[model.Targ
         yield model.resolve(link.target, course, document.source.path)
 
 
-_MODEL_PATH = re.compile(r"""model_path\(\s*[rR]?(["'])(.+?)\1""")
-_QUOTED_WORD = re.compile(r"""(["'])([A-Za-z_][\w/-]{0,80})\1""")
-_REVERSED_FILE = re.compile(r"lmx(?<!\wlmx)\.([\w./-]+)")
+_MODEL_PATH = regex(r"""model_path\(\s*[rR]?(["'])(.+?)\1""")
+_QUOTED_WORD = regex(r"""(["'])([A-Za-z_][\w/-]{0,80})\1""")
+_REVERSED_FILE = regex(r"lmx(?<!\wlmx)\.([\w./-]+)")
 """A file's name from its end on: so each is read once."""
 
 

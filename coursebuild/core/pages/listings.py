@@ -8,7 +8,6 @@ lesson makes on purpose. The many kinds of tokens are mapped to few classes.
 from __future__ import annotations
 
 import functools
-import re
 from collections.abc import Iterable, Iterator
 from html import escape
 from itertools import pairwise
@@ -18,6 +17,7 @@ from markupsafe import Markup
 from tree_sitter import Language, Parser, Query, QueryCursor
 
 from coursebuild.core.text.characters import visible
+from coursebuild.core.text.regex import regex
 
 _KEYWORDS = """
     and as assert async await break case class continue def del elif else except finally for from
@@ -71,7 +71,7 @@ _MAX_FOR_TREE_SITTER = 20_000
 """The most characters of Python that tree-sitter reads. For absurd texts, such as backslashes only,
 its time grows with the square of the length, unlike that of Pygments: a second at this length."""
 _PLAIN = ("", "text")
-_WITHOUT_OUTER_SPACE = re.compile(r"\S(?:.*\S)?")
+_WITHOUT_OUTER_SPACE = regex(r"\S(?:.*\S)?")
 
 
 def highlight_lines(language: str, code: str) -> tuple[Markup, ...]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from coursebuild.core.text.regex import regex
+
 
 def hang(mark: str, text: str, indent: int | None = None) -> str:
     """Text after a mark, its further lines indented by `indent` or the width of the mark."""
@@ -27,7 +29,7 @@ def fence(language: str, text: str, *, wary: bool = False) -> str:
     return f"{ticks}{language}\n{body}{ticks}"
 
 
-_FENCES = re.compile(r"(?:^|\r)[ ]*(`{3,})", re.MULTILINE)
+_FENCES = regex(r"(?:^|\r)[ ]*(`{3,})", re.MULTILINE)
 
 
 def code_span(text: str, ticks: str = "") -> str:
@@ -41,8 +43,8 @@ def code_span(text: str, ticks: str = "") -> str:
     return f"{ticks}{pad}{text}{pad}{ticks}"
 
 
-_TICKS = re.compile("`+")
-_MARKS = re.compile(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
+_TICKS = regex("`+")
+_MARKS = regex(r"[\\`*\[\]<$|]|!$|~(?=~)|(?<=~)~|&(?=#?\w+;)|(?<![^\W_])_|_(?![^\W_])")
 
 
 def escape_marks(text: str) -> str:
@@ -55,7 +57,7 @@ def escape_line(text: str) -> str:
     return escape_marks(" ".join(text.split()))
 
 
-_READ_BY_SOME = re.compile(r"(?<!\\)~|@|:(?=/)|(?<=/)/|\.(?=[^\W\d_])")
+_READ_BY_SOME = regex(r"(?<!\\)~|@|:(?=/)|(?<=/)/|\.(?=[^\W\d_])")
 """What strikes text out, or is part of an address that becomes a link by itself."""
 
 
@@ -83,7 +85,7 @@ def table(head: Iterable[str], rows: Iterable[Iterable[str]], align: Iterable[st
     return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
 
 
-_NEEDS_BRACKETS = re.compile(r"[\s<>()\\]")
+_NEEDS_BRACKETS = regex(r"[\s<>()\\]")
 """Characters that an address may contain only in angle brackets."""
 
 
@@ -102,7 +104,7 @@ def _title(title: str) -> str:
     return f' "{text}"'
 
 
-_BLOCK_START = re.compile(
+_BLOCK_START = regex(
     r"(?P<mark>\#{1,6}(?=\s|$)|>|[-+*](?=\s|$)|~~~|`{3,}[^`]*$|=+\s*$|-+\s*$|(?:-\s*){3,}$|(?:\*\s*){3,}$|(?:_\s*){3,}$"
     r"|[|:\s-]*-[|:\s-]*$)"
     r"|(?P<number>\d{1,9})(?P<after>[.)])(?=\s|$)"

@@ -6,7 +6,6 @@ the writer that `PageContext` overrides; as it is here, text is written that is 
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable
 from typing import Literal, TypeAlias
 from urllib.parse import quote
@@ -22,6 +21,7 @@ from coursebuild.core.pages.typography import (
     split_quantities,
     unit_length,
 )
+from coursebuild.core.text.regex import regex
 
 SpecialBlock: TypeAlias = (
     model.Callout
@@ -40,7 +40,7 @@ def escape(text: str) -> str:
     return text.replace(">", "&gt;").replace('"', "&quot;")
 
 
-_SIMPLE = re.compile('[^0-9&<>"]*+')
+_SIMPLE = regex('[^0-9&<>"]*+')
 _APART = (type(None), model.SoftBreak, model.HardBreak)
 """What stands beside a text of which no word goes on."""
 

@@ -24,12 +24,13 @@ from coursebuild.core import model
 from coursebuild.core.model.results import Mathml
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.renderer import Strings
+from coursebuild.core.text.regex import regex
 
 TextT = TypeVar("TextT", str, Markup)
 
 _COUNTER_CLASS = 'class="tml-eqn"'
 _TAG_CLASS = 'class="tml-tag"'
-_NUMBER = re.compile(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
+_NUMBER = regex(r'<mtext class="tml-tag">\(?([^<]*?)\)?</mtext>')
 
 
 def number_items(document: model.Document, mathml: Mathml) -> dict[int, model.NumberedItem]:

@@ -46,6 +46,7 @@ from coursebuild.core.pages.theme import (
 from coursebuild.core.pages.typography import FORMULA
 from coursebuild.core.registry import features
 from coursebuild.core.text.characters import visible
+from coursebuild.core.text.regex import regex
 
 
 class PageFacts(Struct, frozen=True):
@@ -113,7 +114,7 @@ def record(
 # --- inline styles
 
 _INSIDE = r"""(?>(?:[^"'>]++|"[^"]*+(?:"|\Z)|'[^']*+(?:'|\Z))*)"""
-_PIECE = re.compile(
+_PIECE = regex(
     r"<!--.*?(?:-->|\Z)"
     rf"|<(?P<raw>script|style|textarea|title)\b{_INSIDE}(?:\Z|(?<!/)>.*?(?:</(?P=raw)\s*>|\Z))"
     rf"|<(?P<tag>[a-zA-Z]{_INSIDE})(?:>|\Z)",
@@ -122,7 +123,7 @@ _PIECE = re.compile(
 """A comment, an element of raw text, or a tag, so that only real attributes are found. What never
 ends takes the rest of the page, as in browsers."""
 
-_ATTRIBUTE = re.compile(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
+_ATTRIBUTE = regex(r"""\s+([^\s"'>/=]+)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?""")
 
 
 def hoist_styles(html: str) -> tuple[str, frozenset[str]]:
@@ -191,8 +192,8 @@ def style_rules(declarations: Iterable[str]) -> str:
 
 # --- characters
 
-_TEXT = re.compile(">([^<]+)")
-_FOREIGN = re.compile(r"[^\x00-\x7f]")
+_TEXT = regex(">([^<]+)")
+_FOREIGN = regex(r"[^\x00-\x7f]")
 
 
 def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:

@@ -28,6 +28,7 @@ from msgspec import Struct
 
 from coursebuild.core.drawing.contrast import GROUNDS_DARK, RECOMMENDED_CONTRAST, legible
 from coursebuild.core.model.course import Theme
+from coursebuild.core.text.regex import regex
 
 TEXT, INTERFACE = "Source Serif 4 Variable", "Source Sans 3 Variable"
 CODE, MATH = "Source Code Pro Variable", "STIX Two Math"
@@ -376,12 +377,12 @@ def accents(theme: Theme) -> tuple[str, str]:
     return light, theme.accent_dark or legible(light, GROUNDS_DARK, RECOMMENDED_CONTRAST)
 
 
-_PAIR = re.compile(r"light-dark\((#[0-9a-f]{6}), ?(#[0-9a-f]{6})\)")
-_COLOUR = re.compile(
+_PAIR = regex(r"light-dark\((#[0-9a-f]{6}), ?(#[0-9a-f]{6})\)")
+_COLOUR = regex(
     r"""(?<![\w-])(?P<name>fill|stroke|color|stop-color)(?P<is>\s*[:=]\s*"?)(?P<value>[^;"{}<>]+)"""
 )
-_FUNCTION = re.compile(r"(?P<name>rgb|hsl)a?\((?P<numbers>[\d.,% ]+)\)")
-_ROOT = re.compile(r"<svg\b[^>]*>")
+_FUNCTION = regex(r"(?P<name>rgb|hsl)a?\((?P<numbers>[\d.,% ]+)\)")
+_ROOT = regex(r"<svg\b[^>]*>")
 
 
 def dark_colours(css: str) -> dict[str, str]:

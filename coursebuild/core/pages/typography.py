@@ -34,6 +34,7 @@ from typing import Literal
 
 from markupsafe import Markup
 
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.units import UNIT_PATTERN
 
 LONG = 20
@@ -41,32 +42,32 @@ LONG = 20
 WIDE = 22
 """Characters; a shorter piece fits into the narrowest window."""
 
-FORMULA = re.compile(r"(<math\b.*?</math>)", re.DOTALL)
+FORMULA = regex(r"(<math\b.*?</math>)", re.DOTALL)
 """A formula of any kind; splitting a page by it gives texts and formulas in turn."""
 
 _CACHE_SIZE = 2048
 
-_ROW = re.compile(r"<(/?)mrow\b[^>]*>")
-_WHOLE = re.compile(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)
-_ANNOTATION = re.compile(r"<annotation\b.*?</annotation>", re.DOTALL)
-_TAG = re.compile(r"<[^>]*>")
-_PIECE = re.compile(r"<math>.*?</math>", re.DOTALL)
+_ROW = regex(r"<(/?)mrow\b[^>]*>")
+_WHOLE = regex(r"<math>(?:<semantics>)?(.*?)(?:<annotation\b.*)?</math>", re.DOTALL)
+_ANNOTATION = regex(r"<annotation\b.*?</annotation>", re.DOTALL)
+_TAG = regex(r"<[^>]*>")
+_PIECE = regex(r"<math>.*?</math>", re.DOTALL)
 _BOX = '<span class="formula-inline"[^>]*>'
 _WHOLE_PIECE = f"(?>{_PIECE.pattern})"
-_PIECES = re.compile(rf"(?:{_BOX}{_WHOLE_PIECE}</span>|{_WHOLE_PIECE}){{2,}}", re.DOTALL)
+_PIECES = regex(rf"(?:{_BOX}{_WHOLE_PIECE}</span>|{_WHOLE_PIECE}){{2,}}", re.DOTALL)
 _GLUE_START, _GLUE_END = '<span class="held">', "</span>"
-_FORMULAS = re.compile(r"(<math>.*?</math>(?:<math>.*?</math>)*)", re.DOTALL)
+_FORMULAS = regex(r"(<math>.*?</math>(?:<math>.*?</math>)*)", re.DOTALL)
 _OPENING = "([“‘\"'\u2066"
-_CLOSING = re.compile(r"""\u2069?(?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*""")
+_CLOSING = regex(r"""\u2069?(?:\u00a0[^\s<&]{1,16}){0,4}[,.;:!?)\]’”"'…%]*""")
 
 _LETTER = r"[^\W\d_]"
-_APOSTROPHE = re.compile(rf"(?<={_LETTER})'(?={_LETTER}|\ue000)|(?<=\ue000)'(?={_LETTER})")
+_APOSTROPHE = regex(rf"(?<={_LETTER})'(?={_LETTER}|\ue000)|(?<=\ue000)'(?={_LETTER})")
 
 _RELATIONS = frozenset("=<>≤≥≠≈≡∼≃≅∝→←↔⇒⇐⇔↦⟶⟹∈∉⊂⊆⊃⊇≪≫≔:")
 _BINARY = frozenset("+-−±∓×·⋅∗∘⊗⊕∧∨∪∩")
 _SIGN = "|".join(re.escape(escape(sign)) for sign in sorted(_RELATIONS | _BINARY))
-_FIRST = re.compile(rf"<math>(?<=\s<math>)(?:<semantics>)?(?>(?:<mrow>)*)<mo(?=>(?:{_SIGN})</mo>)")
-_LAST = re.compile(
+_FIRST = regex(rf"<math>(?<=\s<math>)(?:<semantics>)?(?>(?:<mrow>)*)<mo(?=>(?:{_SIGN})</mo>)")
+_LAST = regex(
     rf"""<mo(?: lspace="0em")?(?=>(?:{_SIGN})</mo>(?>(?:</mrow>)*)"""
     r"""(?:<annotation\b[^<]*</annotation></semantics>)?</math>\s)"""
 )
@@ -183,14 +184,14 @@ _NUMBER = (
     r"(?:\^[-−]?[0-9]+|[⁻¹²³⁰⁴-⁹]+)?)?"
 )
 
-_WITH_UNITS = re.compile(rf"(?<=[0-9]) {UNIT_PATTERN}")
-_TITLE = re.compile(r"[0-9]+\.[0-9]+(?= [A-Z] [a-z])")
+_WITH_UNITS = regex(rf"(?<=[0-9]) {UNIT_PATTERN}")
+_TITLE = regex(r"[0-9]+\.[0-9]+(?= [A-Z] [a-z])")
 """The number of a lesson before a title such as `A pendulum`: no amperes."""
 _UNITS_FIRST = rf"{_SPACE}?{UNIT_PATTERN}"
 _QUANTITY = rf"(?<![\w.,])(?:[-+−±~≈<>≤≥]{_NUMBER}(?:{_UNITS_FIRST})?|{_NUMBER}{_UNITS_FIRST})"
 """Compiled when it is needed, as few pages do: it takes longer than all others together."""
-_LATIN_BEFORE = re.compile("[A-Za-z]\\s*(?:=\\s*)?$")
-_LATIN_AFTER = re.compile("[ \u00a0][A-Za-z]")
+_LATIN_BEFORE = regex("[A-Za-z]\\s*(?:=\\s*)?$")
+_LATIN_AFTER = regex("[ \u00a0][A-Za-z]")
 
 
 def text_html(text: str, direction: Literal["ltr", "rtl"]) -> Markup:

@@ -9,12 +9,12 @@ path of the course's base address instead.
 from __future__ import annotations
 
 import posixpath
-import re
 from urllib.parse import quote, unquote, urlsplit
 
 from msgspec import Struct
 
 from coursebuild.core.model import Lesson, Level, Owner, Page, local_file
+from coursebuild.core.text.regex import regex
 
 HOME = "index.html"
 NOT_FOUND = "404.html"
@@ -96,7 +96,7 @@ def base_path(base_url: str) -> str:
     return f"/{path}/" if path else "/"
 
 
-_UNRESERVED = re.compile("[A-Za-z0-9/~._+@,-]*+")
+_UNRESERVED = regex("[A-Za-z0-9/~._+@,-]*+")
 
 
 def encode(path: str) -> str:

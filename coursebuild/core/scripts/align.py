@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import difflib
 import enum
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 
@@ -25,9 +24,10 @@ from msgspec import Struct
 
 from coursebuild.core.model import Comparison
 from coursebuild.core.scripts.lines import LineMatcher, Side
+from coursebuild.core.text.regex import regex
 
 _ALIKE_WEIGHT = 6
-_WORD = re.compile(r"[^\W\d]+")
+_WORD = regex(r"[^\W\d]+")
 
 
 class StepKind(enum.Enum):

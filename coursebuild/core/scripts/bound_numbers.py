@@ -29,14 +29,15 @@ from coursebuild.core.text.quantities import (
     numbers_of_quantities,
     unit_behind,
 )
+from coursebuild.core.text.regex import regex
 
-_STRAY = re.compile(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
+_STRAY = regex(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
 """What beside a number is neither a unit nor a word: `-9.81-` has a slip."""
 
 
-_DECIMALS = re.compile(r"\.?[0-9]{1,3}")
+_DECIMALS = regex(r"\.?[0-9]{1,3}")
 """Decimals in threes, the first with their point."""
-_STRAY_INSIDE = re.compile(r"[-+*/=_]+(?=\s)")
+_STRAY_INSIDE = regex(r"[-+*/=_]+(?=\s)")
 
 
 def shows(number: Number, printed: Number) -> bool:

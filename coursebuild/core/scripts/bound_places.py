@@ -33,6 +33,7 @@ from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, mas
 from coursebuild.core.scripts.table_cells import ColumnTitle, row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.core.text.quantities import is_same_unit, unit_behind, unit_of_label
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
 
@@ -157,7 +158,7 @@ def _reword(address: Address, texts: Iterable[tuple[PrintedText, PrintedText]]) 
     return address
 
 
-_MARKUP = re.compile(r"\{[^{}]*\}|[`*_$]")
+_MARKUP = regex(r"\{[^{}]*\}|[`*_$]")
 _CONTEXT = 5
 """The words before a binding by which it is known again."""
 
@@ -339,7 +340,7 @@ class BoundNumber(Struct, frozen=True, dict=True):
         return self.text.candidates(outputs, self.following)
 
 
-_LINE_END = re.compile(r"(?<!\n)\n[ \t>]*(?!\n)")
+_LINE_END = regex(r"(?<!\n)\n[ \t>]*(?!\n)")
 
 
 def _find(address: Address, outputs: Iterable[PrintedText], count: int) -> PrintedPlace | None:
@@ -347,8 +348,8 @@ def _find(address: Address, outputs: Iterable[PrintedText], count: int) -> Print
     return next((place for place in places if place is not None), None)
 
 
-_WORD = re.compile(r"[^\W\d_]{4,}")
-_SENTENCE_END = re.compile(r"(?<=[.!?:])\s+(?=[^\W\d_a-z])|\n\s*\n|\n(?=[-*|>#])")
+_WORD = regex(r"[^\W\d_]{4,}")
+_SENTENCE_END = regex(r"(?<=[.!?:])\s+(?=[^\W\d_a-z])|\n\s*\n|\n(?=[-*|>#])")
 
 
 def find_printed(

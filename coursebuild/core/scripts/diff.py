@@ -10,7 +10,6 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 from typing import Literal, TypeAlias
@@ -29,9 +28,10 @@ from coursebuild.core.text.numbers import (
     scan,
     unit,
 )
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
-_PART = re.compile(r"\s+|\w+|[^\w\s]")
+_PART = regex(r"\s+|\w+|[^\w\s]")
 _SPACE, _NUMBER = 1, 4
 
 

@@ -45,10 +45,11 @@ from coursebuild.core.scripts.table_cells import (
 )
 from coursebuild.core.scripts.tables import RowAddresses, TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 _T = TypeVar("_T")
-_FENCE = re.compile(r"`{3,}|~{3,}")
+_FENCE = regex(r"`{3,}|~{3,}")
 
 
 def apply_edits(text: str, edits: Iterable[Edit]) -> str:
@@ -386,7 +387,7 @@ def check_source_parts(course: model.Course, read: ReadText) -> Iterator[Diagnos
             yield diagnose("source-part", span, message, label=label, help=help)
 
 
-_LINES = re.compile(r"L(\d{1,9})(?:-L(\d{1,9}))?")
+_LINES = regex(r"L(\d{1,9})(?:-L(\d{1,9}))?")
 
 
 def _script_texts(course: model.Course) -> dict[str, str]:

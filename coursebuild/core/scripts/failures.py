@@ -24,15 +24,14 @@ from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outco
 from coursebuild.core.scripts.diff import shorten
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, propose
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
-_FRAME = re.compile(r'File "(?P<path>[^"\n]+)", line (?P<line>\d{1,9})')
-_WARNING = re.compile(r"^(?P<path>[^\n]*?\.py):(?P<line>\d{1,9})(?=: )", re.MULTILINE)
-_NOISE = re.compile(
-    r"(?<=\b[Tt]hread )0x[0-9a-f]+ (?:\[[^\]\n]*\] )?|\n+Extension modules: [^\n]*\Z"
-)
+_FRAME = regex(r'File "(?P<path>[^"\n]+)", line (?P<line>\d{1,9})')
+_WARNING = regex(r"^(?P<path>[^\n]*?\.py):(?P<line>\d{1,9})(?=: )", re.MULTILINE)
+_NOISE = regex(r"(?<=\b[Tt]hread )0x[0-9a-f]+ (?:\[[^\]\n]*\] )?|\n+Extension modules: [^\n]*\Z")
 """The parts of a crash dump that are of no use, or differ each time."""
-_COLOURS = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
+_COLOURS = regex(r"\x1b\[[0-9;]*[A-Za-z]")
 _CRASH = "Current thread "
 _ABORTED = "Fatal Python error: Aborted\n\n"
 """How Python's answer begins when a script at its time limit is asked where it is."""
@@ -42,22 +41,22 @@ _FIRST_SIGNALS = "HUP INT QUIT ILL TRAP ABRT BUS FPE KILL USR1 SEGV USR2 PIPE AL
 _SIGNALS = dict(enumerate(_FIRST_SIGNALS.split(), 1)) | {24: "XCPU", 25: "XFSZ", 31: "SYS"}
 """As Linux numbers them (signal(7))."""
 
-_MISSING_MODULE = re.compile(r"ModuleNotFoundError: No module named '(\w+)")
+_MISSING_MODULE = regex(r"ModuleNotFoundError: No module named '(\w+)")
 _HELPS = (
     (
         _MISSING_MODULE,
         r"install `\1`, or say `requires=\1` on its fence, to skip it where `\1` is missing",
     ),
     (
-        re.compile(r"FileNotFoundError: |.*Error opening file"),
+        regex(r"FileNotFoundError: |.*Error opening file"),
         "a script runs in the project's folder: name files from there, as `models/box.xml`",
     ),
     (
-        re.compile(r"EOFError: EOF when reading a line"),
+        regex(r"EOFError: EOF when reading a line"),
         "nobody types while a course is checked: write into the script what it asks for",
     ),
     (
-        re.compile(r".*(?:GLFW|gladLoadGL|OpenGL platform library|X11|\bDISPLAY\b)"),
+        regex(r".*(?:GLFW|gladLoadGL|OpenGL platform library|X11|\bDISPLAY\b)"),
         "no window opens while a course is checked: leave it out, or say `norun` on its fence",
     ),
 )

@@ -21,6 +21,7 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.drawing.safe_svg import SVG
+from coursebuild.core.text.regex import regex
 
 TOLERANCE = 1e-3
 """How much numbers may differ: this part of an axis of a figure, of the longer side of a drawing in
@@ -30,7 +31,7 @@ MOST_DATA = 1 << 20
 _MARK = "drawn"
 _PNG_MARK = b"zTXt" + _MARK.encode() + b"\0\0"
 """How the chunk with the data begins."""
-_SVG_DATA = re.compile(rb'<metadata class="%s">([^<]*+)</metadata>' % _MARK.encode())
+_SVG_DATA = regex(rb'<metadata class="%s">([^<]*+)</metadata>' % _MARK.encode())
 _MOST_NAMED = 2
 """The most differences that a message names."""
 

@@ -35,6 +35,7 @@ from coursebuild.core.scripts.figure_data import (
     read_figure_data,
 )
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.regex import regex
 
 PIXEL_TOLERANCE = 1.0
 """How much pixels may differ: root mean square over all channels, of 255 steps."""
@@ -44,12 +45,12 @@ MAX_TABLE = 4 << 20
 """Bytes of data."""
 SVG_HELP = "an SVG may contain only what draws a still picture, and refer only to its own parts"
 
-_NUMBER = re.compile(r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?")
+_NUMBER = regex(r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?")
 _HREFS = ("href", f"{XLINK}href")
-_ID = re.compile(r"""(url\(\s*["']?#)([^()\s"']+)""")
-_RULE_PART = re.compile(r"[^{};]*+[{};]?")
+_ID = regex(r"""(url\(\s*["']?#)([^()\s"']+)""")
+_RULE_PART = regex(r"[^{};]*+[{};]?")
 """What ends in a brace are selectors."""
-_SELECTED = re.compile(r"(#)([\w:-]+)")
+_SELECTED = regex(r"(#)([\w:-]+)")
 _PNG_PARTS = frozenset(b"IHDR PLTE IDAT IEND tRNS bKGD cHRM cICP gAMA iCCP pHYs sBIT sRGB".split())
 """The chunks of a PNG that say what is drawn."""
 _PNG_END = b"\0\0\0\0IEND"

@@ -36,6 +36,7 @@ from coursebuild.core.scripts.table_cells import HEADER_HELP, cell_text, table_r
 from coursebuild.core.scripts.tables import TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 _MAX_NOTES = 3
@@ -196,7 +197,7 @@ def _find_unmarked(
             break
 
 
-_FENCE_HEAD = re.compile(r"(`{3,}|~{3,})[ \t]*[^\s`]*")
+_FENCE_HEAD = regex(r"(`{3,}|~{3,})[ \t]*[^\s`]*")
 
 
 def find_instability(

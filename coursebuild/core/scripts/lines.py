@@ -29,12 +29,13 @@ from coursebuild.core.text.numbers import (
     within_tolerance,
 )
 from coursebuild.core.text.patterns import replacements
+from coursebuild.core.text.regex import regex
 
-_LINE_END = re.compile(r"\r\n?|\n")
+_LINE_END = regex(r"\r\n?|\n")
 # Possessive, and only at the start of a run, so that long runs of white space take linear time; not
 # where a line ends in LF alone, as nearly all do.
-_END_OF_LINE = re.compile(r"(?<![^\S\r\n])(?!\n)[^\S\r\n]*+(?:\r\n?|\n|\Z)")
-_EMPTY_LINES = re.compile(r"(?:\A|(?<=[^\n]\n))\n++\Z")
+_END_OF_LINE = regex(r"(?<![^\S\r\n])(?!\n)[^\S\r\n]*+(?:\r\n?|\n|\Z)")
+_EMPTY_LINES = regex(r"(?:\A|(?<=[^\n]\n))\n++\Z")
 
 
 class MappedText(Struct, frozen=True):
@@ -164,7 +165,7 @@ class Side(Struct, frozen=True):
 MARK = "\x00"
 ELLIPSIS = "..."
 
-_SPACE = re.compile(rf"(?<={MARK})\s++|(?<!\s)\s++(?={MARK})")
+_SPACE = regex(rf"(?<={MARK})\s++|(?<!\s)\s++(?={MARK})")
 _CLOSING = frozenset(")]},;|")
 
 SameNumber = Callable[[Number, Number], bool]

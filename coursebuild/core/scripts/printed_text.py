@@ -36,6 +36,7 @@ from coursebuild.core.text.quantities import (
     unit_behind,
     unit_of_printed,
 )
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 Locate: TypeAlias = Callable[[int, int], Span]
@@ -43,12 +44,12 @@ _Words: TypeAlias = tuple[tuple[str, bool], ...]
 """Words and numbers, each with whether it is a number."""
 
 
-_IN_BRACKETS = re.compile(r"[(\[]([^()\[\]]+)[)\]]")
-_UNIT_IN_BRACKETS = re.compile(r"\s*[(\[][^()\[\]]*[)\]][\s:=]*\Z")
-_REST_OF_ROW = re.compile(r"\A(?:[-+]?\d[\d.e+-]*(?=[\s)\],])|(?:and|to)\s|[\s)\],])*")
-_PER_UNIT = re.compile(r"(?<=# )# (?=/[^\W\d_])")
+_IN_BRACKETS = regex(r"[(\[]([^()\[\]]+)[)\]]")
+_UNIT_IN_BRACKETS = regex(r"\s*[(\[][^()\[\]]*[)\]][\s:=]*\Z")
+_REST_OF_ROW = regex(r"\A(?:[-+]?\d[\d.e+-]*(?=[\s)\],])|(?:and|to)\s|[\s)\],])*")
+_PER_UNIT = regex(r"(?<=# )# (?=/[^\W\d_])")
 """The 1 of a unit among the words of a line, as in `# # /s`: it is none of its numbers."""
-_FORBIDDEN = re.compile(r'["{}]')
+_FORBIDDEN = regex(r'["{}]')
 """What the words of `{out="words"}` cannot hold."""
 
 

@@ -5,7 +5,6 @@ By the words and units of a title printed numbers are named.
 
 from __future__ import annotations
 
-import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -43,13 +42,14 @@ from coursebuild.core.text.quantities import (
     read_unit,
     unit_of_header,
 )
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
-_RUN = re.compile(r"\s{2,}|(?<![0-9])[^\S ]|[^\S ](?![0-9])")
+_RUN = regex(r"\s{2,}|(?<![0-9])[^\S ]|[^\S ](?![0-9])")
 """What is one space in a cell; not what may part thousands."""
-_SPACED_PAIR = re.compile(r"[0-9] [0-9]{3}(?![0-9])")
+_SPACED_PAIR = regex(r"[0-9] [0-9]{3}(?![0-9])")
 """Two numbers, or one with its thousands apart."""
-_ENDS = re.compile(r"\A\s+|\s+\Z")
+_ENDS = regex(r"\A\s+|\s+\Z")
 
 
 class LineLayout(NamedTuple):
@@ -255,10 +255,10 @@ def find_rows(
             yield (place, *rest)
 
 
-_WORD = re.compile(r"[^\W_]+")
-_PARTS = re.compile(r"[,;|]|[:=](?=.*\w)")
+_WORD = regex(r"[^\W_]+")
+_PARTS = regex(r"[,;|]|[:=](?=.*\w)")
 """Between the parts of what stands before a number."""
-_SIGN = re.compile(r"[:=](?=\s*\Z)")
+_SIGN = regex(r"[:=](?=\s*\Z)")
 HEADER_HELP = (
     "write the unit that is printed, or put the columns in order; where a unit is not meant, mark "
     'it: `` `s`{given="…"} ``'

@@ -27,22 +27,23 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     did_you_mean,
 )
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
 
-TERM = re.compile(r"(\{\s*term\b[^{}]{0,400}\}?)")
-SYMBOL = re.compile(r"(\{\s*(?:symbol|unit|value|given)\b[^{}]{0,400}\}?)")
-LABEL = re.compile(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
+TERM = regex(r"(\{\s*term\b[^{}]{0,400}\}?)")
+SYMBOL = regex(r"(\{\s*(?:symbol|unit|value|given)\b[^{}]{0,400}\}?)")
+LABEL = regex(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 """The attributes of a term, a symbol or a formula; group 1 is the braces, the last of which may be
 missing."""
-_GIVEN = re.compile(r'(?:^|(?<=\s))\{given="([^{}"]*\S[^{}"]*)"\}$')
-_LAST_LABEL = re.compile(r"(?:^|(?<=\s))\{#[^{}$\n]{0,200}\}?$")
-_PAIR = re.compile(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
-_MISQUOTED = re.compile(
+_GIVEN = regex(r'(?:^|(?<=\s))\{given="([^{}"]*\S[^{}"]*)"\}$')
+_LAST_LABEL = regex(r"(?:^|(?<=\s))\{#[^{}$\n]{0,200}\}?$")
+_PAIR = regex(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
+_MISQUOTED = regex(
     r"""[^\s={}"]+=([“”„‟‘’‚‛«»'`])[^{}"“”„‟‘’‚‛«»'`\n]*([“”„‟‘’‚‛«»'`])(?=[\s}]|$)"""
 )
-_SPACES = re.compile(r"\s+")
-_NUMBER = re.compile(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
+_SPACES = regex(r"\s+")
+_NUMBER = regex(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'
@@ -163,7 +164,7 @@ def value_text(value: Excerpt | None) -> str:
     return "" if value is None else collapse_spaces(value.text)
 
 
-_UNREAD = re.compile(
+_UNREAD = regex(
     r"(?<!\\)\{\s*(?P<given>given)\b[^{}`\n]*\}?"
     r"|(?<=`)(?<!\\`)\{\s*(?P<binding>out|code)\b[^{}`\n]*\}?"
     r"|(?<=\$)(?<!\\\$)\{\s*(?P<symbol>symbol|unit|value|out)\b[^{}\n]*\}?"
@@ -225,12 +226,12 @@ def split_label(text: Excerpt) -> tuple[Excerpt, Excerpt | None]:
     return trim(text.slice(0, match.start())), text.slice(match.start())
 
 
-_CANDIDATE = re.compile(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
-_WHOLE_ID = re.compile(r"#[\w:.-]*[\w:-]|#\w")
-_WORD = re.compile(r"\S+")
-_CLASS = re.compile(r"\.[A-Za-z_][\w-]*")
-_NO_SLUG = re.compile(r"[^\w\s-]")
-_SPACE = re.compile(r"\s")
+_CANDIDATE = regex(r"(?:^|(?<=[ \t]))\{[ \t]*[#.][^{}]*(\}?)[ \t]*$")
+_WHOLE_ID = regex(r"#[\w:.-]*[\w:-]|#\w")
+_WORD = regex(r"\S+")
+_CLASS = regex(r"\.[A-Za-z_][\w-]*")
+_NO_SLUG = regex(r"[^\w\s-]")
+_SPACE = regex(r"\s")
 _HELP = (
     "write `{#id}`, `{.class}` or `{#id .class}`, "
     "of letters, digits, `-` and `_`, and in an id also `:` and `.`"

@@ -16,7 +16,6 @@ closed.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import Any, TypeAlias, cast
 
@@ -30,6 +29,7 @@ from mdit_py_plugins.footnote.index import footnote_def
 
 from coursebuild.core.syntax.attributes import LABEL, SYMBOL
 from coursebuild.core.syntax.spans import BlockState, InlineState, PositionedToken
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 
 _PLAIN_TEX = r"(?:[^{}$`]|\{[^{}$`]*\})"
@@ -38,11 +38,11 @@ _WORDS = (
     rf"\{{{_PLAIN_TEX}*+(?:\${_PLAIN_TEX}++\${_PLAIN_TEX}*+)+\}}"
 )
 """Words in a formula that hold formulas themselves, as in `\\text{for all $i$}`."""
-_TEX = re.compile(rf"(?>(?:{_WORDS}|[^\\`$]++|\\[\s\S])*)")
-_BLOCK_TEX = re.compile(r"(?>(?:[^\\$]++|\\[\s\S]|\$(?!\$))*)")
-BACKTICKS = re.compile(r"`+")
-_DOLLARS = re.compile(r"\$+")
-_AFTER_MATH = re.compile(r"[.,;:]?[ \t]*(?:\{#[^{}$]*\}?)?")
+_TEX = regex(rf"(?>(?:{_WORDS}|[^\\`$]++|\\[\s\S])*)")
+_BLOCK_TEX = regex(r"(?>(?:[^\\$]++|\\[\s\S]|\$(?!\$))*)")
+BACKTICKS = regex(r"`+")
+_DOLLARS = regex(r"\$+")
+_AFTER_MATH = regex(r"[.,;:]?[ \t]*(?:\{#[^{}$]*\}?)?")
 """What may stand behind a formula of its own: a mark of the sentence that it ends, and a label."""
 _SPACE = " \t\n"
 _DIGITS = ("0", "1", "2", "3", "4", "5", "6", "7", "8", "9")

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection
 
 from msgspec import Struct
 
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import Fix, Parsed, diagnose, did_you_mean
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
-_HEAD = re.compile(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
+_HEAD = regex(r"\[!([^\]\n]*)\](?![(\[])(-?)([^\n]*)(?:\n|$)")
 FALLBACK = "note"
 """The kind that a callout of an unknown kind gets, so that its content is still checked."""
 

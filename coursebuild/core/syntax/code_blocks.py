@@ -36,6 +36,7 @@ from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.python_syntax import check_syntax
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 
 DEFAULT_TIMEOUT, MAX_TIMEOUT = 60.0, 86400.0
@@ -46,16 +47,16 @@ _FLAGS = ("norun", "diverges", "deep")
 _PROGRAM_VALUES = ("timeout", "args", "writes", "record")
 _SHOWS: tuple[Show, ...] = ("open", "folded", "hidden")
 _WHOLE_STATEMENTS = "a part holds whole statements: a function or a loop stands in one part"
-_NUMBER = re.compile(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
-_DEVICE = re.compile(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
-_UNPORTABLE = re.compile(r'[\x00-\x1f\x7f<>:"|?*;&$!#%`{}\'\ud800-\udfff]')
+_NUMBER = regex(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
+_DEVICE = regex(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
+_UNPORTABLE = regex(r'[\x00-\x1f\x7f<>:"|?*;&$!#%`{}\'\ud800-\udfff]')
 _UNUSABLE_NAMES = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - set(
     "code test this".split()
 )
-_PATH = re.compile(r"\w[\w.-]*(?:/\w[\w.-]*)*")
-_FOLDER = re.compile(rf"(?!(?:content|models|examples|features|public)(?:/|\Z)){_PATH.pattern}/*")
-_FIGURE = re.compile(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png|csv)", re.ASCII)
-_ELEMENTS = re.compile(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
+_PATH = regex(r"\w[\w.-]*(?:/\w[\w.-]*)*")
+_FOLDER = regex(rf"(?!(?:content|models|examples|features|public)(?:/|\Z)){_PATH.pattern}/*")
+_FIGURE = regex(r"[A-Za-z0-9][\w-]*(?:\.[\w-]+)*\.(?:svg|png|csv)", re.ASCII)
+_ELEMENTS = regex(r"[A-Za-z_][\w-]*(?:/[A-Za-z_][\w-]*)*")
 
 
 def parse_python(fence: Fence) -> Parsed[Script | ScriptPart | PlainCode]:

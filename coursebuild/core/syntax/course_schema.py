@@ -39,6 +39,7 @@ from coursebuild.core.registry import features
 from coursebuild.core.syntax.declarations import ModelFile
 from coursebuild.core.syntax.nodes import ObjectNode, format_name
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
+from coursebuild.core.text.regex import regex
 
 
 def _file_field(noun: str, endings: str, example: str) -> Meta:
@@ -125,10 +126,8 @@ def _theme_files(node: ObjectNode, name: str, paths: tuple[str, ...]) -> tuple[T
 # --- where notebooks run
 
 
-_GITHUB = re.compile(r"https?://(?i:github\.com)/[\w-]+/[\w.-]+/?", re.ASCII)
-_NO_BRANCH = re.compile(
-    r"[\x00-\x20\x7f~^:?*\[\\]|\.\.|//|@\{|(^|/)\.|^[-/]|[./]$|\.lock(/|$)|^@?$"
-)
+_GITHUB = regex(r"https?://(?i:github\.com)/[\w-]+/[\w.-]+/?", re.ASCII)
+_NO_BRANCH = regex(r"[\x00-\x20\x7f~^:?*\[\\]|\.\.|//|@\{|(^|/)\.|^[-/]|[./]$|\.lock(/|$)|^@?$")
 """What git-check-ref-format(1) forbids in the name of a branch."""
 _SERVICES = ("colab", "binder", "jupyterhub", "codespaces")
 

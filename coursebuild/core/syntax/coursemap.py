@@ -51,6 +51,7 @@ from coursebuild.core.text.diagnostics import (
     sort_diagnostics,
 )
 from coursebuild.core.text.patterns import makes_alike, pattern_mistake
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.rules import RULES
 from coursebuild.core.text.source import Source, Span
 
@@ -296,9 +297,9 @@ def _check_paths(root: ObjectNode, lessons: Iterable[model.Lesson]) -> Iterator[
 
 _DIFFERENT_TEXTS = (("length 1.962 cm", "length 2.481 cm"), ("length 1.962 cm", "weight 1.962 cm"))
 """What no filter may take for the same, or else it would do so with any numbers or words."""
-_VARIABLE = re.compile(r"(?!PYTHON|PATH$|TMPDIR$)[A-Za-z_][A-Za-z0-9_]*")
-_LANGUAGE = re.compile(r"[a-z0-9][a-z0-9+#._-]*")
-_CALLOUT = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
+_VARIABLE = regex(r"(?!PYTHON|PATH$|TMPDIR$)[A-Za-z_][A-Za-z0-9_]*")
+_LANGUAGE = regex(r"[a-z0-9][a-z0-9+#._-]*")
+_CALLOUT = regex(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 
 
 def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:

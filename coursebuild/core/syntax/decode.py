@@ -39,6 +39,7 @@ from coursebuild.core.text.characters import REORDERING
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean, propose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.numbers import point_decimals, scan_prose
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
 S = TypeVar("S", bound=Struct)
@@ -46,9 +47,9 @@ T = TypeVar("T", bound=Struct)
 
 _NO_REMARKS: Mapping[str, str] = {}
 _INVALID = object()
-_MARKUP = re.compile(r"\$[^\s$](?:[^$]*[^\s$])?\$(?!\w)|\*\*[^\s*](?:[^*]*[^\s*])?\*\*(?!\w)")
+_MARKUP = regex(r"\$[^\s$](?:[^$]*[^\s$])?\$(?!\w)|\*\*[^\s*](?:[^*]*[^\s*])?\*\*(?!\w)")
 """A formula or strong text, unlike `$5/$6` and `x**2`."""
-_BOUND_NUMBER = re.compile(r"`(?P<text>[^`]+)`\{out\b[^{}]*\}")
+_BOUND_NUMBER = regex(r"`(?P<text>[^`]+)`\{out\b[^{}]*\}")
 
 
 class Decoding(Struct, Generic[S], frozen=True):

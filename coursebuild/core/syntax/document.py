@@ -27,14 +27,15 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     sort_diagnostics,
 )
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Source, Span
 
-_YAML = re.compile(
+_YAML = regex(
     r"---[ \t]*\n(?:#[ \t].*\n)*"  # the first line, comments
     r"[\w-]+[ \t]*:(?:[ \t].*)?\n"  # the first field
     r"(?:.*\n)*?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
 )
-_TOML = re.compile(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
+_TOML = regex(r"\+\+\+[ \t]*\n(?:.*\n)*?\+\+\+[ \t]*(?:\n|\Z)")
 
 
 def parse_document(
@@ -214,8 +215,8 @@ def _is_reported(first: model.AnchorOwner, second: model.AnchorOwner) -> bool:
 # --- merge conflicts that git left in a file
 
 
-_CONFLICT_MARK = re.compile(r"^(?:<{7}|\|{7}|={7}|>{7})(?:[ \t][^\r\n]*)?(?=\r?$)", re.MULTILINE)
-_FENCED = re.compile(
+_CONFLICT_MARK = regex(r"^(?:<{7}|\|{7}|={7}|>{7})(?:[ \t][^\r\n]*)?(?=\r?$)", re.MULTILINE)
+_FENCED = regex(
     r"^ {0,3}(`{3,}|~{3,})[ \t]*(?P<info>[^`\n]*)\n(?:.*\n)*? {0,3}\1[`~]*[ \t]*\r?$",
     re.MULTILINE,
 )

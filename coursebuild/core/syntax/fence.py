@@ -28,17 +28,16 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     did_you_mean,
 )
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
-_WORD = re.compile(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
-_SPACED_OPTION = re.compile(
-    r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)"""
-)
-_KIND = re.compile(r"\s*(\S*)")
-_NOT_SPACE = re.compile(r"\S")
-_REST = re.compile(r"\S*")
-_PART = re.compile(r"(?:^|(?<=,))[^,]*")
-_ESCAPE = re.compile(r"""\\(["\\])""")
+_WORD = regex(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
+_SPACED_OPTION = regex(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
+_KIND = regex(r"\s*(\S*)")
+_NOT_SPACE = regex(r"\S")
+_REST = regex(r"\S*")
+_PART = regex(r"(?:^|(?<=,))[^,]*")
+_ESCAPE = regex(r"""\\(["\\])""")
 
 
 class Word(Struct, frozen=True):

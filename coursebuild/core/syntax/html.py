@@ -23,6 +23,7 @@ from coursebuild.core.model import MediaAddress
 from coursebuild.core.model.inlines import ForbiddenHtml
 from coursebuild.core.syntax.link_targets import check_raw_scheme
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 VOID = frozenset("area base br col embed hr img input link meta param source track wbr".split())
@@ -33,14 +34,14 @@ _RAW_TEXT = frozenset("script style textarea title".split())
 LITERAL = frozenset("code kbd math pre samp svg".split()) | _RAW_TEXT
 """Elements in which a dollar is a dollar."""
 
-_TAG = re.compile(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?>(?:"[^"]*"|'[^']*'|[^"'<>])*))>""")
-_ATTRIBUTE = re.compile(
+_TAG = regex(r"""<(/?)([A-Za-z][A-Za-z0-9:-]*)(?=[\s/>])((?>(?:"[^"]*"|'[^']*'|[^"'<>])*))>""")
+_ATTRIBUTE = regex(
     r"""\s([^\s"'<>/=]+)\s*=\s*(?:"([^"]*)"|'([^']*)'|([^\s"'<>=`]+))|\s[^\s"'<>/=]+"""
 )
 _LINK_ATTRIBUTES = frozenset("cite href poster src xlink:href".split())
 _MEDIA_ELEMENTS = frozenset("audio embed iframe img input object source track video".split())
 _MEDIA_ATTRIBUTES = frozenset("data poster src srcset".split())
-_CANDIDATE = re.compile(r"[\s,]*([^\s,]+)[^,]*")
+_CANDIDATE = regex(r"[\s,]*([^\s,]+)[^,]*")
 """An address of a `srcset`, with the size that follows it."""
 
 
@@ -241,14 +242,14 @@ _STYLES = frozenset(
     "text-decoration text-rendering vector-effect visibility word-spacing writing-mode".split()
 )
 """Attributes whose value is CSS, or is read as such."""
-_STYLE = re.compile(r"(?>(?:(?!url|position)[^\\\"'@{}<>]|url\(#[\w-]+\))*)", re.IGNORECASE)
+_STYLE = regex(r"(?>(?:(?!url|position)[^\\\"'@{}<>]|url\(#[\w-]+\))*)", re.IGNORECASE)
 _ADDRESSES = _LINK_ATTRIBUTES | {"srcset"}
 """Attributes whose schemes and files are checked in every course."""
 
 _STRICT_ATTRIBUTE = r"""\s+([A-Za-z][A-Za-z0-9:_-]*)(?:\s*=\s*("[^"]*"|'[^']*'|[^\s"'=<>`]+))?"""
-_STRICT_TAG = re.compile(rf"<([A-Za-z][A-Za-z0-9-]*)((?>(?:{_STRICT_ATTRIBUTE})*))\s*/?>")
-_ATTRIBUTES = re.compile(_STRICT_ATTRIBUTE)
-_HARMLESS = re.compile(
+_STRICT_TAG = regex(rf"<([A-Za-z][A-Za-z0-9-]*)((?>(?:{_STRICT_ATTRIBUTE})*))\s*/?>")
+_ATTRIBUTES = regex(_STRICT_ATTRIBUTE)
+_HARMLESS = regex(
     r"[^<]++|<(?![A-Za-z/!?])|</[A-Za-z][A-Za-z0-9-]*\s*>|<!--(?!-?>)(?>(?:(?!--!?>|</title).)*)-->",
     re.DOTALL | re.IGNORECASE,
 )

@@ -18,6 +18,7 @@ from coursebuild.core.syntax.attributes import TERM
 from coursebuild.core.syntax.block_parser import BACKTICKS, math_inline
 from coursebuild.core.syntax.html import LITERAL, tag_at
 from coursebuild.core.syntax.spans import InlineState, PositionedToken
+from coursebuild.core.text.regex import regex
 
 MAX_NESTING = 20
 """How deep brackets may nest and still become links and images."""
@@ -50,7 +51,7 @@ def _emphasis(state: rules_inline.StateInline, silent: bool) -> bool:
     return True
 
 
-_BINDING = re.compile(
+_BINDING = regex(
     r"""\{out(?:=(?P<script>[^\s{}"']+)(?:\ "(?P<line>[^{}"]+)")?|="(?P<words>[^{}"]+)")?\}
     |\{(?P<given>given)="(?P<source>[^{}"]+)"\}|\{code\}""",
     re.VERBOSE,
@@ -85,8 +86,8 @@ def _code_span(state: rules_inline.StateInline, silent: bool) -> bool:
 
 _CITED = r"(?:[^\[\]{}@;]*\s)?@(?:[\w.:/+-]*\w)(?:[^\S\n]*,[^\[\]{};@]*)?\s*"
 _LEAVES = {
-    "citation": re.compile(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{])"),
-    "footnote_ref": re.compile(r"\[\^([^\s\[\]]+)\]"),
+    "citation": regex(rf"\[({_CITED}(?:;{_CITED})*)\](?![\[({{])"),
+    "footnote_ref": regex(r"\[\^([^\s\[\]]+)\]"),
 }
 
 
@@ -182,7 +183,7 @@ _RULES: InlineRules = {
     "&": (rules_inline.entity,),
     "$": (math_inline,),
 }
-_STOP = re.compile(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
+_STOP = regex(r"[\n\\`*_~\[\]<&$!](?:(?<!!)|(?=\[))")
 """Characters at which plain text ends; a `!` only before a bracket."""
 _HTML_RULES: InlineRules = {
     "\n": (_line_end,),
@@ -191,7 +192,7 @@ _HTML_RULES: InlineRules = {
     "&": (rules_inline.entity,),
     "$": (_formula,),
 }
-_HTML_STOP = re.compile(r"[\n\\<&$]")
+_HTML_STOP = regex(r"[\n\\<&$]")
 
 
 class _InlineParser(ParserInline):

@@ -36,14 +36,15 @@ from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.text.diagnostics import diagnose
 from coursebuild.core.text.numbers import find_unread
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 60
 """How deep emphasis may nest; deeper marks are dropped."""
 
 _NUMBERS = ("number_binding", "number_given")
-_CONTROL = re.compile("[\x01-\x08\x0b\x0e-\x1f\x7f-\x9f\u202a-\u202e]")
-_DEFINITION_HEAD = re.compile(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
+_CONTROL = regex("[\x01-\x08\x0b\x0e-\x1f\x7f-\x9f\u202a-\u202e]")
+_DEFINITION_HEAD = regex(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
 
 class _Frame(Struct):

@@ -14,25 +14,26 @@ from typing import NoReturn
 
 from coursebuild.core.syntax import nodes
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose, write
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 MAX_DEPTH = 64
 """How deep objects and arrays may nest: far more than a person writes, far less than the
 interpreter's stack."""
 
-_SPACE = re.compile(r"[ \t\n\r]*")
-_TOKEN = re.compile(r'"(?:[^"\\\n]|\\.)*"|[][{},:]|[^][{},:\s]+')
-_COMMENT = re.compile(r"//[^\n]*|#[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
-_WORD = re.compile(r"[^\W\d][\w$]*")
-_SCALAR = re.compile(r"[^\W\d][\w$]*|[-+.0-9][-+.\w]*")
-_NUMBER = re.compile(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
-_KEY = re.compile(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
-_STRING = re.compile(r'"((?:[^"\\\n]|\\.)*)"')
-_ESCAPE = re.compile(
+_SPACE = regex(r"[ \t\n\r]*")
+_TOKEN = regex(r'"(?:[^"\\\n]|\\.)*"|[][{},:]|[^][{},:\s]+')
+_COMMENT = regex(r"//[^\n]*|#[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
+_WORD = regex(r"[^\W\d][\w$]*")
+_SCALAR = regex(r"[^\W\d][\w$]*|[-+.0-9][-+.\w]*")
+_NUMBER = regex(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
+_KEY = regex(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
+_STRING = regex(r'"((?:[^"\\\n]|\\.)*)"')
+_ESCAPE = regex(
     r"\\u[Dd][89ABab][0-9A-Fa-f]{2}\\u[Dd][C-Fc-f][0-9A-Fa-f]{2}"
     r"|\\u[0-9A-Fa-f]{4}|\\.|[\x00-\x1f\ud800-\udfff]"
 )
-_SURROGATE = re.compile(r"[\ud800-\udfff]")
+_SURROGATE = regex(r"[\ud800-\udfff]")
 _CURLY_QUOTES = "“”„‟‘’‚‛«»"
 _CONSTANTS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
 _CONSTANTS |= dict.fromkeys(("None", "NULL", "Null", "nil", "undefined"), "null")
@@ -317,7 +318,7 @@ class _Reader:
 
 
 _COMMA_HELP = Fix("remove the comma", "", safe=True)
-_QUOTED = re.compile(
+_QUOTED = regex(
     r"""
     "(?:[^"\\\n]|\\.)*"
     | (?: [“”„‟«»] [^"\\\n]*? [“”„‟«»] | (?P<mark>['‘`]) [^"\\\n]*? (?(mark)['’`]) ) (?=\s*[,:\]}])

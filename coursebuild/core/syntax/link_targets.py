@@ -34,13 +34,14 @@ from coursebuild.core.model.course import Words
 from coursebuild.core.model.inlines import LABEL_KINDS
 from coursebuild.core.syntax.attributes import term_id
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
-_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]*):")
+_SCHEME = regex(r"([A-Za-z][A-Za-z0-9+.-]*):")
 _FORBIDDEN_SCHEMES = frozenset({"data", "file", "javascript", "vbscript"})
-_PICTURE = re.compile(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
+_PICTURE = regex(r"data:image/(?:avif|gif|jpeg|png|svg\+xml|webp)[;,]", re.IGNORECASE)
 _BLANK = "".join(map(chr, range(33)))
-_IGNORED_CHARACTER = re.compile("[\t\n\r]")
+_IGNORED_CHARACTER = regex("[\t\n\r]")
 """Characters that browsers ignore in an address, as they do those of `_BLANK` at its ends."""
 _COURSE_SCHEMES = ("lesson", "model", "page", "term")
 
@@ -108,7 +109,7 @@ def check_link_text(target: Target, children: Sequence[Inline], span: Span) -> D
 _LESSON = r"[0-9]+(?:\.[0-9]+)+(?!\w)"
 _LEVEL = r"[0-9]+(?:\.[0-9]+)*(?!\w)"
 
-_NUMBER = re.compile(r"[0-9.]*[0-9]")
+_NUMBER = regex(r"[0-9.]*[0-9]")
 
 
 class TextPiece(NamedTuple):

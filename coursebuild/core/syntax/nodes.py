@@ -16,6 +16,7 @@ import msgspec.inspect as inspect
 from msgspec import Struct
 
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -142,9 +143,9 @@ Node: TypeAlias = (
 )
 
 
-_LETTERS = re.compile(r"[A-Za-z]+")
-_DOLLARS = re.compile(r"(?<!\\)\$+")
-_CONTROL = re.compile(r"[\t\n\b\f\r]")
+_LETTERS = regex(r"[A-Za-z]+")
+_DOLLARS = regex(r"(?<!\\)\$+")
+_CONTROL = regex(r"[\t\n\b\f\r]")
 
 _COMMANDS = frozenset(
     """
@@ -211,7 +212,7 @@ def odd_character(char: str) -> str:
 
 
 _MAX_LENGTH = 40
-_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
+_NUMBER = regex(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
 Format: TypeAlias = Literal["JSON", "TOML"]

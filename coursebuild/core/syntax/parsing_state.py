@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from itertools import islice
 from typing import TypeVar
@@ -14,13 +13,14 @@ from coursebuild.core.model.course import Words
 from coursebuild.core.syntax.attributes import Anchors, read_pairs, value_text
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 T = TypeVar("T")
 
-_LABEL_ID = re.compile(rf"\{{#((?P<kind>{'|'.join(LABEL_KINDS)}):[\w-]+)(?=[\s}}])")
+_LABEL_ID = regex(rf"\{{#((?P<kind>{'|'.join(LABEL_KINDS)}):[\w-]+)(?=[\s}}])")
 
-_CALLOUT_LABEL = re.compile(r"\{#(([A-Za-z]+):[\w-]+)\}")
+_CALLOUT_LABEL = regex(r"\{#(([A-Za-z]+):[\w-]+)\}")
 
 
 class ParsingState:

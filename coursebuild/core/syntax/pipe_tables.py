@@ -6,7 +6,6 @@ before it; `\|` is a `|` in the cell.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from typing import Literal
 
@@ -15,9 +14,10 @@ from markdown_it.common.utils import MD_TRIM_CHARS
 from coursebuild.core.model import Cell, Inline, Table
 from coursebuild.core.syntax.spans import PositionedToken, trim
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 
-_PIPE = re.compile(r"\\?\|")
+_PIPE = regex(r"\\?\|")
 _ALIGN: dict[object, Literal["left", "right", "center"]] = {
     "text-align:left": "left",
     "text-align:right": "right",

@@ -10,10 +10,11 @@ from functools import lru_cache
 
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose
 from coursebuild.core.text.python_code import python_nodes
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
-_LINE_REFERENCE = re.compile(r"\b(on|at) line ([0-9]+)")
-_SHOWS = re.compile(r"(?:matplotlib\.pyplot|plotly\.io)\.show")
+_LINE_REFERENCE = regex(r"\b(on|at) line ([0-9]+)")
+_SHOWS = regex(r"(?:matplotlib\.pyplot|plotly\.io)\.show")
 
 
 def find_windows(code: Excerpt) -> Iterator[Diagnostic]:

@@ -18,11 +18,12 @@ from coursebuild.core.syntax.other_tools import is_known_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.patterns import pattern_mistake, replacements
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
 OUTPUT_KIND = "output"
 _BODY_KINDS = ("text", OUTPUT_KIND)
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
+_NUMBER = regex(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?")
 _VALUES = ("rtol", "atol", "volatile")
 _FLAGS = ("exact", "digits", "ellipsis", "volatile")
 _MODES = {"rtol": "rtol", "atol": "rtol", **{key: key for key in _FLAGS}}

@@ -16,11 +16,12 @@ import tree_sitter_toml
 
 from coursebuild.core.syntax import nodes
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source
 
 _LANGUAGE = tree_sitter.Language(tree_sitter_toml.language())
-_NOT_ASCII = re.compile(r"[^\x00-\x7f]")
-_ESCAPE = re.compile(r"\\(?:[ \t]*\n[ \t\n]*|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0-9A-Fa-f]{2}|.)")
+_NOT_ASCII = regex(r"[^\x00-\x7f]")
+_ESCAPE = regex(r"\\(?:[ \t]*\n[ \t\n]*|u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0-9A-Fa-f]{2}|.)")
 
 
 def parse_toml(
@@ -205,14 +206,14 @@ def _value_of(text: str) -> Any:
     return tomllib.loads(f"x = {text}")["x"]
 
 
-_PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
-_TOKEN = re.compile(
+_PLACE = regex(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+_TOKEN = regex(
     r'#[^\n]*|"""(?:[^\\]|\\.)*?"{3,5}|' + r"'''.*?'{3,5}|"
     r'"(?!"")(?:[^"\\\n]|\\[^\n])*"|' + r"'(?!'')[^'\n]*'|[\[\]{}\"']",
     re.DOTALL,
 )
-_SCALAR = re.compile(r"[^\n,\]}#]*")
-_WORD = re.compile(r"[\w.+-]+|\S")
+_SCALAR = regex(r"[^\n,\]}#]*")
+_WORD = regex(r"[\w.+-]+|\S")
 _CURLY_QUOTES = tuple("“”„‟‘’‚‛«»")
 _BOOLEANS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
 _NULLS = frozenset(("null", "None", "nil", "Null", "NULL"))

@@ -37,6 +37,7 @@ from coursebuild.core.syntax.recording import (
 )
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
 from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 
@@ -350,8 +351,8 @@ class TextReader:
         return None
 
 
-_CODE_SPAN = re.compile(r"(?<!`)(`+)(?!`).*?(?<!`)\1(?!`)", re.DOTALL)
-_SENTENCE_MARK = re.compile(r"[ \t]*([.,;:])")
+_CODE_SPAN = regex(r"(?<!`)(`+)(?!`).*?(?<!`)\1(?!`)", re.DOTALL)
+_SENTENCE_MARK = regex(r"[ \t]*([.,;:])")
 _READERS: dict[
     str, Callable[[TextReader, PositionedToken], model.Block | model.SourceMark | None]
 ] = {

@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import unicodedata
 
-_NOT_HTML = re.compile(
+from coursebuild.core.text.regex import regex
+
+_NOT_HTML = regex(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff\U0001fffe-\U0010ffff]"
 )
 """Past U+1FFFF also allowed ones: listing only the last two of each plane would be slow."""
@@ -30,7 +32,7 @@ def _picture(match: re.Match[str]) -> str:
     return chr(_PICTURES.get(code, 0xFFFD))
 
 
-_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+_NOT_XML = regex("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 """XML 1.0 has no place for these characters (section 2.2)."""
 
 
@@ -39,7 +41,7 @@ def clean_xml(text: str) -> str:
     return _NOT_XML.sub("\ufffd", text)
 
 
-_COMMAND = re.compile(r"^([^\S\n]*):(?=:)|(##\w*)\[", re.MULTILINE)
+_COMMAND = regex(r"^([^\S\n]*):(?=:)|(##\w*)\[", re.MULTILINE)
 
 
 def without_commands(text: str) -> str:
@@ -52,9 +54,9 @@ def without_commands(text: str) -> str:
     return _COMMAND.sub(lambda m: f"{m[1]}\u205a" if m[2] is None else m[2] + bracket, text)
 
 
-REORDERING = re.compile("[\u202a-\u202e]")
+REORDERING = regex("[\u202a-\u202e]")
 """Characters by which a browser shows others in another order than they are read."""
-ISOLATING = re.compile("[\u202a-\u202e\u2066-\u2069]")
+ISOLATING = regex("[\u202a-\u202e\u2066-\u2069]")
 """These, and those that texts in Arabic may need, but code does not."""
 
 TAB = 4

@@ -7,7 +7,6 @@ only (`keeps_words`); all others are proposed, for a human to decide.
 
 from __future__ import annotations
 
-import re
 import unicodedata
 from collections.abc import Iterable
 from typing import Generic, TypeVar
@@ -15,6 +14,7 @@ from typing import Generic, TypeVar
 from msgspec import Struct
 
 from coursebuild.core.text.near import have_other_ids, nearest
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.rules import RULES, Severity
 from coursebuild.core.text.source import Source, Span
 
@@ -140,7 +140,7 @@ def diagnose(
     return Diagnostic(rule, span, message, label, str(help), tuple(notes), edits, is_safe)
 
 
-_WORD = re.compile(r"(?<!\w)[-+\u2212]?\d+(?:[.,]\d+)*|[\u207a\u207b]?\w+")
+_WORD = regex(r"(?<!\w)[-+\u2212]?\d+(?:[.,]\d+)*|[\u207a\u207b]?\w+")
 """A number with its sign, or a word; names in code are words."""
 
 

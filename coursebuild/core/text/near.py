@@ -5,14 +5,15 @@ Entry points: `nearest`; `near`, all of them; `distance`, the number of slips.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
+
+from coursebuild.core.text.regex import regex
 
 _LETTERS_PER_SLIP = 3
 """A name of so many letters may have one slip, one of twice as many two, and so on."""
 
 
-_ID = re.compile(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")
+_ID = regex(r"\d+|(?<![^\W_])[^\W\d_](?![^\W_])")
 
 
 def have_other_ids(first: str, second: str) -> bool:

@@ -20,6 +20,8 @@ from decimal import Context, Decimal
 
 from msgspec import Struct
 
+from coursebuild.core.text.regex import regex
+
 _SIGN = "[+\\-\u2212]"
 _MAGNITUDE = rf"(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE]{_SIGN}?[0-9]{{1,4}})?"
 # No digit, no further `.1`, and no letters with a digit or underscore among them may follow.
@@ -39,30 +41,28 @@ _LOOKS_LIKE_A_NUMBER = "|".join(
     )
 )
 _SPECIAL = rf"{_SIGN}?(?:nan|NaN|NAN|inf|Inf|INF|[iI]nfinity)(?!\w)"
-_TOKEN = re.compile(
+_TOKEN = regex(
     rf"(?P<imaginary>(?<=[0-9.]){_SIGN}{_MAGNITUDE}(?=[jJ](?!\w)))"
     rf"|(?<![\w.^])(?<!\^[+\-])(?:(?P<text>{_LOOKS_LIKE_A_NUMBER})|(?P<special>{_SPECIAL})"
     rf"|(?P<number>(?:(?<![\w.)\]]){_SIGN})?{_MAGNITUDE}{_ENDS})"
     r"|(?P<word>[^\W\d]\w*(?:\.[0-9]\w*)*(?:-[0-9][\w.]*)*))"
 )
-_MAY_HOLD_NUMBERS = re.compile("[0-9]|nan|inf", re.IGNORECASE)
-_GROUPS = re.compile(
-    r"(?<![0-9.,])[1-9][0-9]{0,2}(?:,[0-9]{3})+(?:\.[0-9]+)?(?!,?[0-9])(?!\.[0-9])"
-)
+_MAY_HOLD_NUMBERS = regex("[0-9]|nan|inf", re.IGNORECASE)
+_GROUPS = regex(r"(?<![0-9.,])[1-9][0-9]{0,2}(?:,[0-9]{3})+(?:\.[0-9]+)?(?!,?[0-9])(?!\.[0-9])")
 """Digits as Python's format `,` writes them."""
 _SPACES = "\u00a0\u2009\u202f"
 _BEFORE_SPACE = r"(?<![0-9]\s)[1-9][0-9]{0,2}"
 _SPACED = rf"{_BEFORE_SPACE}(?:[{_SPACES}][0-9]{{3}})+(?![{_SPACES}]?[0-9])"
-_WITH_SPACES = re.compile(rf"(?<![\w.,]){_SPACED}(?!,[0-9])")
-_WITH_COMMA = re.compile(
+_WITH_SPACES = regex(rf"(?<![\w.,]){_SPACED}(?!,[0-9])")
+_WITH_COMMA = regex(
     rf"(?<![\w.,])(?:{_BEFORE_SPACE}(?:[ {_SPACES}][0-9]{{3}})+,[0-9]+|{_SPACED}"
     r"|(?:[0-9]{1,3}(?:\.[0-9]{3})+|[0-9]+),[0-9]+"
     r"|[0-9]{1,3}(?:\.[0-9]{3}){2,})(?![0-9]|[.,][0-9])"
 )
-_GROUP_SPACE = re.compile(rf"(?<=[0-9])[ {_SPACES}](?=[0-9]{{3}}(?![0-9]))")
+_GROUP_SPACE = regex(rf"(?<=[0-9])[ {_SPACES}](?=[0-9]{{3}}(?![0-9]))")
 _SWAPPED = str.maketrans(",.", ".,")
-_DIGIT_COMMA = re.compile("[0-9],[0-9]")
-_NOTATION = re.compile(
+_DIGIT_COMMA = regex("[0-9],[0-9]")
+_NOTATION = regex(
     rf"(?P<sign>{_SIGN})?(?P<whole>[0-9,]*)(?:\.(?P<decimals>[0-9]*))?"
     rf"(?:(?P<mark>[eE])(?P<power_sign>{_SIGN})?(?P<power>[0-9]+))?"
 )
@@ -73,11 +73,11 @@ _QUOTIENT = Context(prec=34)
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻", "0123456789+-")
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-_POWER = re.compile(
+_POWER = regex(
     rf"\s*(?:[×·]|\\cdot|\\times)\s*10(?:\^\{{?(?P<caret>{_SIGN}?[0-9]{{1,4}})\}}?|(?P<raised>[⁺⁻]?[⁰¹²³⁴⁵⁶⁷⁸⁹]{{1,4}}))(?!\w)"
 )
 
-_UNREAD = re.compile(rf"\^\W*[0-9]+|(?P<bad>(?<![\w)\]]){_SIGN}(?={_SIGN}+\.?[0-9])|[0-9]+)")
+_UNREAD = regex(rf"\^\W*[0-9]+|(?P<bad>(?<![\w)\]]){_SIGN}(?={_SIGN}+\.?[0-9])|[0-9]+)")
 
 
 class Number(Struct, frozen=True):

@@ -19,6 +19,7 @@ from fractions import Fraction
 from msgspec import Struct
 
 from coursebuild.core.text.numbers import Number, only_number, scan
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.unit_table import LEVELS, NAMES
 from coursebuild.core.text.units import PER, Unit, find_units, is_name, write_quantities
 
@@ -27,72 +28,72 @@ _SECOND_READINGS = {
     "°": ("°C", "°F"),
 }
 """What a symbol means in text besides."""
-_RAISED = re.compile("[\\^⁻]")
+_RAISED = regex("[\\^⁻]")
 _MAGNITUDES = frozenset("BGMP")
 """In text they count billions and millions more often than they are units."""
 _SIGNS = frozenset(("/", "·", "⋅", "*", *PER, "pour", "square", "cubic", "sq", "cu"))
 """After these, more of a unit must follow."""
-_PER_UNIT = re.compile(r"/[^\W\d_]")
-_GAP = re.compile(r"[ \t]{2,}|\t")
-_NEXT_COLUMN = re.compile(r"[ \t]{2,}|\t|[ \t]?\|[ \t]?|,(?=[^\W\d])")
+_PER_UNIT = regex(r"/[^\W\d_]")
+_GAP = regex(r"[ \t]{2,}|\t")
+_NEXT_COLUMN = regex(r"[ \t]{2,}|\t|[ \t]?\|[ \t]?|,(?=[^\W\d])")
 _REACH = 80
 _LONGEST_PRODUCT = 6
 _CLOSING = ".,;:!?”\"'*_`|>}"
-_UPRIGHT = re.compile(r"\$([^$]*\\(?:mathrm|text|textrm)[^$]*)\$")
+_UPRIGHT = regex(r"\$([^$]*\\(?:mathrm|text|textrm)[^$]*)\$")
 _NUMBER = r"[-+−]?[0-9.]++(?:[eE][-+]?[0-9]++)?"
-_SPREAD = re.compile(rf"[ \t]?(?:±|\+/?-|–|\.\.+|to)[ \t]*{_NUMBER}(?=[ \t)\]])[ \t]*[)\]]?(?! ?%)")
+_SPREAD = regex(rf"[ \t]?(?:±|\+/?-|–|\.\.+|to)[ \t]*{_NUMBER}(?=[ \t)\]])[ \t]*[)\]]?(?! ?%)")
 """A number that shares its unit with the one before: `83.4 ± 0.2 m`, `(83.4 .. 85.0) m`.
 
 Not so `0.5 ± 0.8 %`, which may be relative.
 """
-_SPREAD_BEFORE = re.compile(rf"[=:)\]\s]\s*{_NUMBER}[ \t]?(?:±|\+/?-)[ \t]*\Z")
+_SPREAD_BEFORE = regex(rf"[=:)\]\s]\s*{_NUMBER}[ \t]?(?:±|\+/?-)[ \t]*\Z")
 """What stands between the label of a number and its uncertainty: `v (m/s): 83.4 ± `."""
-_REST_OF_LIST = re.compile(rf"(?:[,; \t]++{_NUMBER})*[ \t]*[)\]]")
+_REST_OF_LIST = regex(rf"(?:[,; \t]++{_NUMBER})*[ \t]*[)\]]")
 _BEGIN_OF_LIST = frozenset("([ \t,;+-−.eE0123456789")
 """What may stand in a list before a number of it."""
-_REFERENCE = re.compile(r" ?\[[\^@][^\[\]]*\]")
+_REFERENCE = regex(r" ?\[[\^@][^\[\]]*\]")
 """A footnote or a source behind a unit."""
-_FRACTION = (re.compile(r"\\[td]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}"), r"(\1)/(\2)")
+_FRACTION = (regex(r"\\[td]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}"), r"(\1)/(\2)")
 _TEX_SIGNS = (
-    (re.compile(r"\^\{([-−]?\d+)\}"), r"^\1"),
+    (regex(r"\^\{([-−]?\d+)\}"), r"^\1"),
     _FRACTION,
-    (re.compile(r"\\(?:mathrm|text|textrm|operatorname)\s*(?:\{([^{}]*)\}|(\w))"), r" \1\2"),
-    (re.compile(r"\^?\{?\\(?:circ|degree)\}?"), "°"),
-    (re.compile(r"(?:°|\b(?:degrees?|deg|Grad)\b)\s*([CF])(?:elsius|ahrenheit)?\b"), r"°\1"),
-    (re.compile(r"\*\*"), "^"),
-    (re.compile(r"\\cdot"), "·"),
-    (re.compile(r"\\mu\s*"), "µ"),
-    (re.compile(r"\\Omega"), "Ω"),
+    (regex(r"\\(?:mathrm|text|textrm|operatorname)\s*(?:\{([^{}]*)\}|(\w))"), r" \1\2"),
+    (regex(r"\^?\{?\\(?:circ|degree)\}?"), "°"),
+    (regex(r"(?:°|\b(?:degrees?|deg|Grad)\b)\s*([CF])(?:elsius|ahrenheit)?\b"), r"°\1"),
+    (regex(r"\*\*"), "^"),
+    (regex(r"\\cdot"), "·"),
+    (regex(r"\\mu\s*"), "µ"),
+    (regex(r"\\Omega"), "Ω"),
     _FRACTION,
-    (re.compile(r"\\%"), "%"),
-    (re.compile(r"\\[,;:! ]|[~$]"), " "),
-    (re.compile(r"\(\s+"), "("),
+    (regex(r"\\%"), "%"),
+    (regex(r"\\[,;:! ]|[~$]"), " "),
+    (regex(r"\(\s+"), "("),
 )
-_BRACKET = re.compile(r"(?P<before>(?<!/)|[^/])[(\[](?P<unit>(?:[^()\[\]]|\([^()]*\))*)[)\]]\s*\Z")
-_BRACKET_WITH_WORDS = re.compile(
+_BRACKET = regex(r"(?P<before>(?<!/)|[^/])[(\[](?P<unit>(?:[^()\[\]]|\([^()]*\))*)[)\]]\s*\Z")
+_BRACKET_WITH_WORDS = regex(
     r"\A[^()\[\]\s]*?(?P<before>.?)[(\[](?P<unit>(?!min,)[^()\[\],]+)"
     r"(?:, [^\W\d_][^()\[\]]{2,}[)\]]|[)\]] of [^()\[\]]*)\Z"
 )
 """`E (J, in total)`, `E [J] of the ball`; behind a comma another label may stand."""
-_BEHIND_COMMA = re.compile(r"[^\W\d_]{2}|.*[/^²³°A-Z].*|[a-z]+s")
+_BEHIND_COMMA = regex(r"[^\W\d_]{2}|.*[/^²³°A-Z].*|[a-z]+s")
 """What is a unit behind a comma, as in `duration, ms`; another word may be one as well."""
-_SOLIDUS = re.compile(r"\s*/\s*(?P<unit>[^/=:]+)\Z")
-_DENOMINATOR = re.compile(r"(?<=\w/)\([^()]*\)")
+_SOLIDUS = regex(r"\s*/\s*(?P<unit>[^/=:]+)\Z")
+_DENOMINATOR = regex(r"(?<=\w/)\([^()]*\)")
 """As in `c in J/(g K)`, a part of a unit and not the unit in brackets."""
-_IN_WORDS = re.compile(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
-_SYMBOL = re.compile(r"\w{1,2}|\\[a-z]+")
-_TO_NUMBER = re.compile(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
+_IN_WORDS = regex(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
+_SYMBOL = regex(r"\w{1,2}|\\[a-z]+")
+_TO_NUMBER = regex(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
 """From the end of a label to a number, perhaps past other numbers."""
 _CELLS = (
-    re.compile(r"\u2026|[^\s|;,\u2026](?:(?!\s\s|\s*[\t|;,]|\u2026).)*"),
-    re.compile(r"\u2026|[^\s|;,\u2026]+(?: ?[(\[](?:[^()\[\]]|\([^()\[\]]*\))*[)\]])?"),
+    regex(r"\u2026|[^\s|;,\u2026](?:(?!\s\s|\s*[\t|;,]|\u2026).)*"),
+    regex(r"\u2026|[^\s|;,\u2026]+(?: ?[(\[](?:[^()\[\]]|\([^()\[\]]*\))*[)\]])?"),
 )
 """Cells of a row, with wide gaps or signs between them, and with single spaces.
 
 `\u2026` is one, without gaps: what varies from run to run stands there.
 """
-_SEPARATOR = re.compile(r"[\t|;,\u2026]")
-_RULE = re.compile(r"[\s\-=+|:─━═┼]*")
+_SEPARATOR = regex(r"[\t|;,\u2026]")
+_RULE = regex(r"[\s\-=+|:─━═┼]*")
 
 
 class UnitText(Struct, frozen=True):

@@ -17,7 +17,9 @@ from operator import itemgetter
 
 from msgspec import Struct
 
-_NEWLINE = re.compile(r"\r\n|\r|\n")
+from coursebuild.core.text.regex import regex
+
+_NEWLINE = regex(r"\r\n|\r|\n")
 
 
 def text_digest(text: str) -> bytes:

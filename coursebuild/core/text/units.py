@@ -18,6 +18,7 @@ from msgspec.structs import replace
 
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
 from coursebuild.core.text.near import nearest
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 from coursebuild.core.text.unit_table import LEVELS, NAMES, UNITS
 
@@ -82,12 +83,12 @@ _TWO_UNITS = (
 """After what a space may be missing: `ms⁻¹`, `kgm²`, `mPas`, `W/m2K`."""
 PER = ("per", "pro", "par", "por")
 _WORDS = (
-    (re.compile(rf"\s+(?:{'|'.join(PER)})\s+(?!cent\b)"), "/"),
-    (re.compile(r"(?:per|pour|por) ?cent\b|por ciento\b"), "%"),
-    (re.compile(r"\b(?:square|sq\.?) ([^\W\d_]+)|\bQuadrat([^\W\d_]+)"), r"\1\2^2"),
-    (re.compile(r"\b(?:cubic|cu\.?) ([^\W\d_]+)|\bKubik([^\W\d_]+)"), r"\1\2^3"),
-    (re.compile(r"(?<=[^\W\d_]) (?:squared|carrés?|cuadrados?)\b"), "^2"),
-    (re.compile(r"(?<=[^\W\d_]) (?:cubed|cubes?|cúbicos?)\b"), "^3"),
+    (regex(rf"\s+(?:{'|'.join(PER)})\s+(?!cent\b)"), "/"),
+    (regex(r"(?:per|pour|por) ?cent\b|por ciento\b"), "%"),
+    (regex(r"\b(?:square|sq\.?) ([^\W\d_]+)|\bQuadrat([^\W\d_]+)"), r"\1\2^2"),
+    (regex(r"\b(?:cubic|cu\.?) ([^\W\d_]+)|\bKubik([^\W\d_]+)"), r"\1\2^3"),
+    (regex(r"(?<=[^\W\d_]) (?:squared|carrés?|cuadrados?)\b"), "^2"),
+    (regex(r"(?<=[^\W\d_]) (?:cubed|cubes?|cúbicos?)\b"), "^3"),
 )
 """How units are written in words."""
 _LONGEST = 100
@@ -182,7 +183,7 @@ def _with_signs(text: str) -> str:
     return text
 
 
-_MACRO = re.compile(r"\\([A-Za-z]+)\s*(?:\{([^{}]*)\})?")
+_MACRO = regex(r"\\([A-Za-z]+)\s*(?:\{([^{}]*)\})?")
 _POWER_MACROS = {"square": "2", "squared": "2", "cubic": "3", "cubed": "3"}
 
 
@@ -210,16 +211,16 @@ def _unit_of_macros(tex: str) -> str:
 
 
 _ARGUMENT = r"\s*\{((?:[^{}]|\{[^{}]*\})*)\}"
-QUANTITY = re.compile(
+QUANTITY = regex(
     r"\\(?:(?:num|(?P<of_unit>qty|SI))(?P<many>list|product|(?P<range>range))?|(?P<angle>ang)"
     rf"|(?P<bare>unit|si))(?![A-Za-z])(?:\s*\[[^\]]*\])?{_ARGUMENT}(?(range){_ARGUMENT})"
     rf"(?(of_unit){_ARGUMENT})"
 )
-_NEXT = re.compile(r"\s*(?:;|(?<=[\d\s])x(?=[\d\s]))\s*")
+_NEXT = regex(r"\s*(?:;|(?<=[\d\s])x(?=[\d\s]))\s*")
 """Between the numbers of one argument."""
 _BETWEEN = {"list": r",\;", "range": r"\text{ – }"}
 """What is shown between numbers, which are factors otherwise; in no language."""
-_DEFINITION = re.compile(r"\\(?:def|[a-z]*command\*?\s*\{?)\s*(\\[A-Za-z]+)")
+_DEFINITION = regex(r"\\(?:def|[a-z]*command\*?\s*\{?)\s*(\\[A-Za-z]+)")
 
 
 def write_quantities(tex: str) -> str:

@@ -13,33 +13,32 @@ from functools import cached_property, lru_cache
 
 from msgspec import Struct
 
+from coursebuild.api import regex
 from coursebuild.core.checks.formulas import SYMBOLS
 from coursebuild.features.arithmetic.expressions import CONSTANTS, Expression, NotUnderstood
 from coursebuild.features.arithmetic.tex import SPACE, TOKEN, read_expression
 
 _MAX_LENGTH = 5_000
-_DIGITS = re.compile("[0-9],[0-9]")
-_COMMA = re.compile(r"([0-9]+)\{,\}([0-9]+)")
-_PLAIN_COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")
-_COMMA_OF_TWO = re.compile(r"[0-9],[0-9]|[0-9](?:,|\{,\})\([0-9]")
-_POINT = re.compile(r"(?<=[0-9])\s*\.\s*(?=[0-9])")
-_CERTAIN_COMMA = re.compile(r"(?<![0-9.])0\{,\}[0-9]|[0-9]\{,\}(?:[0-9]{1,2}|[0-9]{4,})(?![0-9])")
+_DIGITS = regex("[0-9],[0-9]")
+_COMMA = regex(r"([0-9]+)\{,\}([0-9]+)")
+_PLAIN_COMMA = regex(r"(?<=[0-9]),(?=[0-9])")
+_COMMA_OF_TWO = regex(r"[0-9],[0-9]|[0-9](?:,|\{,\})\([0-9]")
+_POINT = regex(r"(?<=[0-9])\s*\.\s*(?=[0-9])")
+_CERTAIN_COMMA = regex(r"(?<![0-9.])0\{,\}[0-9]|[0-9]\{,\}(?:[0-9]{1,2}|[0-9]{4,})(?![0-9])")
 """A comma that parts no thousands."""
 _ARABIC = {zero + n: str(n) for zero in (0x660, 0x6F0) for n in range(10)} | {0x66B: "."}
 """Digits and the decimal sign, as they are written in Arabic and Persian."""
-_ENVIRONMENT = re.compile(r"\\(?:begin|end)\{(?:aligned|split|align\*?|gathered|equation\*?)\}")
-_WORDS = re.compile(
+_ENVIRONMENT = regex(r"\\(?:begin|end)\{(?:aligned|split|align\*?|gathered|equation\*?)\}")
+_WORDS = regex(
     r"\\(?:mathrm|text|textrm|begin|end|(?:qty|SI)\{[^{}]*\})\s*(?:\{[^{}]*\}|\w)"
     rf"|\\(?!(?:{'|'.join(SYMBOLS - {'pi', 'infty'})})(?![A-Za-z]))[A-Za-z]+"
 )
 """Commands and words whose letters are no symbols."""
-_MAY_BE_NUMERIC = re.compile(r"[0-9e]|\\pi")
+_MAY_BE_NUMERIC = regex(r"[0-9e]|\\pi")
 """A digit, or a part of one of `CONSTANTS`."""
-_SYMBOL = re.compile(r"(?<![\\A-Za-z])e*[A-DF-Za-df-z]")
+_SYMBOL = regex(r"(?<![\\A-Za-z])e*[A-DF-Za-df-z]")
 """A letter that is a symbol, unless it stands in a word."""
-_MAY_HOLD_WORDS = re.compile(
-    r"\\(?:math|text|operatorname|begin|underbrace|overbrace|sum|prod|qty|SI)"
-)
+_MAY_HOLD_WORDS = regex(r"\\(?:math|text|operatorname|begin|underbrace|overbrace|sum|prod|qty|SI)")
 _RELATIONS = {
     **{sign: sign for sign in "=<>"},
     **dict.fromkeys((r"\approx", r"\simeq", "≈"), "≈"),

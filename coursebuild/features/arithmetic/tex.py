@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import re
 
+from coursebuild.api import regex
 from coursebuild.core.checks.formulas import SYMBOLS
 from coursebuild.core.text.quantities import plain_unit
 from coursebuild.core.text.units import QUANTITY, write_quantities
@@ -28,25 +29,25 @@ from coursebuild.features.arithmetic.expressions import (
 )
 
 _MAX_FACTORS = 100  # of one expression, which also limits how deep it nests
-TOKEN = re.compile(r"\\[A-Za-z]+\*?|\\[\s\S]|[\s\S]")
-SPACE = re.compile(
+TOKEN = regex(r"\\[A-Za-z]+\*?|\\[\s\S]|[\s\S]")
+SPACE = regex(
     r"(?:\s|&|~|\\[,;:! ]|\\(?:left|right|[bB]igg?[lrm]?|displaystyle|textstyle|nolimits|limits"
     r"|nonumber|thinspace)(?![A-Za-z])\.?|\{\}|\\\\)+"
 )
-_NUMBER = re.compile(
+_NUMBER = regex(
     r"(?:[0-9]{1,3}(?:(?:\{,\}|\\[,;: ]|~)[0-9]{3})+(?![0-9])|[0-9]+)(?:\.[0-9]+)?|\.[0-9]+"
 )
-_E_NOTATION = re.compile(r"(?:[eE]|\\mathrm\s*(?:[eE]|\{[eE]\}))(?:\{[-+−]?[0-9]+\}|[-+−][0-9])")
-_LETTER = re.compile(r"[A-Za-z]|\\[A-Za-z]+")
-_DIFFERENTIAL = re.compile(r"\\mathrm\s*(?:\{\s*d\s*\}|d)|\\partial(?![A-Za-z])")
-_UPRIGHT = re.compile(r"\\(?:mathrm|text|textrm|operatorname|mathit)(?![A-Za-z])\s*")
-_SCALE = re.compile(r"(?:\\mathrm|\\text)\s*(?:\{\s*([CF])\s*\}|([CF]))(?![\^_])")
+_E_NOTATION = regex(r"(?:[eE]|\\mathrm\s*(?:[eE]|\{[eE]\}))(?:\{[-+−]?[0-9]+\}|[-+−][0-9])")
+_LETTER = regex(r"[A-Za-z]|\\[A-Za-z]+")
+_DIFFERENTIAL = regex(r"\\mathrm\s*(?:\{\s*d\s*\}|d)|\\partial(?![A-Za-z])")
+_UPRIGHT = regex(r"\\(?:mathrm|text|textrm|operatorname|mathit)(?![A-Za-z])\s*")
+_SCALE = regex(r"(?:\\mathrm|\\text)\s*(?:\{\s*([CF])\s*\}|([CF]))(?![\^_])")
 _UPRIGHT_UNIT = r"\{\s*(\\(?:mathrm|text)\s*(?:\{[^{}]+\}|[A-Za-z])(?:\^(?:\d|\{-?\d\}))?)\s*\}"
-_UNIT_FRACTION = re.compile(rf"(?!\{{\s*\\mathrm\s*\{{?d\b)\s*{_UPRIGHT_UNIT}\s*{_UPRIGHT_UNIT}")
-_DEGREES = re.compile(r"\\circ|\{\s*\\circ\s*\}")
+_UNIT_FRACTION = regex(rf"(?!\{{\s*\\mathrm\s*\{{?d\b)\s*{_UPRIGHT_UNIT}\s*{_UPRIGHT_UNIT}")
+_DEGREES = regex(r"\\circ|\{\s*\\circ\s*\}")
 _FUNCTIONS = "sin cos tan cot sec csc sinh cosh tanh arcsin arccos arctan exp ln log".split()
 _ACCENTS = frozenset("dot ddot hat bar tilde".split())
-_BRACKET = re.compile(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
+_BRACKET = regex(r"[(\[]|\{\s*(?:\\left\s*)?\([^()]*\)\s*\}")
 """What holds all that a function is of: brackets, perhaps in braces, as other programs write."""
 _BRACKETS = {"(": ")", "[": "]", "{": "}", "|": "|", r"\lvert": r"\rvert"}
 _QUOTIENT_SIGNS = ("/", r"\div")

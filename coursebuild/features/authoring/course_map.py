@@ -23,6 +23,7 @@ from coursebuild.api import (
     UsageError,
     did_you_mean,
     parse_toml,
+    regex,
 )
 from coursebuild.core.model import LessonTarget, Link, find_inlines, resolve
 from coursebuild.core.scripts.edit import apply_edits
@@ -30,9 +31,9 @@ from coursebuild.core.syntax.coursemap import parse_course_map
 from coursebuild.core.syntax.nodes import ArrayNode, ObjectNode, StringNode
 from coursebuild.core.syntax.toml_text import toml_string
 
-_COMMENTS_ABOVE = re.compile(r"(?:^[ \t]*#[^\n]*\n)*[ \t]*\Z", re.MULTILINE)
-_LINE_END = re.compile(r"\r?\n|\Z")
-_BLANK_LINES = re.compile(r"(?:[ \t]*\r?\n)*")
+_COMMENTS_ABOVE = regex(r"(?:^[ \t]*#[^\n]*\n)*[ \t]*\Z", re.MULTILINE)
+_LINE_END = regex(r"\r?\n|\Z")
+_BLANK_LINES = regex(r"(?:[ \t]*\r?\n)*")
 
 
 def with_lesson(course: Course, id: str, slug: str, title: str) -> str:

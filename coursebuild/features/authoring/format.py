@@ -25,6 +25,7 @@ from coursebuild.api import (
     Span,
     model,
     parse_json,
+    regex,
 )
 from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.registry import fence_names
@@ -98,8 +99,8 @@ _MEANINGS: dict[type, Callable[[Any], object]] = {
 
 _VERBATIM = ("fence", "code_block", "html_block", "math_block")
 _UNBREAKABLE = (model.CodeSpan, model.Image, model.RawInline)
-_LINE_END = re.compile(r"\r\n|\r|\n")
-_DELIMITERS = re.compile(r"[-:|][-:| \t]*$")
+_LINE_END = regex(r"\r\n|\r|\n")
+_DELIMITERS = regex(r"[-:|][-:| \t]*$")
 _PARENTS = ("", "blockquote_open", "footnote_reference_open")
 """Containers whose blocks are separated by empty lines; the first is the document itself."""
 
@@ -234,11 +235,11 @@ class _Layout:
                 parents.append([token.type, ""])
 
 
-GAP = re.compile(r"[ \t]*(?:\r\n|\r|\n)([ \t>]*)|[ \t]+")
+GAP = regex(r"[ \t]*(?:\r\n|\r|\n)([ \t>]*)|[ \t]+")
 """White space between words; group 1 is the prefix of the next line in a quote or list."""
-_OPENING = re.compile(r"[-+*#=_|]+$|>|\d+[.)]$|`{3}|~{3}|\$\$")
+_OPENING = regex(r"[-+*#=_|]+$|>|\d+[.)]$|`{3}|~{3}|\$\$")
 """Words that would begin another block if they began a line."""
-_PIPE = re.compile(r"(?<!\\)\|")
+_PIPE = regex(r"(?<!\\)\|")
 
 
 def split_words(span: Span, unbreakable: Sequence[Span]) -> list[str]:

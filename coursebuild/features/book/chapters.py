@@ -31,6 +31,7 @@ from coursebuild.api import (
     Lesson,
     OutputFile,
     gate,
+    regex,
     temporary_folder,
     urls,
 )
@@ -61,7 +62,7 @@ _ID_ATTRIBUTES = frozenset(
     " aria-flowto aria-labelledby aria-owns for headers list".split()
 )
 _ADDRESSES = frozenset(("href", "xlink:href", "src"))
-_IN_SVG = re.compile(r"url\(#([^)]+)\)")
+_IN_SVG = regex(r"url\(#([^)]+)\)")
 
 
 class RewriteRules(Struct, frozen=True):
@@ -311,13 +312,13 @@ _BROWSER_OPTIONS = (
 )
 _SECONDS = 600
 """How long printing may take."""
-_ENTRY = re.compile(r'(<span class="book-page" data-at="([^"]*)">)(</span>)')
-_TIMES = re.compile(rb"/CreationDate \([^()]*\)\s*/ModDate \([^()]*\)")
-_NODE = re.compile(rb"\(node\d{8}\)")
-_DESTINATION = re.compile(rb"/([^\s/\[\]()<>]+) \[(\d+) 0 R /XYZ")
-_OBJECT = re.compile(rb"(?:^|\n)(\d+) 0 obj\n(<<.*?)\nendobj", re.DOTALL)
-_KIDS = re.compile(rb"/Kids \[([^\]]*)\]")
-_ROOT = re.compile(rb"/Type /Catalog\s+/Pages (\d+) 0 R")
+_ENTRY = regex(r'(<span class="book-page" data-at="([^"]*)">)(</span>)')
+_TIMES = regex(rb"/CreationDate \([^()]*\)\s*/ModDate \([^()]*\)")
+_NODE = regex(rb"\(node\d{8}\)")
+_DESTINATION = regex(rb"/([^\s/\[\]()<>]+) \[(\d+) 0 R /XYZ")
+_OBJECT = regex(rb"(?:^|\n)(\d+) 0 obj\n(<<.*?)\nendobj", re.DOTALL)
+_KIDS = regex(rb"/Kids \[([^\]]*)\]")
+_ROOT = regex(rb"/Type /Catalog\s+/Pages (\d+) 0 R")
 
 
 def pdf_file(context: ExportContext) -> tuple[OutputFile]:

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from markupsafe import Markup
 from msgspec import Struct
 
-from coursebuild.api import CachedFile, ExportContext, Lesson, OutputFile, SiteFile, urls
+from coursebuild.api import CachedFile, ExportContext, Lesson, OutputFile, SiteFile, regex, urls
 from coursebuild.core.model import Level
 from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import to_xml
@@ -39,11 +39,11 @@ _CONTAINER = """\
 _FOLDER = "EPUB/"
 _XHTML = "application/xhtml+xml"
 _FEATURES = ("structuralNavigation", "tableOfContents", "displayTransformability")
-_STYLE_RULE = re.compile(r"\.s[0-9a-f]{7}\{[^{}]*\}")
+_STYLE_RULE = regex(r"\.s[0-9a-f]{7}\{[^{}]*\}")
 """A rule of the site's style sheet that replaces a style attribute, see `styles`."""
-_FONT_FACE = re.compile(rf'@font-face{{font-family:"(?:{"|".join(COURSE.values())})"[^}}]*}}')
+_FONT_FACE = regex(rf'@font-face{{font-family:"(?:{"|".join(COURSE.values())})"[^}}]*}}')
 """The rule for one of the course's own fonts in the site's style sheet."""
-_FONT = re.compile(r'url\("(fonts/[^"]+)"\)')
+_FONT = regex(r'url\("(fonts/[^"]+)"\)')
 _FONT_RULES = {
     "text": "body{{font-family:{},serif}}",
     "interface": ".bar,.label,.receipt,figcaption{{font-family:{},sans-serif}}",

@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator
 
 from markupsafe import Markup
 
-from coursebuild.api import ExportContext, OutputFile, document_scripts, urls
+from coursebuild.api import ExportContext, OutputFile, document_scripts, regex, urls
 from coursebuild.core.model.lesson_record import shown_versions
 from coursebuild.core.pages.frame import citation
 from coursebuild.core.pages.html_xml import HtmlContent, HtmlElement, to_html
@@ -34,9 +34,9 @@ _POLICY = (
     "connect-src data:; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
     "base-uri 'none'; form-action 'none'"
 )
-_OWN_ID = re.compile("_+slide-")
-_WORDS = re.compile(r'<template id="_words"([^>]*)>(.*?)</template>', re.DOTALL)
-_QUIZ_SCRIPT = re.compile(r'data-quiz-script="([^"]*)"')
+_OWN_ID = regex("_+slide-")
+_WORDS = regex(r'<template id="_words"([^>]*)>(.*?)</template>', re.DOTALL)
+_QUIZ_SCRIPT = regex(r'data-quiz-script="([^"]*)"')
 _LAB_FILES = ("module", "mjb", "worker", "wasm")
 """The fields of a lab's JSON that hold addresses."""
 _TYPES = {"js": "text/javascript", "json": "application/json", "wasm": "application/wasm"}

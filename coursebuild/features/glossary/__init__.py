@@ -12,7 +12,6 @@ Chinese and Japanese need no white space.
 
 from __future__ import annotations
 
-import re
 import unicodedata
 from collections.abc import Callable, Iterator
 from itertools import groupby
@@ -21,7 +20,7 @@ from markupsafe import Markup
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import Feature, Library, Mathml, PageKind, Parsed, model, urls
+from coursebuild.api import Feature, Library, Mathml, PageKind, Parsed, model, regex, urls
 from coursebuild.core.pages import document_inputs, typography
 from coursebuild.core.pages.library import links
 from coursebuild.core.pages.markup import HtmlWriter
@@ -116,9 +115,9 @@ def _split_definition(
         yield DefinitionPart(writer.display(following.tex.text, 0), display=True)
 
 
-_END = re.compile(r"[.!?…؟।]+[\"'”’»)\]]*\s+|[。！？]+[」』）”’]*\s*")
-_COMPLETE = re.compile(r"[.!?…؟।。！？][\"'”’»」』）)\]]*\s*$")
-_LAST_WORD = re.compile(r"[^\s(\[“‘\"']*$")
+_END = regex(r"[.!?…؟।]+[\"'”’»)\]]*\s+|[。！？]+[」』）”’]*\s*")
+_COMPLETE = regex(r"[.!?…؟।。！？][\"'”’»」』）)\]]*\s*$")
+_LAST_WORD = regex(r"[^\s(\[“‘\"']*$")
 _ABBREVIATIONS = frozenset(
     "approx. ca. cf. ch. e.g. eq. eqs. fig. figs. i.e. p. pp. ref. refs. resp. sec. viz. vs."
     " d.h. z.b. bzw. vgl. abb. gl. p.ej. u.a.".split()

@@ -25,6 +25,7 @@ from coursebuild.api import (
     Span,
     diagnose,
     model,
+    regex,
 )
 
 # --- shown as written
@@ -33,20 +34,20 @@ _OTHER = "\ufffc"
 """Stands for what is no text: code, a formula, an image, an escaped character."""
 _ESCAPED = {"\\[": "\ue000", "\\{": "\ue001", "\\<": "\ue002", "&lt;": "\ue002"}
 """Stand for brackets that are escaped, and may be closed by one that need not be."""
-_HIDDEN = re.compile(r"\\[!-/:-@\[-`{-~]|&#?\w+;")
-_MARKS = re.compile(r"(`|\*|_|~|#|\[|\]|\{|\}|<|\||\$|\^|\\)\1*")
+_HIDDEN = regex(r"\\[!-/:-@\[-`{-~]|&#?\w+;")
+_MARKS = regex(r"(`|\*|_|~|#|\[|\]|\{|\}|<|\||\$|\^|\\)\1*")
 _BRACKETS = (
-    re.compile(r"\[([-+\d.,; ]*(?:\[[-+\d.,; ]*\][,; ]*)*)\](?![(\[{])"),  # [[1, 2], [3, 4]]
-    re.compile(  # [0, 1), ]0, 1[, but not what lies between the brackets of a(b, [c])
+    regex(r"\[([-+\d.,; ]*(?:\[[-+\d.,; ]*\][,; ]*)*)\](?![(\[{])"),  # [[1, 2], [3, 4]]
+    regex(  # [0, 1), ]0, 1[, but not what lies between the brackets of a(b, [c])
         r"(?<![\w\])])[\[\](](?=\S)([^\[\](){}\n]{0,99}[,;][^\[\](){}\n]{0,99})(?<=\S)[\])\[](?![\w\[])"
     ),
-    re.compile(  # [sic], [see [1]], \[a]
+    regex(  # [sic], [see [1]], \[a]
         r"(?:(?<!!)\[(?![\^(])|\ue000)([^\[\]\ue000]{0,400})\](?![(\[{])"
     ),
-    re.compile(  # {1, 2}, \{a}
+    regex(  # {1, 2}, \{a}
         rf"(?:(?<![\w{_OTHER}\])}}{{])\{{(?![%#.:])|\ue001)([^{{}}\ue001]{{0,400}})\}}"
     ),
-    re.compile(r"(?:(?<=\w)<|\ue002)([^<>\ue002]{0,400})>"),  # \<a>; List< [Item](#item)>
+    regex(r"(?:(?<=\w)<|\ue002)([^<>\ue002]{0,400})>"),  # \<a>; List< [Item](#item)>
 )
 """Brackets that belong together, around what they hold."""
 _ORDINARY = (
@@ -65,7 +66,7 @@ _ORDINARY = (
     r"\|(?=[^|\s]{1,20}⟩)|\|{1,2}\S(?:[^|\n]{0,40}\S)?\|{1,2}|[<>]=(?=\w)",  # |0⟩, |x|, >=a
     rf"<{_OTHER}[^<>\n]{{0,80}}>",  # <link>
 )
-_PROSE = re.compile("|".join(_ORDINARY))
+_PROSE = regex("|".join(_ORDINARY))
 """What texts hold, as far as characters of Markdown are concerned, beside words and numbers."""
 
 
@@ -126,10 +127,10 @@ def _source_text(inlines: Iterable[model.Inline]) -> tuple[str, list[tuple[int, 
 
 # --- degrees or radians
 
-_ANGLES = re.compile(r"<(joint|body|geom|site|camera|frame)\b([^<>]*)>")
-_VALUES = re.compile(r'\b(range|ref|springref|euler|axisangle)\s*=\s*"([^"]*)"')
-_SLIDES = re.compile(r'\btype\s*=\s*"(?:slide|free)"')
-_COMPILER = re.compile(r'<compiler\b[^<>]*\bangle\s*=\s*"(degree|radian)"')
+_ANGLES = regex(r"<(joint|body|geom|site|camera|frame)\b([^<>]*)>")
+_VALUES = regex(r'\b(range|ref|springref|euler|axisangle)\s*=\s*"([^"]*)"')
+_SLIDES = regex(r'\btype\s*=\s*"(?:slide|free)"')
+_COMPILER = regex(r'<compiler\b[^<>]*\bangle\s*=\s*"(degree|radian)"')
 
 
 def odd_angles(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:

@@ -14,6 +14,7 @@ from textwrap import shorten
 
 from msgspec import Struct
 
+from coursebuild.api import regex
 from coursebuild.report.values import plural
 
 Replacement = Callable[[re.Match[str]], str]
@@ -46,7 +47,7 @@ _MOST_WORDS = 300
 """Characters of a message in a report of the command."""
 _MOST_ALIKE = 3
 """Leftovers with the same words that it names one by one; else the first, and some places."""
-_NAMES = re.compile(r"`[^`]*`|\(.*\)")
+_NAMES = regex(r"`[^`]*`|\(.*\)")
 """What differs in the messages on the same sort of thing."""
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+from coursebuild.api import regex
 from coursebuild.features.importer.context import (
     NUMBERED,
     PROOF_LABELS,
@@ -12,7 +13,7 @@ from coursebuild.features.importer.context import (
 )
 from coursebuild.features.importer.displays import normalize_formulas
 
-TARGET = re.compile(
+TARGET = regex(
     r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)"
     r"(?:(?P<myst>\()|(?P<mkdocs>\[\]\(\)\{[ ]*#)|r\[)(?P<name>[\w:./|@<>*+-]+)"
     r"(?(myst)\)=|(?(mkdocs)[ ]*\}|\]))[ \t]*"
@@ -20,13 +21,13 @@ TARGET = re.compile(
     re.MULTILINE,
 )
 """An anchor of MyST, of `mkdocstrings`, or of a rule in the reference of Rust."""
-FIGURE = re.compile(
+FIGURE = regex(
     r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"
     r"\{#fig-(?P<label>[\w-]+)(?:[^{}\n]*?fig-alt=\"(?P<alternative>[^\"\n]*)\")?[^{}\n]*\}(?=\n|\Z)"
 )
 
 
-_LABELLED = re.compile(
+_LABELLED = regex(
     rf"\{{(?:prf:)?(?P<kind>{'|'.join(sorted(NUMBERED))}|figure|table|list-table|code|code-block"
     r"|sourcecode)\}[^\n]*\n"
     r"(?:[ \t]*(?::(?!name|label)[\w-]+:|---|(?!name|label)\w+:)[^\n]*\n)*"
@@ -81,11 +82,9 @@ def figure_of(source: str, caption: str, label: str, alt: str) -> str:
     return f"Figure: ![{alt}]({source}) {caption}{mark}"
 
 
-CAPTION = re.compile(
-    r"(?:Table)?:[ ]+(?P<caption>.*?)[ ]*(?:\{(?:#tbl-(?P<label>[\w-]+))?[^{}\n]*\})?"
-)
+CAPTION = regex(r"(?:Table)?:[ ]+(?P<caption>.*?)[ ]*(?:\{(?:#tbl-(?P<label>[\w-]+))?[^{}\n]*\})?")
 """The caption of a table of Pandoc, with attributes."""
-TABLE_CAPTION = re.compile(rf"^(?P<table>(?:\|.*\n)+)\n?{CAPTION.pattern}$", re.MULTILINE)
+TABLE_CAPTION = regex(rf"^(?P<table>(?:\|.*\n)+)\n?{CAPTION.pattern}$", re.MULTILINE)
 """A table of Quarto above its caption."""
 
 
@@ -108,7 +107,7 @@ def write_target(match: re.Match[str]) -> str:
     return f"{match['heading'].rstrip()} {{#{anchor}}}"
 
 
-MARKDOWN_FIGURE = re.compile(
+MARKDOWN_FIGURE = regex(
     r"^(?P<lead>[ \t]*)<figure[^<>]*>\s*(?P<picture>!\[[^\]\n]*\]\([^()\n]*\))(?:\{[^{}\n]*\})?\s*"
     r"(?:<figcaption\b[^<>]*>\s*(?P<caption>[^<>]*?)\s*</figcaption>\s*)?</figure>[ \t]*$",
     re.MULTILINE,

@@ -9,7 +9,7 @@ import textwrap
 
 from msgspec.structs import replace
 
-from coursebuild.api import marks
+from coursebuild.api import marks, regex
 from coursebuild.core.registry import fence_names, missing_package
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.features.importer.absent_labs import write_absent_lab
@@ -32,14 +32,12 @@ from coursebuild.features.lab.model import BUILT_IN_KINDS
 
 _MAX_DEPTH = 20
 """Blocks that may be around another."""
-_DIRECTIVE = re.compile(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
-_TITLE = re.compile(r"\b(?:title|tab|filename|lst-cap|name)=(?:\"([^\"]*)\"|'([^']*)')")
+_DIRECTIVE = regex(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
+_TITLE = regex(r"\b(?:title|tab|filename|lst-cap|name)=(?:\"([^\"]*)\"|'([^']*)')")
 _TAB = "tab", "a title in bold, and what it holds: pages show one tab below the other"
-_CAMERA = re.compile(r'"camera"\s*:\s*\{(?:[^{}])*\}')
-_ANGLE = re.compile(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
-_QUOTED_KIND = re.compile(
-    r"^((?:[ \t]*>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\])", re.MULTILINE
-)
+_CAMERA = regex(r'"camera"\s*:\s*\{(?:[^{}])*\}')
+_ANGLE = regex(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
+_QUOTED_KIND = regex(r"^((?:[ \t]*>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\])", re.MULTILINE)
 
 
 def convert_segment(segment: Segment, context: LessonContext) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 
+from coursebuild.api import regex
 from coursebuild.features.importer.context import PROOF_LABELS
 from coursebuild.features.importer.outlines import group, leave_entry
 from coursebuild.features.importer.source_files import (
@@ -19,25 +20,25 @@ from coursebuild.features.importer.source_files import (
     value_at,
 )
 
-PART = re.compile(
+PART = regex(
     r"^#[ \t]+\((?:PART|APPENDIX)(?:\\?\*)?\)[ \t]*(.*?)[ \t]*(?:\{[^{}]*\})?[ \t]*$", re.M
 )
 _LABELS = {kind: label for label, kind in PROOF_LABELS.items()}
-_REFERENCE = re.compile(
+_REFERENCE = regex(
     r"(?:\b(?:Figures?|Figs?\.|Tables?|Equations?|Eqs?\.|Theorem|Lemma|Definition|Corollary|Example"
     r"|Exercise)[ ~]|(?P<paren>\())?"
     r"\\@ref\((?:(?P<kind>[a-z]+):)?(?P<label>[\w-]+)\)(?(paren)\))"
 )
-_TEXT = re.compile(r"^\(ref:(?P<name>[\w-]+)\)[ ](?P<text>[^\n]*(?:\n(?!\n|$)[^\n]+)*)\n?", re.M)
-_FENCE = re.compile(
+_TEXT = regex(r"^\(ref:(?P<name>[\w-]+)\)[ ](?P<text>[^\n]*(?:\n(?!\n|$)[^\n]+)*)\n?", re.M)
+_FENCE = regex(
     r"^(?P<mark>`{3,})\{(?P<kind>block2?|[a-z]+)(?P<options>[^{}\n]*)\}[ \t]*\n"
     r"(?P<body>.*?)^(?P=mark)[ \t]*$",
     re.MULTILINE | re.DOTALL,
 )
-_DIVISION = re.compile(
+_DIVISION = regex(
     r"^(:{3,}[ \t]*)\{\.(?P<kind>[a-z]+)[ ]+#(?P<label>[\w-]+)(?P<rest>[^{}\n]*)\}", re.M
 )
-_LABEL = re.compile(r"\A[ ,]*(?:label\s*=\s*)?[\"']?([A-Za-z][\w-]*)[\"']?\s*(?:,|\Z)")
+_LABEL = regex(r"\A[ ,]*(?:label\s*=\s*)?[\"']?([A-Za-z][\w-]*)[\"']?\s*(?:,|\Z)")
 
 
 def read_bookdown(text: str) -> str:

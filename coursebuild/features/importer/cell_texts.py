@@ -5,17 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from coursebuild.api import regex
 from coursebuild.features.importer.source_files import read_yaml
 
-_OPTION = re.compile(
+_OPTION = regex(
     r"\s*(?:(?:#|//|%%)(?:[ ](?=\|[ ]+[\w-]+:[ ]))?\|(.*)|:([\w-]+):[ \t]*(.*))(?:\n|\Z)"
 )
 """A line of options of a cell: YAML of Quarto, or one option of MyST."""
-_YAML_HEAD = re.compile(r"---[ \t]*\n(.*?)\n---[ \t]*(?:\n|\Z)", re.DOTALL)
-MAGIC = re.compile(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
-_COMMAND = re.compile(r"!|%(?=pip|conda|time)")
+_YAML_HEAD = regex(r"---[ \t]*\n(.*?)\n---[ \t]*(?:\n|\Z)", re.DOTALL)
+MAGIC = regex(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
+_COMMAND = regex(r"!|%(?=pip|conda|time)")
 """What begins a line that says something to readers, too."""
-COMMENT = re.compile(r"^# (?:!|%(?=pip|conda)|(?=%))", re.MULTILINE)
+COMMENT = regex(r"^# (?:!|%(?=pip|conda)|(?=%))", re.MULTILINE)
 """What stands before such a line where it is a comment, and no part of it for a shell."""
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from msgspec.structs import replace
 
-from coursebuild.api import marks
+from coursebuild.api import marks, regex
 from coursebuild.core.scripts.figures import prepare_figure
 from coursebuild.features.importer.anchors import figure_of
 from coursebuild.features.importer.cell_texts import (
@@ -24,16 +24,16 @@ from coursebuild.features.importer.context import LessonContext, to_anchor
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.source_files import Segment, find_group
 
-_TIMING = re.compile(r"%%(?:time|timeit|capture|prun)\b.*")
-_TIMES = re.compile(r"^(?:CPU times|Wall time|.* per loop \(mean)\b.*\n?", re.MULTILINE)
+_TIMING = regex(r"%%(?:time|timeit|capture|prun)\b.*")
+_TIMES = regex(r"^(?:CPU times|Wall time|.* per loop \(mean)\b.*\n?", re.MULTILINE)
 """What it prints."""
-_WINDOW = re.compile(
+_WINDOW = regex(
     r"^([ \t]*)(?:display\()?(?:plt|(?:\w+\.)?pyplot)\.show\([^()\n]*\)+[ \t;]*$", re.MULTILINE
 )
 """What opens a window where there is none."""
-_DISPLAY = re.compile(r"^([ \t]*)display\(", re.MULTILINE)
+_DISPLAY = regex(r"^([ \t]*)display\(", re.MULTILINE)
 """What Jupyter shows without an import."""
-_ESCAPE = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
+_ESCAPE = regex(r"\x1b\[[0-9;?]*[A-Za-z]|[\x00-\x08\x0b-\x1f\x7f]")
 """What colours text or moves the cursor in a terminal."""
 
 
@@ -147,9 +147,7 @@ def imported_names(node: ast.AST) -> Mapping[str, str]:
     return {start + alias.name: alias.asname or alias.name for alias in names}
 
 
-_SAVED = re.compile(
-    r"(?P<call>\.(?:savefig|imsave)\(\s*)([\"'])(?P<path>[^\"'\n{}]+\.(?:svg|png))\2"
-)
+_SAVED = regex(r"(?P<call>\.(?:savefig|imsave)\(\s*)([\"'])(?P<path>[^\"'\n{}]+\.(?:svg|png))\2")
 """A call that saves a figure under a name."""
 
 
@@ -200,7 +198,7 @@ def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = T
     return figure_of(name, caption, label if label.startswith("fig-") else "", alt)
 
 
-_DRAWN_TITLE = re.compile(
+_DRAWN_TITLE = regex(
     r"\.(?:set_)?(?:sup)?title\(\s*(r|f(?!.*\{))?([\"'])((?:\\.|(?!\2)[^\\])+)\2\s*[,)]"
 )
 """A title that is not computed."""

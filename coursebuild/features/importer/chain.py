@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from textwrap import shorten
 
-from coursebuild.api import Edit, Options, Recording, ScriptRun, Span, marks, model
+from coursebuild.api import Edit, Options, Recording, ScriptRun, Span, marks, model, regex
 from coursebuild.core.run.part_marks import FAILURE
 from coursebuild.core.run.script_environment import distributions
 from coursebuild.features.importer.cells import imported_names
@@ -16,7 +16,7 @@ from coursebuild.features.importer.commands.findings import Rank
 from coursebuild.features.importer.context import script_path_of
 from coursebuild.report.values import plural
 
-_MISSING_MODULE = re.compile(r"^ModuleNotFoundError: No module named '([\w.]+)'", re.MULTILINE)
+_MISSING_MODULE = regex(r"^ModuleNotFoundError: No module named '([\w.]+)'", re.MULTILINE)
 
 
 def missing_modules(text: str) -> list[str]:

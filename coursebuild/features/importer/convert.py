@@ -13,7 +13,7 @@ from pathlib import Path
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import EffectError, Store, UsageError, model
+from coursebuild.api import EffectError, Store, UsageError, model, regex
 from coursebuild.core.files.errors import reason
 from coursebuild.core.files.read import read_bytes
 from coursebuild.core.files.write import FileChange, change_files
@@ -110,9 +110,9 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     return ConvertedCourse(dict(sorted(out.items())), files.account, context.notebook_outputs)
 
 
-_READABLE = re.compile(r"^(?![ ]{0,3}#{1,6}[ \t])[^\n]*\S", re.MULTILINE)
+_READABLE = regex(r"^(?![ ]{0,3}#{1,6}[ \t])[^\n]*\S", re.MULTILINE)
 """A line that is no heading."""
-_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_COMMENT = regex(r"<!--.*?-->", re.DOTALL)
 
 
 def _plan_empty_lessons(
@@ -136,13 +136,13 @@ def _plan_empty_lessons(
     return replace(course, levels=tuple(levels))
 
 
-_FRAGMENT = re.compile(
+_FRAGMENT = regex(
     r"<mujocoinclude\b|\A(?!.*<(?:worldbody|include)\b)"
     r".*<(?:actuator|contact|equality|keyframe|sensor|tendon)\b",
     re.DOTALL,
 )
 """What is about bodies, and has none."""
-_PART = re.compile(r"<(?:include|mesh|hfield|texture|skin)\s[^<>]*?\bfile\s*=\s*[\"']([^\"'<>]+)")
+_PART = regex(r"<(?:include|mesh|hfield|texture|skin)\s[^<>]*?\bfile\s*=\s*[\"']([^\"'<>]+)")
 
 
 def _find_models(files: SourceFiles) -> Mapping[str, str]:
@@ -207,7 +207,7 @@ def _place_models(parts: Mapping[str, Sequence[str]], models: dict[str, str]) ->
     models |= {n: f"models/{posixpath.relpath(f'/{n}', root)}" for n in rest - models.keys()}
 
 
-_WORK = re.compile(
+_WORK = regex(
     r"(?:^|(?<=\}))[ \t]*@(?!comment|preamble)(\w+)[ \t]*\{[ \t]*([^,\s{}=]+)", re.M | re.I
 )
 
@@ -224,7 +224,7 @@ def _works(files: SourceFiles) -> Iterator[tuple[str, str]]:
                 yield key, text[work.start() : end].strip()
 
 
-_AUTHOR = re.compile(r"\bauthor\s*=\s*(?:\{((?:[^{}]|\{[^{}]*\})*)\}|\"([^\"]*)\")", re.IGNORECASE)
+_AUTHOR = regex(r"\bauthor\s*=\s*(?:\{((?:[^{}]|\{[^{}]*\})*)\}|\"([^\"]*)\")", re.IGNORECASE)
 
 
 def _authors(work: str) -> str:

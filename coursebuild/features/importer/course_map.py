@@ -16,7 +16,7 @@ from typing import Any
 from markdown_it import MarkdownIt
 from msgspec.structs import replace
 
-from coursebuild.api import UsageError, model
+from coursebuild.api import UsageError, model, regex
 from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
@@ -308,10 +308,10 @@ _COLOURING = (
     r"^[ \t]*(?:#|//|--|%|/\*|<!--|\{{/\*)[ \t]*{}-(?:next-line|start|end)\b[^\w\n]*(?:\n|\Z)"
 )
 """A comment by which Docusaurus colours lines, with a word that tells how."""
-_TAG_BESIDE_BLOCK = re.compile(
+_TAG_BESIDE_BLOCK = regex(
     r"^[ \t]*</?[a-z][^<>\n]*>[ \t]*\n(?=[ \t]*`{3})|^[ \t]*`{3,}[ \t]*\n(?=[ \t]*</)", re.MULTILINE
 )
-_ROLE = re.compile(r"\{[a-z][\w:-]*\}`([^`]*?)(?:\s*<[^`<>]*>)?`")
+_ROLE = regex(r"\{[a-z][\w:-]*\}`([^`]*?)(?:\s*<[^`<>]*>)?`")
 """A role of MyST, of which the map, where titles are plain, keeps the words."""
 
 

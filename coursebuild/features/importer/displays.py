@@ -9,20 +9,21 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from coursebuild.api import regex
 from coursebuild.features.importer.context import label_anchor
 from coursebuild.features.importer.source_files import find_group, value_at
 
 WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
 """Words in a formula that hold a formula themselves."""
 _CODE = r"(?P<ticks>`+)(?!`)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
-_DISPLAY = re.compile(
+_DISPLAY = regex(
     rf"{_CODE}|\$\$(?P<tex>(?:{WORDS}|[^$\\]|\\.)+?)\$\$"
     r"(?:[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\}))?"
     r"(?:[ \t]*<br[ ]*/?>)*(?P<behind>[ \t]*(?=[^\s.,;:]|[.,;:][ \t]*\S))?",
     re.DOTALL,
 )
 """A formula between two dollar signs each, or code, in which there is none."""
-_ENVIRONMENT = re.compile(
+_ENVIRONMENT = regex(
     rf"{_CODE}|\$\$(?>(?:{WORDS}|[^$])+)\$\$|(?:^[ \t]*|(?P<words>[\w,.:;)][ ]))"
     r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
     r"(?>(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*)"
@@ -30,37 +31,35 @@ _ENVIRONMENT = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 """A formula between dollar signs, or one that its environment alone makes one; or code."""
-_BRACKETS = re.compile(
+_BRACKETS = regex(
     r"^(?P<lead>[ \t]*)(?:\\{1,2}\[(?P<tex>(?>(?:(?!\\{1,2}[\[\]]).)+))\\{1,2}\]"
     r"|\$(?P<lines>[ \t]*\n(?:(?!\n[ \t]*\n)[^$])+)\$)[ \t]*$",
     re.DOTALL | re.MULTILINE,
 )
 """A formula between brackets, or below a line that holds nothing but a dollar sign."""
-_ESCAPED = re.compile(
+_ESCAPED = regex(
     rf"{_CODE}|(?P<mark>\\\\[(\[])(?P<tex>(?>(?:(?!\\\\[()\[\]]|\n[ \t]*\n).)+))(?=\\\\[)\]])",
     re.DOTALL,
 )
 """A formula whose brackets have two backslashes, one of which is Markdown's; or code."""
-_LABEL = re.compile(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
+_LABEL = regex(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
 """A label of LaTeX, or of mdBook's preprocessor `numeq`."""
-_EMPTY = re.compile(r"[ \t]*\n?[ \t]*")
-_MARGIN = re.compile(r"[ \t]*>[ \t>]*|[ \t]+\Z")
+_EMPTY = regex(r"[ \t]*\n?[ \t]*")
+_MARGIN = regex(r"[ \t]*>[ \t>]*|[ \t]+\Z")
 """The mark of a quotation, or what a line of a list begins with."""
-_LEAD = re.compile(r"\n[ \t>]*\Z")
+_LEAD = regex(r"\n[ \t>]*\Z")
 """What stands before the mark that ends a formula, on a line of its own."""
-_WORDS_BEFORE = re.compile(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
-DEFINITION = re.compile(
+_WORDS_BEFORE = regex(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
+DEFINITION = regex(
     r"\\(?:(?:(?:re)?newcommand|DeclareMathOperator)\*?[ ]*\{?\\?([A-Za-z]+)\}?(?:\[\d\]){0,2}"
     r"|def[ ]*\\([A-Za-z]+)(?:#\d)*)[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
 )
 """A macro of LaTeX; MathJax takes its name without a backslash, too."""
-_DOXYGEN = re.compile(
-    rf"{_CODE}|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<tex>[^$]+?)\\f\])", re.DOTALL
-)
+_DOXYGEN = regex(rf"{_CODE}|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<tex>[^$]+?)\\f\])", re.DOTALL)
 """A formula of Doxygen; or code, in which there is none."""
 _MACROS = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
 """Where MyST and Sphinx have macros by their names."""
-_WHOLE_ENVIRONMENT = re.compile(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
+_WHOLE_ENVIRONMENT = regex(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 
 
 def read_escapes(text: str) -> str:

@@ -15,13 +15,14 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
 
+from coursebuild.api import regex
 from coursebuild.features.importer.source_files import TEXTS, TOO_MUCH, SourceFiles, find_group
 
 _MAX_DEPTH = 10
 """Files that may include each other in a row."""
 _MOST_LINES = 100_000
 """After so many lines of a file no more of it are chosen: some could be chosen again and again."""
-_MARK = re.compile(
+_MARK = regex(
     r"\{%-?[ ]*raw[ ]*-?%\}\n?(?P<raw>.*?)\{%-?[ ]*endraw[ ]*-?%\}"
     r"|(?P<escape>\\)?\{\{[ ]*#(?P<command>include|rustdoc_include|playground|title)[ ]+"
     r"(?P<mdbook>[^{}\s][^{}]*?)[ ]*\}\}"
@@ -32,14 +33,14 @@ _MARK = re.compile(
     r"|^(?P<indent>[ \t]*)-{1,}8<-{1,}[ \t]+[\"'](?P<mkdocs>[^\"'\n]+)[\"'][ \t]*$",
     re.MULTILINE | re.DOTALL,
 )
-_FENCE = re.compile(r"^[ \t>]*(?:`{3,}|~{3,})", re.MULTILINE)
+_FENCE = regex(r"^[ \t>]*(?:`{3,}|~{3,})", re.MULTILINE)
 _ANCHOR = r"^.*?ANCHOR(?P<end>_END)?:[ \t]*(?P<name>[\w-]+).*\n?"
 _SECTION = (
     r"^.*?-{1,}8<-{1,}[ \t]*\[[ \t]*(?P<end>end|start)[ \t]*:[ \t]*(?P<name>[\w-]+)[ \t]*\].*\n?"
 )
 
 
-_IMPORT = re.compile(
+_IMPORT = regex(
     r"^import[ ]+(?P<name>\w+)[ ]+from[ ]+"
     r"['\"](?P<file>!!raw-loader![^'\"\n]+|[^'\"\n]+\.(?:mdx?|png|svg|jpe?g|gif|webp))"
     r"['\"];?[ \t]*(?:\n|\Z)",
@@ -200,7 +201,7 @@ def without_hidden_lines(text: str, marks: Mapping[str, str]) -> str:
     return _CODE.sub(show, text) if marks else text
 
 
-_CODE = re.compile(
+_CODE = regex(
     r"^(?P<head>(?P<mark>[ \t]*`{3,})(?P<language>\w+)\b"
     r"(?:[^\n]*\bhidelines=(?P<own>[^\s,]+))?[^\n]*\n)(?P<body>.*?)(?P<end>^(?P=mark)[ \t]*$)",
     re.MULTILINE | re.DOTALL,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 
+from coursebuild.api import regex
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.source_files import find_group
 
@@ -18,9 +19,9 @@ _STATEMENT = (
     r"|export[ ](?:const|let|function|default)\b)"
     r"[^\n]*(?:\n(?!</)[^\n]+)*\n?"  # not the end of a script element
 )
-MDX = re.compile(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
+MDX = regex(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
 """What only MDX can hold."""
-_PART = re.compile(
+_PART = regex(
     r"(?P<code>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`))"
     rf"|(?P<statement>{_STATEMENT})"
     r"|\{/\*(?P<comment>.*?)\*/\}"
@@ -29,24 +30,24 @@ _PART = re.compile(
     rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)>",
     re.MULTILINE | re.DOTALL,
 )
-_INDENT = re.compile(
+_INDENT = regex(
     r"(?P<kept>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`)|</?[A-Z][^<>]*>)"
     r"|(?<=\n\n)[ ]{4,}(?![ ]*[-*+`\d])",
     re.DOTALL,
 )
 """The indentation of what a component holds; code and tags are passed over."""
-_COMPUTED = re.compile(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
+_COMPUTED = regex(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
 _LABELS = [
-    re.compile(rf"\s(?:{names})=(?:\"([^\"]*)\"|'([^']*)')")
+    regex(rf"\s(?:{names})=(?:\"([^\"]*)\"|'([^']*)')")
     for names in ("label|title|caption|heading", "value|alt", "href|to|link")
 ]
-_SENTENCE = re.compile(
+_SENTENCE = regex(
     r"\s(?!class|style)\w+=([\"'])"
     r"((?:(?!\1).)*[A-Za-z]{2}[^\"'\w]*[ ](?:(?!\1).)*[A-Za-z]{2}.*?)\1",
     re.DOTALL,
 )
 """An attribute of more than a word, which readers see."""
-_ADDRESS = re.compile(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
+_ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
 """The address of a picture where it is computed."""
 
 

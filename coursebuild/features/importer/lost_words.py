@@ -10,12 +10,12 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 
-from coursebuild.api import UsageError
+from coursebuild.api import UsageError, regex
 from coursebuild.features.importer.segments import join_lines
 from coursebuild.features.importer.source_files import TEXTS, SourceFiles
 
-_WORD = re.compile(r"[^\W\d_](?:[^\W_]|\d)+")
-_MARKUP = re.compile(
+_WORD = regex(r"[^\W\d_](?:[^\W_]|\d)+")
+_MARKUP = regex(
     r"<(script|style)\b.*?</\1\s*>|<[^<>]*>|\x1b\[[0-9;]*m|data:[\w/+-]+;base64,[\w/+=]+", re.DOTALL
 )
 """What of recorded HTML, or of what a terminal shows, is no word."""

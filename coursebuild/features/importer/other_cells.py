@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 
 from msgspec.structs import replace
 
-from coursebuild.api import marks
+from coursebuild.api import marks, regex
 from coursebuild.features.importer.cell_texts import code_for_readers, read_options
 from coursebuild.features.importer.cells import (
     caption_of_code,
@@ -33,19 +33,17 @@ _EXTENSIONS = {
 _SHELLS = ("bash", "sh", "zsh")
 _PRINTING = ("r", *_SHELLS)
 """Languages of which a script prints the values that a cell shows."""
-_HEAD = re.compile(
+_HEAD = regex(
     r"\{code-cell\}[ \t]+(?P<myst>\w+).*|\{(?P<name>\w+)(?:[\s,]+(?P<options>[^{}]*))?\}", re.DOTALL
 )
-_OWN_LABEL = re.compile(r"\A\{r[ \t]+([\w.-]+)[ \t]*(?:,.*)?\}\Z", re.DOTALL)
+_OWN_LABEL = regex(r"\A\{r[ \t]+([\w.-]+)[ \t]*(?:,.*)?\}\Z", re.DOTALL)
 """The label of a cell as knitr has it, the word behind the language."""
-_MAGIC = re.compile(r"\A\s*%%(\w+)[^\n]*\n")
-_NESTED = re.compile(r"^[ \t>]*(?:`{3,}|~{3,})\{(?:code-cell\}[ ]+)?(\w+)", re.MULTILINE)
+_MAGIC = regex(r"\A\s*%%(\w+)[^\n]*\n")
+_NESTED = regex(r"^[ \t>]*(?:`{3,}|~{3,})\{(?:code-cell\}[ ]+)?(\w+)", re.MULTILINE)
 """The language of a cell in the text of a block."""
-_SETTINGS = re.compile(r"(?:library\(knitr\)\s*)?(?:knitr::)?opts_chunk\$set\([^()]*\)\s*")
-_PICTURE = re.compile(
-    r"\s*(?:knitr::)?include_graphics\(\s*([\"'])(?P<path>[^\"'\n]+)\1[^()]*\)\s*"
-)
-_KNITR = re.compile(r"([\w.]+)\s*=\s*(\"(?:[^\"\\]|\\.)*\"|'(?:[^'\\]|\\.)*'|[^,\s]+)")
+_SETTINGS = regex(r"(?:library\(knitr\)\s*)?(?:knitr::)?opts_chunk\$set\([^()]*\)\s*")
+_PICTURE = regex(r"\s*(?:knitr::)?include_graphics\(\s*([\"'])(?P<path>[^\"'\n]+)\1[^()]*\)\s*")
+_KNITR = regex(r"([\w.]+)\s*=\s*(\"(?:[^\"\\]|\\.)*\"|'(?:[^'\\]|\\.)*'|[^,\s]+)")
 """An option of a cell as knitr has it, in the head."""
 
 

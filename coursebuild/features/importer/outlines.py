@@ -16,6 +16,7 @@ from urllib.parse import unquote
 from msgspec import Struct
 from msgspec.structs import replace
 
+from coursebuild.api import regex
 from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.segments import read_front_matter
 from coursebuild.features.importer.source_files import (
@@ -127,11 +128,11 @@ def group(title: str, lessons: Sequence[ImportedText]) -> Iterator[ImportedText 
 
 # --- mdBook, GitBook
 
-_ENTRY = re.compile(
+_ENTRY = regex(
     r"(?P<indent>[ \t]*)(?P<item>[-*+][ \t]+)?\[(?P<title>(?:[^\[\]\\]|\\.|\[[^\[\]]*\])*)\]"
     r"\((?:<(?P<spaced>[^<>\n]*)>|(?P<file>[^()<>\s]*))(?:[ \t]+\"[^\"]*\")?\)[ \t]*"
 )
-_PART = re.compile(r"#{1,3}[ \t]+(.*?)[ \t]*#*[ \t]*")
+_PART = regex(r"#{1,3}[ \t]+(.*?)[ \t]*#*[ \t]*")
 
 
 _Entry = tuple[int, ImportedText]
@@ -182,11 +183,11 @@ def _group_by_depth(entries: Iterable[_Entry]) -> Iterator[ImportedText | Import
 
 # --- Sphinx
 
-_TOCTREE = re.compile(
+_TOCTREE = regex(
     r"^(?P<mark>`{3,}|:{3,})\{toctree\}[ \t]*\n(?P<body>.*?)^(?P=mark)[ \t]*$",
     re.MULTILINE | re.DOTALL,
 )
-_CAPTION = re.compile(r"^:?caption:[ \t]*[\"']?(.*?)[\"']?[ \t]*$", re.MULTILINE)
+_CAPTION = regex(r"^:?caption:[ \t]*[\"']?(.*?)[\"']?[ \t]*$", re.MULTILINE)
 
 
 def _read_toctrees(

@@ -16,20 +16,20 @@ from unicodedata import east_asian_width
 
 from msgspec import Struct
 
-from coursebuild.api import marks
+from coursebuild.api import marks, regex
 from coursebuild.features.importer.anchors import CAPTION, write_caption
 
-_QUOTE = re.compile(r"(?:[ ]{0,3}>[ ]?)*")
-_INDENT = re.compile(rf"{_QUOTE.pattern}[ ]{{0,3}}")
-_GRID_RULE = re.compile(r"\+(?:[-=:]+\+)+")
-_RULE = re.compile(r"[ ]{0,3}-{2,}(?:[ ]+-{2,})+[ ]*")
+_QUOTE = regex(r"(?:[ ]{0,3}>[ ]?)*")
+_INDENT = regex(rf"{_QUOTE.pattern}[ ]{{0,3}}")
+_GRID_RULE = regex(r"\+(?:[-=:]+\+)+")
+_RULE = regex(r"[ ]{0,3}-{2,}(?:[ ]+-{2,})+[ ]*")
 """What stands above the cells of a table without bars, a run of hyphens for each column."""
-_LINE = re.compile(r"[ ]{0,3}-{5,}[ ]*")
-_FENCE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
-_DELIMITERS = re.compile(r"\|?[ \t]*:?-+:?[ \t]*(?:\|[ \t]*:?-+:?[ \t]*)*\|?[ \t]*")
+_LINE = regex(r"[ ]{0,3}-{5,}[ ]*")
+_FENCE = regex(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,})")
+_DELIMITERS = regex(r"\|?[ \t]*:?-+:?[ \t]*(?:\|[ \t]*:?-+:?[ \t]*)*\|?[ \t]*")
 _WIDE = "\0"
 """What stands behind a character that takes two columns."""
-_ITEM = re.compile(r"[-+*][ ]+|(?=\d+[.)][ ])")
+_ITEM = regex(r"[-+*][ ]+|(?=\d+[.)][ ])")
 
 _MOST_LINES = 2_000
 """Lines that a table may take: else a long text of what begins as one could be read without end."""
@@ -265,7 +265,7 @@ _READERS = ((_INDENT, _read_grid), (_QUOTE, _read_ruled))
 """What reads tables, and what stands before each of their lines."""
 
 
-_BAR = re.compile(r"(?<!\\)\|")
+_BAR = regex(r"(?<!\\)\|")
 
 
 def cut_rows(lines: Sequence[str], leave: Callable[[int, str], None]) -> Iterator[str]:
@@ -293,7 +293,7 @@ def cut_rows(lines: Sequence[str], leave: Callable[[int, str], None]) -> Iterato
         yield line
 
 
-MEANING = re.compile(
+MEANING = regex(
     r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
     r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
     re.MULTILINE,
@@ -309,7 +309,7 @@ def write_meanings(match: re.Match[str]) -> str:
     return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
 
 
-_EXAMPLE = re.compile(r"^([ ]{0,3})\(@([\w-]*)\)(?=[ \t]+\S)", re.MULTILINE)
+_EXAMPLE = regex(r"^([ ]{0,3})\(@([\w-]*)\)(?=[ \t]+\S)", re.MULTILINE)
 
 
 def number_examples(text: str) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 
+from coursebuild.api import regex
 from coursebuild.features.importer.account import Rules
 from coursebuild.features.importer.anchors import (
     FIGURE,
@@ -53,10 +54,10 @@ _ATTRIBUTES = rf"(?:{_ATTRIBUTES})"
 _KEY = r"\w(?:[\w.:/+-]*\w)?"
 """The key of a source."""
 _PLACE = r"(?:<[^<>\n]+>|(?:[^()\s<]|\([^()\s]*\))(?:[^()\s]|\([^()\s]*\))*)"
-_ALT = re.compile(r"\balt=(['\"])(.*?)\1")
+_ALT = regex(r"\balt=(['\"])(.*?)\1")
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
 # A formula holds no beginning of another, so that each character is looked at a few times only.
-_LINE = re.compile(
+_LINE = regex(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)(?:\{=\w+\})?)"
     rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?P<hover>{_LINK_TITLE})?[ \t]*\)"
@@ -99,51 +100,49 @@ _LINE = re.compile(
 )
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
-_FIELDS = re.compile(
+_FIELDS = regex(
     r"(?<![^\n]\n)(?:^:[A-Za-z][\w -]*:(?:[ \t]+\S[^\n]*)?(?:\n[ \t]+\S[^\n]*)*\n?)+^(?!.)",
     re.MULTILINE,
 )
 """A paragraph of lines such as `:name: words`, a list of fields in Sphinx."""
-_ABBREVIATION = re.compile(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
-_EDGE = re.compile(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
+_ABBREVIATION = regex(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
+_EDGE = regex(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
-_PICTURE_LINE = re.compile(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)
+_PICTURE_LINE = regex(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)
 """A picture of HTML above words, which would be HTML as well."""
-_EMPTY_HEADING = re.compile(r"[ ]{0,3}#{1,6}[ \t]*$")
+_EMPTY_HEADING = regex(r"[ ]{0,3}#{1,6}[ \t]*$")
 _ENDS = {"<!--": "-->", "$$": "$$"}
-_COMMENT = re.compile(
+_COMMENT = regex(
     r"%%(?P<inner>[^%\n]+)%%|^%%[ \t]*\n(?P<lines>(?:(?!%%)[^\n]*\n)+)%%[ \t]*$"
     r"|^(?:%(?!%)(?P<line>[^\n]*)|\+\+\+(?:[ \t]+(?P<data>[{\[][^\n]*))?[ \t]*)$",
     re.MULTILINE,
 )
 """A comment of MyST or Obsidian, or the break of MyST between two cells."""
-_QUOTED_TITLE = re.compile(r"^[ ]{0,3}>[ \t>]*#(?=[ \t])", re.MULTILINE)
-_COMMENT_AS_HEADING = re.compile(
+_QUOTED_TITLE = regex(r"^[ ]{0,3}>[ \t>]*#(?=[ \t])", re.MULTILINE)
+_COMMENT_AS_HEADING = regex(
     r"^(#{1,6}[ \t]+)?<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$(?(1)|(?=\n+:[ \t]))", re.MULTILINE
 )
 """Or as a term whose meaning is below it."""
-_HELD_COMMENT = re.compile(r"[ ]\((<!--(?:(?!-->)[^\n])*-->)\)")
-_CONTENTS = re.compile(
+_HELD_COMMENT = regex(r"[ ]\((<!--(?:(?!-->)[^\n])*-->)\)")
+_CONTENTS = regex(
     r'<div class="toc">.*?</div>|^(?:\[TOC\]|\[\[_?TOC_?\]\])[ \t]*$', re.DOTALL | re.M
 )
 """What Jupyter's extension and Python's Markdown replace by a list; the page has its own."""
-_SETTINGS = re.compile(
+_SETTINGS = regex(
     r"(?:\A|(?<=\n\n))---[ \t]*\n(?:\w[\w-]*:(?: [^\n]*)?\n(?:[ \t]+[^\n]*\n)*)+---[ \t]*$",
     re.MULTILINE,
 )
 """Settings of Pandoc, which takes them anywhere."""
 _KEPT = {
-    re.compile(r"^[ >]*#{1,6}[ \t]+\S", re.MULTILINE): "heading",
-    re.compile(
-        r"^[ >]*\|?[ \t]*:?-+:?[ \t]*(?:\|[ \t]*:?-+:?[ \t]*)+\|?[ \t]*$", re.MULTILINE
-    ): "table",
-    re.compile(r"^\[\^[^\[\]\n]+\]:", re.MULTILINE): "footnote",
-    re.compile(r"^[ >]*(?:[-+*]|\d+[.)])[ \t]+\S", re.MULTILINE): "item of a list",
-    re.compile(r"<!--.*?-->", re.DOTALL): "comment",
-    re.compile(r"\$\$[^$]+\n[^$]*\$\$"): "formula",
+    regex(r"^[ >]*#{1,6}[ \t]+\S", re.MULTILINE): "heading",
+    regex(r"^[ >]*\|?[ \t]*:?-+:?[ \t]*(?:\|[ \t]*:?-+:?[ \t]*)+\|?[ \t]*$", re.MULTILINE): "table",
+    regex(r"^\[\^[^\[\]\n]+\]:", re.MULTILINE): "footnote",
+    regex(r"^[ >]*(?:[-+*]|\d+[.)])[ \t]+\S", re.MULTILINE): "item of a list",
+    regex(r"<!--.*?-->", re.DOTALL): "comment",
+    regex(r"\$\$[^$]+\n[^$]*\$\$"): "formula",
 }
 """What is Markdown here as well."""
-_OVER_LINES = re.compile(
+_OVER_LINES = regex(
     r"(?<!`)(`+)(?!`).+?(?<!`)\1(?!`)"  # what looks like one in code is none
     r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
@@ -154,7 +153,7 @@ _OVER_LINES = re.compile(
     r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
 )
 """A role, a note, a citation, the address of a link or a formula that goes on in the next line."""
-_TAG_OVER_LINES = re.compile(
+_TAG_OVER_LINES = regex(
     r"<(?i:a|img|source|video|iframe)[ \t\n](?=[^<>\n]*\n)[^<>]*>(?:\s*</iframe>)?"
 )
 _KINDS = {
@@ -439,12 +438,12 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return whole
 
 
-_STATEMENTS = re.compile(r"\s*(?:\{%[^%\n]*%\}\s*)+")
+_STATEMENTS = regex(r"\s*(?:\{%[^%\n]*%\}\s*)+")
 """A line of nothing but statements of Jinja or Liquid."""
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
-_CITED_KEY = re.compile(rf"(?<![\w@`])@({_KEY})")
-_TIGHT = re.compile(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
+_CITED_KEY = regex(rf"(?<![\w@`])@({_KEY})")
+_TIGHT = regex(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
 """A formula with blanks at its ends, which some tools allow."""
-_WORD = re.compile(r"(?s)\A(?!.*\\[A-Za-z]).*(?<![A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
+_WORD = regex(r"(?s)\A(?!.*\\[A-Za-z]).*(?<![A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
 """A word outside of braces and no command, as of a sentence between two prices."""

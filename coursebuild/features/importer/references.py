@@ -16,16 +16,16 @@ from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct
 
-from coursebuild.api import Edit, Source, Span, model
+from coursebuild.api import Edit, Source, Span, model, regex
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.features.importer.displays import DEFINITION
 from coursebuild.features.importer.prose import GONE
 from coursebuild.features.importer.source_files import find_group, title_of_file
 
-_GONE = re.compile(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
-_REFERENCE = re.compile(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
-_COMMAND = re.compile(r"\\([A-Za-z]+)")
+_GONE = regex(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
+_REFERENCE = regex(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
+_COMMAND = regex(r"\\([A-Za-z]+)")
 
 
 class _Text(Struct, frozen=True):
@@ -66,15 +66,15 @@ def complete_texts(
 
 _PASSES = 3
 """How often HTML is dropped: an end whose beginning was dropped is seen the next time."""
-_ANCHOR = re.compile(r'<a id="[^"<>]*">|[ ]id="[^"<>]*"|[ ]?\{#[^{}\n]*\}')
-_MEDIA = re.compile(
+_ANCHOR = regex(r'<a id="[^"<>]*">|[ ]id="[^"<>]*"|[ ]?\{#[^{}\n]*\}')
+_MEDIA = regex(
     r"<(?:(?:img|source)\b[^<>]*>(?:</img>)?"
     r"|(?P<name>video|audio)\b[^<>]*(?:/>|>(?:.*?</(?P=name)\s*>)?))",
     re.DOTALL | re.IGNORECASE,
 )
-_ELSEWHERE = re.compile("https?://|//")
+_ELSEWHERE = regex("https?://|//")
 _ELSEWHERE_NOTE = "a {} from another host, `{}`; it is a link now"
-_WITH_CONTENT = re.compile(r"<(script|style)\b.*?(?:</\1\s*>|\Z)", re.DOTALL | re.IGNORECASE)
+_WITH_CONTENT = regex(r"<(script|style)\b.*?(?:</\1\s*>|\Z)", re.DOTALL | re.IGNORECASE)
 
 
 def _read(

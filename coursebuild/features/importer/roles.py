@@ -11,6 +11,7 @@ import re
 import unicodedata
 from urllib.parse import urlsplit
 
+from coursebuild.api import regex
 from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.context import (
     PROOF_LABELS,
@@ -107,13 +108,13 @@ _CODE_ROLES = frozenset(
     "attribute data const exc exception obj object type".split()
 )
 _WORD_ROLES = frozenset("abbr chem dfn guilabel menuselection raw sc smallcaps span term".split())
-_ICON_ROLE = re.compile(r"octicon|fa[bsr]?|material-\w+")
-_INLINE_RUN = re.compile(r"`(?:\{(python|r|julia)\}|r)[ ]+([^`]+)`")
-_LANGUAGE = re.compile(r"^(`+)[ ]?(?:#!|:::)[\w-]+[ ]+")
+_ICON_ROLE = regex(r"octicon|fa[bsr]?|material-\w+")
+_INLINE_RUN = regex(r"`(?:\{(python|r|julia)\}|r)[ ]+([^`]+)`")
+_LANGUAGE = regex(r"^(`+)[ ]?(?:#!|:::)[\w-]+[ ]+")
 """The language of code in a line, as MkDocs marks it."""
 
 
-_SHORTCODE = re.compile(r"(\{?)\{\{<\s*(?:(?:var|meta)\s+([\w.-]+)|[^{}]*?)\s*>\}\}(\}?)")
+_SHORTCODE = regex(r"(\{?)\{\{<\s*(?:(?:var|meta)\s+([\w.-]+)|[^{}]*?)\s*>\}\}(\}?)")
 
 
 def fill_shortcodes(code: str, context: LessonContext) -> str:
@@ -168,8 +169,8 @@ _FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split
 """Names between braces that only place or mark what stands between them."""
 
 
-_CALL = re.compile(r"\{\{-?[ ]*[\w.]+\((?P<arguments>.*)\)[ ]*-?\}\}")
-_QUOTED = re.compile(r"\"([^\"]+)\"|'([^']+)'")
+_CALL = regex(r"\{\{-?[ ]*[\w.]+\((?P<arguments>.*)\)[ ]*-?\}\}")
+_QUOTED = regex(r"\"([^\"]+)\"|'([^']+)'")
 
 
 def convert_substitution(whole: str, context: LessonContext, is_statement: bool) -> str:
@@ -236,11 +237,11 @@ def convert_wiki_link(whole: str, page: str, part: str, words: str, context: Les
     return write_link(words or page or part.lstrip("#"), address)
 
 
-_ATTRIBUTE = re.compile(r"(?<=\s)(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
+_ATTRIBUTE = regex(r"(?<=\s)(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
 
 
-_WITH_FILE = re.compile(r"<(?:a|(?P<frame>iframe)|img|source|video)\b", re.IGNORECASE)
-_LOOK = re.compile(
+_WITH_FILE = regex(r"<(?:a|(?P<frame>iframe)|img|source|video)\b", re.IGNORECASE)
+_LOOK = regex(
     r"(?<=<table)(?:(?!\sid=)[^<>])*?\salign=[\"'\w]+"  # by which words would stand beside it
     r"|[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
 )

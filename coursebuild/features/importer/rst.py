@@ -5,17 +5,17 @@ from __future__ import annotations
 import re
 import textwrap
 
-from coursebuild.api import marks
+from coursebuild.api import marks, regex
 from coursebuild.features.importer.source_files import find_group
 
-_DIRECTIVE = re.compile(
+_DIRECTIVE = regex(
     r"^\.\.[ ]+(?P<name>[\w:-]+)::[ ]*(?P<argument>.*)\n?(?P<body>(?:[ \t]*\n|[ ]+\S.*\n?)*)"
     r"|^\.\.[ ]+_(?P<label>[\w .-]+):[ \t]*$"
     r"|^\.\.(?:[ ].*)?\n(?:[ \t]*\n|[ ]+\S.*\n?)*",
     re.MULTILINE,
 )
 """A directive, a label, or a comment."""
-_INLINE = re.compile(
+_INLINE = regex(
     r"(?P<code>``.+?``)|:(?P<role>[A-Za-z][\w:+.-]*):`(?P<body>[^`]+)`"
     r"|`(?P<words>[^`<>]*\S)\s*<(?P<address>[^`<>]+)>`__?"
 )

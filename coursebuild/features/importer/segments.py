@@ -17,27 +17,27 @@ from mdit_py_plugins.footnote import footnote_plugin
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import UsageError
+from coursebuild.api import UsageError, regex
 from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.displays import read_macros
 from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
-_MARK = re.compile(r"(:{3,}|/{3,})[ \t]*(.*?)[ \t]*")
-_TITLED = re.compile(
+_MARK = regex(r"(:{3,}|/{3,})[ \t]*(.*?)[ \t]*")
+_TITLED = regex(
     r"(?:===[!+]?[ \t]+([\"'])(?P<tab>.*)\1"
     r"|(?P<mark>!!!|\?{3}\+?|:::(?=[ \t]+[A-Za-z_]\w*(?:\.\w+)+[ \t]*\Z))"
     r"[ \t]*(?P<head>[\w\"].*?))[ \t]*"
 )
 """A tab, an admonition, or what `mkdocstrings` makes of the code of an object."""
-_CELL = re.compile(r"\{code-cell\}(?:[ \t]+i?python3?\b.*)?|\{(?:python|ipython3?)[^}]*\}")
-_FRONT_MATTER = re.compile(
+_CELL = regex(r"\{code-cell\}(?:[ \t]+i?python3?\b.*)?|\{(?:python|ipython3?)[^}]*\}")
+_FRONT_MATTER = regex(
     r"(?:[ \t]*\n)*---[ \t]*\n(?P<yaml>.*?\n)?(?:---|\.\.\.)[ \t]*(?:\n|\Z)"
     r"|\+\+\+[ \t]*\n(?P<toml>.*?\n)?\+\+\+[ \t]*(?:\n|\Z)",
     re.DOTALL,
 )
-_PLAIN_FIELDS = re.compile(r"(?:[\w-]+:.*\n|[ \t]+.*\n|-[ ].*\n|\n)*")
+_PLAIN_FIELDS = regex(r"(?:[\w-]+:.*\n|[ \t]+.*\n|-[ ].*\n|\n)*")
 """Front matter that other tools read line by line: a value may hold a colon."""
-_TITLE = re.compile(
+_TITLE = regex(
     r"^[ ]?#[ \t]+(?P<text>.*?)(?:[ \t]+#+)?"
     r"(?:[ \t]*\{(?:[^{}]*#(?P<label>[\w-]+))?[^{}]*\})?[ \t]*$"
     r"|(?:\A(?:[ \t]*\n)*|(?<=\n\n)|(?<=\)=\n)|(?<===\n))(?:(?P<line>[^\s#>].*)\n=+|"
@@ -45,7 +45,7 @@ _TITLE = re.compile(
     re.MULTILINE,
 )
 """A heading of level 1, of both forms. A formula over lines may hold one `=` on a line."""
-_HEADING = re.compile(rf"{_TITLE.pattern}|^(?P<lower>\#{{2,5}})(?=[ \t])", re.MULTILINE)
+_HEADING = regex(rf"{_TITLE.pattern}|^(?P<lower>\#{{2,5}})(?=[ \t])", re.MULTILINE)
 
 
 _SUMMARIES = ("description", "abstract", "subtitle")
@@ -164,7 +164,7 @@ def change_prose(segments: Iterable[Segment], change: Callable[[str], str]) -> I
         yield replace(segment, text=change(segment.text)) if is_prose else segment
 
 
-_GATES = re.compile(
+_GATES = regex(
     r"^(?P<mark>`{3,}|~{3,}|:{3,})\{(?P<name>exercise|solution)-start\}"
     r"(?P<head>[^\n]*\n(?:[ \t]*:[^\n]*\n)*)"
     r"(?P=mark)[ \t]*\n(?P<body>.*?)^(?P=mark)\{(?P=name)-end\}[ \t]*\n(?P=mark)[ \t]*$",
@@ -173,18 +173,18 @@ _GATES = re.compile(
 """An exercise or a solution of MyST between a block that begins it and one that ends it."""
 
 
-_HINT = re.compile(
+_HINT = regex(
     r"^\{% hint style=\"(\w+)\" %\}[ \t]*\n(.*?)\n?^\{% endhint %\}[ \t]*$",
     re.MULTILINE | re.DOTALL,
 )
 """A callout of GitBook."""
-_ALERT = re.compile(
+_ALERT = regex(
     r"^<div\b[^<>]*\bclass=[\"'][^\"'<>]*\balert-(?!block\b)(?P<kind>\w+)[^<>]*>"
     r"(?P<text>(?:(?!<div\b).)*?)</div>[ \t]*$",
     re.MULTILINE | re.DOTALL | re.IGNORECASE,
 )
 """A callout of Jupyter, as its style sheet has it."""
-_HIGHLIGHT = re.compile(
+_HIGHLIGHT = regex(
     r"^\{[%{][<%-]?[ ]*(?:(highlight)[ ]+|(\w+)[ ]+lang=\"?)(\w+)[^\n]*\n(.*?)\n"
     r"\{[%{][<%-]?[ ]*(?:end|/)(?:\1|\2)\b[^\n]*$",
     re.MULTILINE | re.DOTALL,
@@ -342,8 +342,8 @@ def _line_at(state: StateBlock, number: int) -> str:
     return "" if is_code else state.src[start : state.eMarks[number]]
 
 
-_QUOTE = re.compile(r"^ {0,3}> ?")
-_LEAD = re.compile(r"[ \t]*(?:(?:[-+*]|\d+[.)])[ \t]+)*")
+_QUOTE = regex(r"^ {0,3}> ?")
+_LEAD = regex(r"[ \t]*(?:(?:[-+*]|\d+[.)])[ \t]+)*")
 """What stands before a block in a list; the mark of its item, where this begins with it."""
 _BLOCKS = ("fence", "marked", "titled")
 _PARSER = MarkdownIt("commonmark").use(footnote_plugin).disable("footnote_tail")  # in its order

@@ -21,7 +21,7 @@ from typing import Any, Literal
 import yaml
 from msgspec import Struct
 
-from coursebuild.api import UsageError
+from coursebuild.api import UsageError, regex
 from coursebuild.core.files.errors import reason
 from coursebuild.core.values import DAMAGE
 from coursebuild.features.importer.account import Account, Leftover
@@ -200,7 +200,7 @@ _MAX_INCLUDED = 2_000_000
 """Characters that a lesson may include: files that include each other could become endless."""
 PAIR = "the text of a notebook, which is taken"
 TOO_MUCH = "with it the lesson would include too much text"
-_BAD_NAME = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")
+_BAD_NAME = regex("[\x00-\x1f\x7f\ud800-\udfff]")
 _OPEN_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
 _OPEN_FILE = os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 
 from markupsafe import Markup
@@ -26,13 +25,14 @@ from coursebuild.api import (
     Span,
     TextParser,
     diagnose,
+    regex,
 )
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.near import nearest
 
 LABELS = ("INPUT", "PROCESS", "OUTPUT")
-_LABEL = re.compile(r"\s*(INPUT|PROCESS|OUTPUT):")
-_LIKE_LABEL = re.compile(r"\s*([A-Za-z]+)(?:\s*:|(?<=[A-Z]{3})[^\w\s]?(?!\S))")
+_LABEL = regex(r"\s*(INPUT|PROCESS|OUTPUT):")
+_LIKE_LABEL = regex(r"\s*([A-Za-z]+)(?:\s*:|(?<=[A-Z]{3})[^\w\s]?(?!\S))")
 
 
 class Io(FeatureBlock, frozen=True):

@@ -13,6 +13,8 @@ import tree_sitter_javascript
 from msgspec import Struct
 from tree_sitter import Language, Node, Parser
 
+from coursebuild.api import regex
+
 
 class UntranslatableError(Exception):
     """JavaScript that this tool cannot write as Python; the text quotes it."""
@@ -23,10 +25,10 @@ def refusal(node: Node, kind: str = "") -> UntranslatableError:
     return UntranslatableError(f"{kind}`{text_of(node).splitlines()[0]}`")
 
 
-_ESCAPE = re.compile(
+_ESCAPE = regex(
     r"\\(?:u\{([0-9a-fA-F]+)\}|u([0-9a-fA-F]{4})|x([0-9a-fA-F]{2})|([^ux1-9\r\n\u2028\u2029]))"
 )
-_NAME = re.compile(r"[A-Za-z_$][\w$]*", re.ASCII)
+_NAME = regex(r"[A-Za-z_$][\w$]*", re.ASCII)
 _ESCAPED_CHARACTERS = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f", "v": "\v", "0": "\0"}
 
 

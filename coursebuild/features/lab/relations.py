@@ -6,7 +6,6 @@ wrong elsewhere.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from msgspec import Struct
@@ -21,6 +20,7 @@ from coursebuild.api import (
     did_you_mean,
     find_blocks,
     model,
+    regex,
 )
 from coursebuild.core.run.mjcf import read_tags
 from coursebuild.core.syntax.decode import check_unique, require_one_of
@@ -219,7 +219,7 @@ def _check_setting(label: StringNode, value: Node, controls: Controls) -> Iterat
             pass
 
 
-_OWN_KIND = re.compile(r"content/labs/([^/]*)\.js")
+_OWN_KIND = regex(r"content/labs/([^/]*)\.js")
 
 
 def check_labs(course: Course, documents: Iterable[Document]) -> Iterator[Diagnostic]:

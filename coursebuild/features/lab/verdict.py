@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from typing import Any
 
 from msgspec import Struct
 from tree_sitter import Node
 
-from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean
+from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean, regex
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
 from coursebuild.features.lab.compile import LabCode, pieces
@@ -93,7 +92,7 @@ def code_diagnostic(lab: Lab, piece: LabCode, message: str) -> Diagnostic:
     return diagnose("lab-code", lab.place(piece.entry), message, help=_HELP[piece.form])
 
 
-_OF_MATH = re.compile(
+_OF_MATH = regex(
     r"ReferenceError: (abs|sqrt|exp|log|a?(?:sin|cos|tan)|atan2|floor|ceil|round|min|max|pow|pi)\b"
 )
 _HELP = {

@@ -14,7 +14,7 @@ from typing import Literal, TypeAlias
 
 from markupsafe import Markup
 
-from coursebuild.api import PageContext, marks, model
+from coursebuild.api import PageContext, marks, model, regex
 from coursebuild.core.pages.markup import escape, is_tight, raw_html
 from coursebuild.core.pages.page_writer import output_receipt, run_commands, script_receipt
 from coursebuild.core.registry import kind_of_block
@@ -28,10 +28,10 @@ _SPACED_BLOCKS = (
 
 _Room: TypeAlias = Literal["block", "line", "cell"]
 """What inlines may fill: lines of their own, a single line, or a cell of a table."""
-_LAST_MARKS = re.compile(r"(^|\s)(#+)$")
-_PIPE = re.compile(r"(?<!\\)\|")
-_COMMENT = re.compile(r"(?<!\\)%")
-_MINUS = re.compile(r"(?<!\w)-(?=\d)")
+_LAST_MARKS = regex(r"(^|\s)(#+)$")
+_PIPE = regex(r"(?<!\\)\|")
+_COMMENT = regex(r"(?<!\\)%")
+_MINUS = regex(r"(?<!\w)-(?=\d)")
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import Span, model
+from coursebuild.api import Span, model, regex
 from coursebuild.core.text.python_code import python_nodes
 
 Kind: TypeAlias = Literal[
@@ -39,18 +39,18 @@ Kind: TypeAlias = Literal[
 """`mjcf` is an element, perhaps with an attribute, in code that begins with `<mujoco`; `defined` a
 function in a link to a script."""
 
-_SHAPE = re.compile(
+_SHAPE = regex(
     r"[A-Za-z0-9]_[A-Za-z0-9]|\w\.[A-Za-z]|\w\(|\b[Mm]j[A-Z]|=[\"]|\A<[/A-Za-z]|>\Z|--\w|/|\[\w"
     r"|->\w|\Acoursebuild "
 )
 """What every claim has somewhere, so that most code is passed over quickly."""
-ENGINE_WORD = re.compile(r"(?:mj[A-Z]|mj[a-z]{0,2}_|mjt[A-Z]|Mj[A-Z])\w+")
+ENGINE_WORD = regex(r"(?:mj[A-Z]|mj[a-z]{0,2}_|mjt[A-Z]|Mj[A-Z])\w+")
 """A name that only MuJoCo has."""
-_ATTRIBUTES = re.compile(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
-_TAG = re.compile(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
-_TABLE = re.compile(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
-_FILE = re.compile(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]+")
-_CODE_WORD = re.compile(
+_ATTRIBUTES = regex(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
+_TAG = regex(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
+_TABLE = regex(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
+_FILE = regex(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]+")
+_CODE_WORD = regex(
     r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
     r"|(?<=\")[A-Za-z]\w+(?=\")"
 )
@@ -58,7 +58,7 @@ _CODE_WORD = re.compile(
 _CODE = (model.Script | model.ScriptPart | model.PlainCode | model.CodeBlock) | (
     model.Mjcf | model.FeatureBlock | model.Recording
 )
-_CALLED = re.compile(r"([A-Za-z_]\w*)\(.*\)")
+_CALLED = regex(r"([A-Za-z_]\w*)\(.*\)")
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
 _DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 

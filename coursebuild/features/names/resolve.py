@@ -13,7 +13,7 @@ import functools
 import re
 
 from coursebuild import MANUAL
-from coursebuild.api import Course, did_you_mean, document_scripts
+from coursebuild.api import Course, did_you_mean, document_scripts, regex
 from coursebuild.core.model import Script
 from coursebuild.core.model.addresses import line_anchor
 from coursebuild.core.text.diagnostics import propose
@@ -37,9 +37,9 @@ _MANUAL_ID = "coursebuild-manual"
 """The id of the manual, in docs/content/course.toml."""
 _ROOTS = {"model": "MjModel", "data": "MjData", "opt": "MjOption", "spec": "MjSpec"}
 """The classes of variables by their usual names, for links."""
-_FUNCTION = re.compile(r"mj[ud]?_[A-Za-z][A-Za-z0-9]*")
+_FUNCTION = regex(r"mj[ud]?_[A-Za-z][A-Za-z0-9]*")
 """How the names of functions begin that only MuJoCo has."""
-_BRACKETS = re.compile(r"[()\[\]]+")
+_BRACKETS = regex(r"[()\[\]]+")
 _resolvers: list[Resolver] = []
 """The one that was asked last."""
 

@@ -36,6 +36,7 @@ from coursebuild.api import (
     PageInputs,
     SiteContext,
     model,
+    regex,
     step_key,
     urls,
 )
@@ -176,7 +177,7 @@ def _text_cell(section: str, text: str) -> Cell:
     return markdown_cell(f"text-{_slug(section)}", text)
 
 
-_NOT_IN_IDS = re.compile(r"[^a-zA-Z0-9]+")
+_NOT_IN_IDS = regex(r"[^a-zA-Z0-9]+")
 
 
 def _slug(name: str) -> str:

@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from urllib.parse import urlsplit
 
+from coursebuild.api import regex
 from coursebuild.core.pages.html_xml import (
     Element,
     HtmlContent,
@@ -44,7 +45,7 @@ _ACTIVE = frozenset(
 )
 _ANCHOR = "anchor"
 """The class of a heading's link to itself, which only a page needs."""
-_NUMBER = re.compile(r"[0-9]{1,5}")
+_NUMBER = regex(r"[0-9]{1,5}")
 
 
 class Flow:
@@ -314,8 +315,8 @@ _ALIGNMENTS = {"tml-left": "left", "tml-right": "right"}
 """Classes of columns that the site's style sheet aligns."""
 _EMPTY = frozenset({"mspace", "mprescripts", "none"})
 _WORDS = frozenset({"mi", "mn", "mo", "mtext", "ms"})
-_COLOUR = re.compile(r"(?:^|;)\s*color\s*:\s*(#[0-9a-fA-F]{3,6}|[a-zA-Z]+)\s*(?:;|$)")
-_LENGTH = re.compile(r"[+-]?\d*\.?\d+(?:%|em|ex|px|in|cm|mm|pt|pc)?|\w+mathspace")
+_COLOUR = regex(r"(?:^|;)\s*color\s*:\s*(#[0-9a-fA-F]{3,6}|[a-zA-Z]+)\s*(?:;|$)")
+_LENGTH = regex(r"[+-]?\d*\.?\d+(?:%|em|ex|px|in|cm|mm|pt|pc)?|\w+mathspace")
 
 
 def mathml(node: HtmlElement) -> Element:

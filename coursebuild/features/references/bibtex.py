@@ -13,12 +13,12 @@ import re
 
 from msgspec import Struct
 
-from coursebuild.api import Diagnostic, Note, Parsed, Source, Span, diagnose
+from coursebuild.api import Diagnostic, Note, Parsed, Source, Span, diagnose, regex
 
 NAMES = ("author", "editor", "translator")
-_KEY = re.compile(r"@\s*\w+\s*[{(]\s*([^,\s{}()]*)")
-_ENTRY = re.compile(r"^[ \t]*@", re.MULTILINE)
-_DOI = re.compile(r"(?:https?://(?:dx\.)?doi\.org/|doi:\s*)?(10\.\d{4,9}/\S+)", re.IGNORECASE)
+_KEY = regex(r"@\s*\w+\s*[{(]\s*([^,\s{}()]*)")
+_ENTRY = regex(r"^[ \t]*@", re.MULTILINE)
+_DOI = regex(r"(?:https?://(?:dx\.)?doi\.org/|doi:\s*)?(10\.\d{4,9}/\S+)", re.IGNORECASE)
 _IDENTIFIERS = frozenset(("doi", "isbn", "url"))
 """Fields in which a backslash only stands before a character of LaTeX."""
 
@@ -154,7 +154,7 @@ def read_works(source: Source) -> Parsed[tuple[Work, ...]]:
     return Parsed(tuple(works), tuple(diagnostics))
 
 
-_PIECE = re.compile(r"""[^\s"#%'(),={}]+""")
+_PIECE = regex(r"""[^\s"#%'(),={}]+""")
 """A number, or a name of `@string`."""
 
 

@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.api import Source
+from coursebuild.api import Source, regex
 from coursebuild.features.references.bibtex import Work, read_works
 
 _STYLE = Path(__file__).with_name("style.csl")
@@ -71,7 +71,7 @@ _LOCATORS = {
     "volume": "vol. vols. volume bd. المجلد",
 }
 """Words that may begin what is named within a work, by the label of CSL."""
-_ORDINAL = re.compile(r"(\d+)(?:st|nd|rd|th|\.)?")
+_ORDINAL = regex(r"(\d+)(?:st|nd|rd|th|\.)?")
 _MARKS = {
     "Italic": "i",
     "Oblique": "i",

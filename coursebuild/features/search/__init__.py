@@ -15,13 +15,12 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from msgspec import Struct
 
-from coursebuild.api import CachedFile, Feature, PageKind, PagePart, SiteContext
+from coursebuild.api import CachedFile, Feature, PageKind, PagePart, SiteContext, regex
 from coursebuild.core.pages.context import NotedPage
 from coursebuild.features.search.page import LEAD_ONLY, as_json, note_page, script, text_and_terms
 from coursebuild.features.search.words import is_fuzzy, shelf_of
@@ -35,7 +34,7 @@ _BATCH = 16
 _PAGES_PER_SHARD = 8
 _MAX_SHARDS = 1024
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz-_"
-_SLICE = re.compile(rb"(?>(?:[^\n ]++ (?>(?:[0-9a-f]{2})*)(?:\n(?!\Z)|\Z))*)")
+_SLICE = regex(rb"(?>(?:[^\n ]++ (?>(?:[0-9a-f]{2})*)(?:\n(?!\Z)|\Z))*)")
 _LIVE = "search.live."
 """The prefix of interface texts that only the search script needs."""
 

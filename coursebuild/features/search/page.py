@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias
 
 from msgspec import Struct
 
-from coursebuild.api import Document, PageContext, PageInputs, model
+from coursebuild.api import Document, PageContext, PageInputs, model, regex
 from coursebuild.core.model.inlines import CodeSpan
 from coursebuild.core.pages.context import DocumentInputs, HighlightedFile
 from coursebuild.core.pages.document_inputs import LessonLink
@@ -47,7 +47,7 @@ class Section(Struct, frozen=True):
     """Symbols that it says the meaning of."""
 
 
-_TAG = re.compile(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
+_TAG = regex(r"<!--.*?-->|<(script|style)\b.*?</\1>|<[^>]*>", re.DOTALL | re.IGNORECASE)
 
 
 _HEADINGS = {f"h{level}": level for level in range(1, 7)}

@@ -21,6 +21,8 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Literal
 
+from coursebuild.api import regex
+
 MAX_LENGTH = 48
 """The limit for terms, in characters; longer ones are data, which nobody types."""
 _MAX_NUMBER_LENGTH = 12
@@ -52,18 +54,18 @@ _UNSPACED = (
 )
 """First and last characters of scripts without spaces between words: Thai, Lao, Burmese, Khmer,
 Kana, Han."""
-_TOKEN = re.compile(
+_TOKEN = regex(
     r"[0-9]+(?:\.[0-9]+)*[eE][+-]?[0-9]+(?!\w)|\w+(?:\.\w+)*|[" + "".join(_SYMBOLS) + "]"
 )
-_NUMBER = re.compile(r"[0-9][0-9.eE+-]*\Z")
+_NUMBER = regex(r"[0-9][0-9.eE+-]*\Z")
 _SYLLABLE = 3
 """Characters; a name of shorter parts only, such as MuJoCo, has none."""
-_SEAM = re.compile(
+_SEAM = regex(
     r"(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])|(?<=[A-Za-z])(?=[0-9])|(?<=[0-9])(?=[A-Za-z])"
     r"|_+"
 )
-_FOREIGN = re.compile(r"[^\x00-\x7f]+")
-_GENITIVE = re.compile("['’]s\\b")
+_FOREIGN = regex(r"[^\x00-\x7f]+")
+_GENITIVE = regex("['’]s\\b")
 
 
 def terms_of(text: str) -> list[str]:
@@ -173,7 +175,7 @@ def _terms_of_run(run: bytes) -> tuple[str, ...]:
     return tuple(terms_of(run.decode("utf-8", "surrogatepass")))
 
 
-_PIECE = re.compile(r"%[^\n]*|\\([A-Za-z]+)\*?|\\.|\s+|.", re.DOTALL)
+_PIECE = regex(r"%[^\n]*|\\([A-Za-z]+)\*?|\\.|\s+|.", re.DOTALL)
 """A comment, a command, another character after a backslash, blanks, or a character."""
 
 _SIGNS = {
@@ -209,10 +211,10 @@ _LETTERS = {
     **{"varepsilon": "ε", "vartheta": "ϑ", "varphi": "φ", "varrho": "ϱ", "varpi": "ϖ"},
     "varsigma": "ς",
 }
-_MATHEMATICAL = re.compile("[\U0001d400-\U0001d7ff]")
+_MATHEMATICAL = regex("[\U0001d400-\U0001d7ff]")
 # The blank is matched first and its neighbours then: the other order is far slower.
-_TIGHT = re.compile(r" (?:(?<=[_^(\[|⟨] )|(?=[_^)\]⟩,;]))")
-_OPERATOR = re.compile(r" (?<=[Δδ∂∇] )(?=[^\W\d])")
+_TIGHT = regex(r" (?:(?<=[_^(\[|⟨] )|(?=[_^)\]⟩,;]))")
+_OPERATOR = regex(r" (?<=[Δδ∂∇] )(?=[^\W\d])")
 """The blank after a sign such as Δ or ∂: with its operand it is one word, as `Δt`."""
 
 

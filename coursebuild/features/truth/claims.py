@@ -32,7 +32,7 @@ from operator import itemgetter
 
 from msgspec.structs import replace
 
-from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean, model
+from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean, model, regex
 from coursebuild.core.registry import kind_of_block
 from coursebuild.core.syntax.document import read_again
 from coursebuild.core.text.numbers import Number, point_decimals, scan_prose
@@ -44,23 +44,23 @@ from coursebuild.features.arithmetic.statements import FormulaSide, read_stateme
 from coursebuild.features.arithmetic.symbol_values import check_formulas
 from coursebuild.features.truth.model import Claims, StatedNumber
 
-_PART = re.compile(
+_PART = regex(
     r"[\w.-]+(?:/[\w.-]+)+\.[a-z]+|(?:content|examples|lib|models|runs)/\S*|lab|#lab:\S+|lesson:\S+"
 )
 """A source that is a part of the course, also where its name is misspelt."""
-_LITERAL = re.compile(r"(?<![\w.])(?:\d+(?:_\d{3})*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
-_MODEL_PATH = re.compile(r"models/([\w/-]+)\.xml")
+_LITERAL = regex(r"(?<![\w.])(?:\d+(?:_\d{3})*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_MODEL_PATH = regex(r"models/([\w/-]+)\.xml")
 
 _COUNTS = 12
 _YEARS = range(1600, 2100)
 _OTHER = "\ufffc"
 """Stands for code, a formula or a link behind a text: `in` is no unit before one."""
-_FACTORS = re.compile(r"(?:\s*×\s*[\d.]+)*")
-_DECIMAL = re.compile(r"\d\.\d")
-_MAY_CLAIM = re.compile(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
+_FACTORS = regex(r"(?:\s*×\s*[\d.]+)*")
+_DECIMAL = regex(r"\d\.\d")
+_MAY_CLAIM = regex(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
 """Every formula with claims matches this."""
-_DIGIT = re.compile("[0-9]")
-_VECTOR = re.compile(r"\s*[(\[](?:[-+\d.,;\s]|\\[,;: ])+[)\]]\s*")
+_DIGIT = regex("[0-9]")
+_VECTOR = regex(r"\s*[(\[](?:[-+\d.,;\s]|\\[,;: ])+[)\]]\s*")
 
 
 # --- held against the course

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from jinja2 import Environment
 
-from coursebuild.api import CLEAN, UsageError, did_you_mean, load_course, options_of, write
+from coursebuild.api import CLEAN, UsageError, did_you_mean, load_course, options_of, regex, write
 from coursebuild.core.files.write import FileChange
 from coursebuild.core.model.course import TEMPLATES
 from coursebuild.core.registry import CORE_FENCES, features, fence_names
@@ -46,7 +46,7 @@ _MODEL = """\
 </mujoco>
 """
 _FEATURE = Path(__file__).parents[1] / "feature"
-_NAME = re.compile(r"\w[\w-]*(?:/\w[\w-]*)*", re.ASCII)
+_NAME = regex(r"\w[\w-]*(?:/\w[\w-]*)*", re.ASCII)
 
 
 def declare(parser: argparse.ArgumentParser) -> None:

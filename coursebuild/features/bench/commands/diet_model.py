@@ -28,6 +28,7 @@ from coursebuild.api import (
     Source,
     Store,
     find_blocks,
+    regex,
     temporary_folder,
 )
 from coursebuild.core.checks.compiled import mjcf_texts
@@ -284,8 +285,8 @@ def _find_readers(
     return ModelReaders(tuple(sources), modules)
 
 
-_INCLUDED = re.compile(r"<include\s[^>]*?\bfile\s*=\s*[\"']([^\"']+)")
-_REFERENCE = re.compile(r"(?<![\w-])(?!name\s*=)\w+\s*=\s*[\"']([^\"']*)[\"']")
+_INCLUDED = regex(r"<include\s[^>]*?\bfile\s*=\s*[\"']([^\"']+)")
+_REFERENCE = regex(r"(?<![\w-])(?!name\s*=)\w+\s*=\s*[\"']([^\"']*)[\"']")
 
 
 def _included_files(files: CourseFiles, source: Source) -> frozenset[str]:

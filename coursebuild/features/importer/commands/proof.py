@@ -34,6 +34,7 @@ from coursebuild.api import (
     Store,
     marks,
     model,
+    regex,
 )
 from coursebuild.core.files.examples import write_examples
 from coursebuild.core.model.results import Change, EffectKind, Sign
@@ -301,7 +302,7 @@ def _record_outputs(
             keep_notebook_outputs([(script.path, printed)], options.store)
 
 
-_VALUE_PLACE = re.compile(r"`(?P<name>[^`:\n]+)(?::(?P<format>[^`\n]+))? = \?`")
+_VALUE_PLACE = regex(r"`(?P<name>[^`:\n]+)(?::(?P<format>[^`\n]+))? = \?`")
 """Where a text shows a value that its tool computed, as the first pass has left it."""
 
 
@@ -353,9 +354,9 @@ def _find_old_numbers(
 
 # --- what varies from run to run
 
-_NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?|[-+]?\.\d+(?:[eE][-+]?\d+)?|0x[0-9a-f]+")
+_NUMBER = regex(r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?|[-+]?\.\d+(?:[eE][-+]?\d+)?|0x[0-9a-f]+")
 _ANY_NUMBER = r"[-+.0-9a-fxE]+"
-_WORDS_BEFORE = re.compile(r"[^\W\d](?:[^\W\d]|[ .,:;=()/%-])*\Z")
+_WORDS_BEFORE = regex(r"[^\W\d](?:[^\W\d]|[ .,:;=()/%-])*\Z")
 _MOST_PATTERNS = 4
 
 

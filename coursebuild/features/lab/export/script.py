@@ -22,7 +22,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from msgspec import Struct
 
-from coursebuild.api import Lesson, Store, Trial, TrialContext
+from coursebuild.api import Lesson, Store, Trial, TrialContext, regex
 from coursebuild.core.text.source import unique_name
 from coursebuild.core.values import fingerprint
 from coursebuild.features.lab.engines.native import (
@@ -45,8 +45,8 @@ from coursebuild.features.lab.model import SIMLAB, Lab, Test, Writing
 from coursebuild.features.lab.reply import PARITY_RTOL, MainRun, unpack_arrays
 from coursebuild.features.lab.schema import Button, Control, Select, Slider
 
-_HALF_CHARACTER = re.compile("[\ud800-\udfff]")
-_PLACE = re.compile(r"\{\{control:(\d+)\}\}")
+_HALF_CHARACTER = regex("[\ud800-\udfff]")
+_PLACE = regex(r"\{\{control:(\d+)\}\}")
 _ENVIRONMENT = Environment(
     trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
 )

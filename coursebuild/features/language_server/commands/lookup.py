@@ -14,7 +14,7 @@ from urllib.parse import unquote
 from lsprotocol import types
 from msgspec import Struct
 
-from coursebuild.api import Library, ModelFacts, Source, Span, model
+from coursebuild.api import Library, ModelFacts, Source, Span, model, regex
 from coursebuild.core.checks.links import anchors
 from coursebuild.core.model import Owner
 from coursebuild.core.model.results import Formula
@@ -40,9 +40,9 @@ from coursebuild.features.symbols import declared_symbol, symbols
 from coursebuild.pipeline.reader import kept_formulas
 from coursebuild.preview.messages import printed_outputs
 
-_ASSIGNMENT = re.compile(r"(\w+)\s*=\s*mujoco\.(Mj(?:Data|Model))\b")
-_NAME = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
-_STRING = re.compile(r"""(["'])([^"'\s]+)\1""")
+_ASSIGNMENT = regex(r"(\w+)\s*=\s*mujoco\.(Mj(?:Data|Model))\b")
+_NAME = regex(r"(?<![\w.])[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
+_STRING = regex(r"""(["'])([^"'\s]+)\1""")
 
 
 class Referent(Struct, frozen=True):

@@ -21,7 +21,7 @@ from lsprotocol import types
 from msgspec import Struct
 from pygls import uris
 
-from coursebuild.api import Document, Edit, Lesson, Library, Source, Span
+from coursebuild.api import Document, Edit, Lesson, Library, Source, Span, regex
 from coursebuild.core.files.course_root import MAP
 from coursebuild.core.files.read import read_sources
 from coursebuild.core.files.write import FileChange
@@ -148,15 +148,15 @@ def _parse(source: Source, callouts: frozenset[str], lesson: bool, words: Words)
 
 # --- the fields that there can be at a place
 
-_FENCE = re.compile(
+_FENCE = regex(
     r"^[ \t>]*(?P<marks>`{3,}+|~{3,}+)[ \t]*(?P<kind>[\w-]*).*\n(?P<body>[\s\S]*?)"
     # An unclosed fence ends where the next one begins.
     r"(?:(?=^[ \t>]*(?P=marks)[ \t]*\w)|^[ \t>]*(?P=marks).*|\Z)",
     re.MULTILINE,
 )
 _TOKEN = r'[{}\[\]:,=]|"(?:[^"\\\n]|\\.)*"|"[\w./-]*|[^\s"{}\[\]:,=>]+'
-_JSON = re.compile(_TOKEN)
-_TOML = re.compile(
+_JSON = regex(_TOKEN)
+_TOML = regex(
     rf"(?:^[ \t]*\[\[?(?P<header>[\w. -]+)\]\]?[ \t\r]*)?(?:#.*)?\n|{_TOKEN}", re.MULTILINE
 )
 
