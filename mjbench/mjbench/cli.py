@@ -336,9 +336,9 @@ def _diet(arguments: argparse.Namespace) -> int:
                 only=arguments.only,
                 quick=arguments.quick,
             )
-        except StoppedSurvey as stopped:
-            words = diet_text(stopped.report, command, table, _style(), is_stopped=True)
-            _print(arguments, DIET.encode(stopped.report), words, record=False)
+        except StoppedSurvey as stop:
+            words = diet_text(stop.report, command, table, _style(), is_stopped=True)
+            _print(arguments, DIET.encode(stop.report), words, record=False)
             print("mjbench: stopped; this is what is known", file=sys.stderr)
             return _STOPPED
         if not (arguments.fix and result.changes):

@@ -7,16 +7,14 @@ import re
 import struct
 from xml.parsers import expat
 
-from coursebuild.core.text.regex import regex
-
 WHOLE_COLUMN = 1600
 """The width given to a drawing without one, which is shown as wide as its column, in CSS pixels."""
 
-_LENGTH = regex(r"\s*\+?(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+)(px|pt|pc|in|cm|mm)?\s*", re.IGNORECASE)
+_LENGTH = re.compile(r"\s*\+?(\d+\.?\d*(?:e[+-]?\d+)?|\.\d+)(px|pt|pc|in|cm|mm)?\s*", re.IGNORECASE)
 _UNITS = {"": 1, "px": 1, "pt": 4 / 3, "pc": 16, "in": 96, "cm": 96 / 2.54, "mm": 96 / 25.4}
-_NUMBER = regex(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 _JPEG_FRAMES = frozenset({*range(0xC0, 0xD0)} - {0xC4, 0xC8, 0xCC})
-_LIES_ON_SIDE = regex(
+_LIES_ON_SIDE = re.compile(
     rb"\x01\x12\0\x03\0\0\0\x01\0[\x05-\x08]|\x12\x01\x03\0\x01\0\0\0[\x05-\x08]\0"
 )
 """The orientation in the Exif data of a JPEG, in either order of bytes."""

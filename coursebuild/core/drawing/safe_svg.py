@@ -14,8 +14,6 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from xml.parsers import expat
 
-from coursebuild.core.text.regex import regex
-
 SVG = "{http://www.w3.org/2000/svg}"
 XLINK = "{http://www.w3.org/1999/xlink}"
 MAX_BYTES = 4 << 20
@@ -99,7 +97,7 @@ _PROPERTIES = frozenset(
     "ascent-override descent-override font-display line-gap-override size-adjust src "
     "unicode-range".split()
 )
-_VENDOR = regex(r"^-(?:webkit|moz|ms|o|inkscape)-")
+_VENDOR = re.compile(r"^-(?:webkit|moz|ms|o|inkscape)-")
 _AT_RULES = {"@media": True, "@supports": True, "@keyframes": True, "@font-face": False}
 """Whether they hold rules, or declarations."""
 _FUNCTIONS = frozenset(
@@ -111,9 +109,9 @@ _FUNCTIONS = frozenset(
 )
 
 _ESCAPE = r"\\(?:[0-9a-f]{1,6}(?:\r\n|[ \t\r\n\f])?|[^0-9a-f\r\n\f])"
-_ESCAPED = regex(_ESCAPE, re.IGNORECASE)
+_ESCAPED = re.compile(_ESCAPE, re.IGNORECASE)
 _NAME = rf"(?>(?:[\w-]|[^\x00-\x7f]|{_ESCAPE})+)"
-_TOKEN = regex(
+_TOKEN = re.compile(
     rf"""(?P<blank>(?>(?:\s|/\*.*?\*/)+))
     |(?P<string>"(?>(?:[^"\\\n\r\f]|\\.)*)"|'(?>(?:[^'\\\n\r\f]|\\.)*)')
     |(?P<link>url\(\s*(?P<q>["']?)\#(?>(?:[\w.:-]|[^\x00-\x7f])+)(?P=q)\s*\))
@@ -125,8 +123,8 @@ _TOKEN = regex(
     |(?P<mark>[][(){{}};:,.+>~*|=^$!%\#?]|/(?!\*))""",
     re.VERBOSE | re.DOTALL | re.IGNORECASE | re.ASCII,
 )
-_PIXELS = regex(r"data:image/(?:png|jpe?g|webp);base64,[A-Za-z0-9+/=\s]*")
-_REFERENCE = regex(r"""url\(\s*["']?#((?:[\w.:-]|[^\x00-\x7f])+)""", re.IGNORECASE)
+_PIXELS = re.compile(r"data:image/(?:png|jpe?g|webp);base64,[A-Za-z0-9+/=\s]*")
+_REFERENCE = re.compile(r"""url\(\s*["']?#((?:[\w.:-]|[^\x00-\x7f])+)""", re.IGNORECASE)
 _ENCODINGS = ("utf-8", "utf8", "us-ascii", "ascii")
 """Those in which a drawing is the same text as in UTF-8."""
 

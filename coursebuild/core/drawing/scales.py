@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from html import escape
 from itertools import pairwise
 
 from msgspec import Struct
-
-from coursebuild.core.text.regex import regex
 
 _LARGEST = 290.0
 """Greater powers of ten are drawn as this one."""
@@ -143,7 +142,7 @@ def _scaled(mantissa: int, exponent: int) -> str:
     return power if mantissa == 1 else f"{mantissa}·{power}"
 
 
-_NO_MARKUP = regex("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
+_NO_MARKUP = re.compile("[\x00-\x1f\x7f\ud800-\udfff\ufffe\uffff]")
 """Includes lone surrogates, which stand for bytes that are not text."""
 _NARROW = frozenset("ijl.,:;'|!()[] ·ft")
 _BROAD = frozenset("mwMW—%@")

@@ -73,10 +73,9 @@ class BoundText(Struct, frozen=True):
         `may_join`: spaces, also ordinary ones, may part thousands, and groups of decimals.
         """
         if gaps := decimal_gaps(text, comma) if may_join else ():
-            joined = cls.of(
-                replace_ranges(text, ((*gap, "") for gap in gaps)), comma, may_join=True
-            )
-            return replace(joined, decimal_space=text[slice(*gaps[0])])
+            without_gaps = replace_ranges(text, ((*gap, "") for gap in gaps))
+            bound_text = cls.of(without_gaps, comma, may_join=True)
+            return replace(bound_text, decimal_space=text[slice(*gaps[0])])
         pointed = as_printed(join_thousands(text) if may_join else text, comma)
         if pointed != text:
             return replace(cls.of(pointed), comma=comma, space=group_space(text))

@@ -438,11 +438,9 @@ class _Reader:
             sign = self.take(*_PRODUCT_SIGNS)
             is_function = self.peek()[1:] in _FUNCTIONS
             is_spaced = re.search(r"\\[,;: ]", self.tex[end : self.at]) is not None
-            if not (sign or self.begins_factor()) or (is_function and sign not in _QUOTIENT_SIGNS):
-                self.at = end
-                return argument
             is_angle = argument.kind == "*" and argument.parts[1].text == "deg"
-            if is_angle and sign and sign not in _QUOTIENT_SIGNS:
+            is_outside = is_function or (is_angle and bool(sign))
+            if not (sign or self.begins_factor()) or (is_outside and sign not in _QUOTIENT_SIGNS):
                 self.at = end
                 return argument
             if sign or is_spaced or self.peek() in _BRACKETS:

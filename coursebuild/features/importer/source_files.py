@@ -171,7 +171,7 @@ def value_at(settings: object, *path: str) -> object:
 
 def find_group(pattern: str | re.Pattern[str], text: str) -> str:
     """Return the last group of the first match of a pattern; empty where there is none."""
-    match = re.search(pattern, text)
+    match = re.search(pattern, text) if isinstance(pattern, str) else pattern.search(text)
     return match[match.lastindex or 0] if match else ""
 
 
