@@ -127,7 +127,8 @@ def table_rows(
             gaps = decimal_gaps(text, table.comma)
             mapped = mapped.replace_ranges(dict.fromkeys(gaps, ""))
             text = join_thousands(mapped.text)
-        return RowCell.of(cell, column, mapped, as_printed(text, table.comma), is_grouped)
+        text = _printed_name(as_printed(text, table.comma), printed)
+        return RowCell.of(cell, column, mapped, text, is_grouped)
 
     rows = (
         tuple(
@@ -138,6 +139,15 @@ def table_rows(
         for row in table.rows
     )
     return tuple(row for row in rows if row)
+
+
+def _printed_name(text: str, printed: str) -> str:
+    """A name as it is printed: `T\u2080` as `T0`, `\u03c9` as `omega`, `v_1` as `v1`."""
+    if text in printed or scan_prose(text):
+        return text
+    name = "".join(map(_spell, unicodedata.normalize("NFKD", text)))
+    names = (name.translate(dict.fromkeys(map(ord, signs))) for signs in ("", "\\{}", "\\{}_^"))
+    return next((name for name in names if name in printed), text)
 
 
 def elides_rows(table: model.Table) -> bool:
@@ -411,4 +421,7 @@ def words_of(text: str) -> frozenset[str]:
 
 def _spell(character: str) -> str:
     name = unicodedata.name(character, "")
-    return name.rpartition(" ")[2] if name.startswith("GREEK") else character
+    if not name.startswith("GREEK"):
+        return character
+    word = name.rpartition(" ")[2]
+    return word.capitalize() if character.isupper() else word.lower()
