@@ -295,7 +295,8 @@ def gallery_inputs(library: Library) -> PageInputs:
         lessons = tuple(lesson_link(library, place, o) for o in owners if isinstance(o, Lesson))
         cards.append(ModelCard(model.name, model.description, href, picture, lessons))
     values = {"home": place.href(urls.HOME), "models": tuple(cards)}
-    head = PageHead(place.path, "models", library.words("models.title"), "")
+    words = library.words
+    head = PageHead(place.path, "models", words("models.title"), words("models.description"))
     return PageInputs(head, "models.html", values)
 
 
