@@ -138,7 +138,8 @@ class Subject(Struct, frozen=True):
         """Its `MjSpec`; `None` where it has no source."""
         if not self.path.endswith(".urdf"):
             return None if self.is_binary else mujoco.MjSpec.from_file(self.file)
-        spec = mujoco.MjSpec.from_string(self.mjcf)  # which may name files by other paths
+        # It may name files by other paths; where MuJoCo takes any bytes, its binding takes text.
+        spec = mujoco.MjSpec.from_string(self.data.decode("utf-8", "replace"))
         spec.modelfiledir = self.folder
         return spec
 

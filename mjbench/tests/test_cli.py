@@ -116,6 +116,7 @@ def test_a_package_of_urdf_is_the_folder_of_its_name(tmp_path: Path, capsys: Cap
     for path, text in ((file, URDF), (mesh, TETRAHEDRON)):
         path.parent.mkdir(parents=True)
         path.write_text(text, "utf-8")
+    file.write_bytes(URDF.replace("<link", "<!-- länger --><link").encode("latin-1"))
     subject = read_subject(file)
     compiled_model = compile_subject(subject, LocalHost(tmp_path, lambda _: None), quick=True)
     assert compiled_model.model.nmesh == compiled_model.spec.compile().nmesh == 1

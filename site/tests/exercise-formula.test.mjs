@@ -4,7 +4,7 @@ import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { formulaCode } from '../js/exercise/formula.js'
 
-const KNOWN = { names: ['h', 'g'], maths: ['sqrt', 'sin', 'min'] }
+const KNOWN = { names: ['h', 'g'], maths: ['sqrt', 'sin', 'min', 'atan2', 'hypot'] }
 
 test('a formula is computed as it is read on paper', () => {
   for (const [text, value] of [
@@ -17,6 +17,8 @@ test('a formula is computed as it is read on paper', () => {
     ['(g)**2', 100],
     ['min(h, 1e-1, .5)*007', 0.1 * 7],
     ['π*h²', Math.PI / 4],
+    ['hypot(-h) + hypot(3, 0, 4)', 5.5],
+    ['atan2(h, h)', Math.PI / 4],
   ]) {
     assert.equal(new Function(...KNOWN.names, `return ${formulaCode(text, KNOWN)}`)(0.5, 10), value, text)
   }
@@ -36,6 +38,7 @@ test('what cannot be read is said at its place', () => {
     ['9,81*h', 'rest', ',81*h'],
     ['sqrt(2*9,81*h)', 'rest', ',81*h)'],
     ['min(h)', 'rest', ')'],
+    ['atan2(h, g, 1)', 'rest', ', 1)'],
     ['y = h', 'name', 'y'],
     ['h = 1', 'rest', '= 1'],
     ['constructor', 'name', 'constructor'],

@@ -18,6 +18,7 @@ test('a flat line has a scale', () => {
   near(spanOf({}, -2, -2), [-2.1, -1.9])
   near(spanOf({}, 0, 0), [-1, 1])
   near(spanOf({}, 2, 2 + 1e-13), [1.9, 2.1])
+  near(spanOf({ ymin: 2, ymax: 2 + 1e-11 }, 0, 0), [2, 2 + 1e-11])
 })
 
 test('so has a plot that waits for its first sample', () => {

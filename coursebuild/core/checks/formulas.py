@@ -117,7 +117,7 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
     help: str | Fix = ""
     if command := re.search(r"unknown command (\\([A-Za-z]+))", error.message):
         likely = nearest(command[2], SYMBOLS | _FUNCTIONS | _WITH_BRACES)
-        help = rf"if MathJax has it, `\newcommand{{{command[1]}}}…` in the formula defines it here"
+        help = rf"a macro is defined in the formula that has it: `\newcommand{{{command[1]}}}…`"
         start = tex.text.find(command[2])
         if likely is not None and start >= 0:
             place = tex.span(start, start + len(command[2]))

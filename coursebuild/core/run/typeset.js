@@ -32,8 +32,8 @@ const typeset = (() => {
     '\\dd': (context) => `\\mathrm{d}${readPower(context)}`,
     '\\dv': (context) => derivative('\\mathrm{d}', context),
     '\\pdv': (context) => derivative('\\partial', context),
-    '\\braket': (context) => `\\mathinner{\\langle{${readArguments(context, 2).join('|')}}\\rangle}`,
-    '\\Braket': (context) => `\\left\\langle{${readArguments(context, 2).join('|').replaceAll('|', '}\\,\\middle|\\,{')}}\\right\\rangle`,
+    '\\braket': (context) => `\\mathinner{\\langle{${readBracket(context)}}\\rangle}`,
+    '\\Braket': (context) => `\\left\\langle{${readBracket(context).replace(/(?<!\\)\|/g, '}\\,\\middle|\\,{')}}\\right\\rangle`,
     '\\ketbra': '\\ket{#1}\\!\\bra{#2}',
     '\\vb': '\\@ifstar\\boldsymbol\\mathbf',
     '\\cross': '\\times',
@@ -69,9 +69,17 @@ const typeset = (() => {
   /** An argument, and more of them as long as there are braces. */
   function readArguments(context, most) {
     const values = []
-    do values.push(texOf(context.consumeArg().tokens))
-    while (values.length < most && context.future().text === '{')
+    do {
+      values.push(texOf(context.consumeArg().tokens))
+      context.consumeSpaces()
+    } while (values.length < most && context.future().text === '{')
     return values
+  }
+
+  /** What stands in a bracket of Dirac's: `{a|b}`, or `{a}{b}`. */
+  function readBracket(context) {
+    const [left] = readArguments(context, 1)
+    return left.includes('|') || context.future().text !== '{' ? left : `${left}|${readArguments(context, 1)[0]}`
   }
 
   /** A derivative: `\dv{x}`, `\dv[2]{f}{x}`, `\pdv{f}{x}{y}`; in LaTeX's `derivative` it is `\pdv{f}{x,y}`. */
@@ -90,9 +98,13 @@ const typeset = (() => {
   const REWRITES = [
     // A formula may define a name that is defined here, and leave out its backslash, as MathJax lets it.
     [
-      /\\newcommand\*?\s*(?:\{\s*\\?([A-Za-z]+)\s*\}|\\([A-Za-z]+))/g,
-      (_, inner, bare) => `\\providecommand{\\${inner ?? bare}}{}\\renewcommand{\\${inner ?? bare}}`,
+      /\\(new|provide)command\*?\s*(?:\{\s*\\?([A-Za-z]+)\s*\}|\\([A-Za-z]+))/g,
+      (command, kind, inner, bare) => {
+        const name = `\\${inner ?? bare}`
+        return kind === 'new' || name in MACROS ? `\\providecommand{${name}}{}\\renewcommand{${name}}` : command
+      },
     ],
+    [/\\DeclareMathOperator(\*?)\s*\{\s*([A-Za-z]+)\s*\}/g, (_, star, name) => `\\DeclareMathOperator${star}{\\${name}}`],
     [/\\begin\{eqnarray\*?\}/g, () => '\\begin{array}{rcl}'],
     [/\\end\{eqnarray\*?\}/g, () => '\\end{array}'],
     [/\\(begin|end)\{flalign(\*?)\}/g, (_, edge, star) => `\\${edge}{align${star}}`],

@@ -42,8 +42,9 @@ _QUOTED_KIND = regex(r"^((?:[ \t]*>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\])
 
 def convert_segment(segment: Segment, context: LessonContext) -> str:
     """Return a segment as Markdown; a cell becomes a part of the lesson's script."""
-    new = textwrap.indent(_convert(segment, context), " " * len(segment.indent))
-    return segment.indent + new.removeprefix(" " * len(segment.indent))
+    margin = re.sub(r"\S", " ", segment.indent)  # a tab stays one
+    new = textwrap.indent(_convert(segment, context), margin)
+    return segment.indent + new.removeprefix(margin)
 
 
 def _convert(segment: Segment, context: LessonContext) -> str:

@@ -56,8 +56,10 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
             language = re.sub("writefile|script", "text", magic[1].lower())
         if language == "html":
             return rewrite_prose(shown_code, context)
-        elif not re.search(r"^[^#\n]", shown_code, re.MULTILINE):
-            language = "sh" if re.search("^# !|^# %[pc]", shown_code, re.MULTILINE) else "python"
+        holds_commands = magic is None and MAGIC.search(cell.text) is not None
+        if holds_commands and not re.search(r"^[^#\n]", shown_code, re.MULTILINE):
+            is_of_shell = re.search(r"^[ \t]*(?:!|%[pc])", cell.text, re.MULTILINE)
+            language = "sh" if is_of_shell else "python"
             shown_code = COMMENT.sub("", shown_code)
         blocks = [marks.fence(language, shown_code)] if shown_code else []
         return "\n\n".join((*blocks, *write_outputs(cell, context)))

@@ -42,11 +42,11 @@ _LABELS = [
     for names in ("label|title|caption|heading", "value|alt", "href|to|link")
 ]
 _SENTENCE = regex(
-    r"\s(?!class|style)\w+=([\"'])"
+    r"\s(?!class|style)\w+=([\"'])(?=[^\W\d_a-z])"
     r"((?:(?!\1).)*[A-Za-z]{2}[^\"'\w]*[ ](?:(?!\1).)*[A-Za-z]{2}.*?)\1",
     re.DOTALL,
 )
-"""An attribute of more than a word, which readers see."""
+"""An attribute of more than a word that begins as a sentence does."""
 _ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
 """The address of a picture where it is computed."""
 

@@ -11,7 +11,7 @@ from coursebuild.features.importer.source_files import find_group
 _DIRECTIVE = regex(
     r"^\.\.[ ]+(?P<name>[\w:-]+)::[ ]*(?P<argument>.*)\n?(?P<body>(?:[ \t]*\n|[ ]+\S.*\n?)*)"
     r"|^\.\.[ ]+_(?P<label>[\w .-]+):[ \t]*$"
-    r"|^\.\.(?:[ ].*)?\n(?:[ \t]*\n|[ ]+\S.*\n?)*",
+    r"|^\.\.(?:[ ](?![\[|_]).*)?\n(?:[ \t]*\n|[ ]+\S.*\n?)*",
     re.MULTILINE,
 )
 """A directive, a label, or a comment."""

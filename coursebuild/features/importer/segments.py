@@ -179,11 +179,11 @@ _HINT = regex(
 )
 """A callout of GitBook."""
 _ALERT = regex(
-    r"^<div\b[^<>]*\bclass=[\"'][^\"'<>]*\balert-(?!block\b)(?P<kind>\w+)[^<>]*>"
+    r"^(?P<fence>`{3,}|~{3,})[^\n]*\n.*?^(?P=fence)|^<div\b[^<>]*\bclass=[\"'][^\"'<>]*\balert-(?!block\b)(?P<kind>\w+)[^<>]*>"
     r"(?P<text>(?:(?!<div\b).)*?)</div>[ \t]*$",
     re.MULTILINE | re.DOTALL | re.IGNORECASE,
 )
-"""A callout of Jupyter, as its style sheet has it."""
+"""A callout of Jupyter, as its style sheet has it; or code, in which there is none."""
 _HIGHLIGHT = regex(
     r"^\{[%{][<%-]?[ ]*(?:(highlight)[ ]+|(\w+)[ ]+lang=\"?)(\w+)[^\n]*\n(.*?)\n"
     r"\{[%{][<%-]?[ ]*(?:end|/)(?:\1|\2)\b[^\n]*$",
@@ -193,6 +193,8 @@ _HIGHLIGHT = regex(
 
 
 def _write_alert(alert: re.Match[str]) -> str:
+    if alert["fence"]:
+        return alert[0]
     kind = {"success": "tip", "warning": "warning", "danger": "danger"}.get(alert["kind"], "note")
     return f"::::::{kind}\n{textwrap.dedent(alert['text']).strip()}\n::::::"
 

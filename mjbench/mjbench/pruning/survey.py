@@ -161,10 +161,11 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         """Try every candidate, then all findings together."""
         try:
             self._find()
+            fixable = [i for group in self.groups if group.finding.fixable for i in group.items]
+            together = largest_subset(fixable, self._is_needless)
         except KeyboardInterrupt:
             raise StoppedSurvey(self._with_findings(report)) from None
-        fixable = [i for group in self.groups if group.finding.fixable for i in group.items]
-        fixed = self.trials.prune(largest_subset(fixable, self._is_needless)) if fixable else None
+        fixed = self.trials.prune(together) if fixable else None
         used_keys = {group.finding.kind for group in self.groups}
         used_keys |= {f"{item.kind} {item.name}" for group in self.groups for item in group.items}
         stale = {key: keep for key, keep in self.keeps.items() if key not in used_keys}

@@ -50,14 +50,18 @@ export function formulaCode(text, { names, maths }) {
     const [name] = tokens[next] ?? stop()
     if (take(...names)) return name
     if (take('pi', 'π')) return 'Math.PI'
-    if (take(...maths)) return `Math.${name}${take('(') || stop()}${list(Math[name])}${close()}`
+    if (take(...maths)) return `Math.${name}${take('(') || stop()}${list(name)}${close()}`
     if (/^[\p{L}_]/u.test(name)) throw new FormulaError('name', name)
     if (!/\d/.test(name)) stop()
     next += 1
     return String(Number(name))
   }
-  /** The arguments of a function: one, or of those such as `max` at least two. */
-  const list = ({ length }) => (length > 1 ? sum() + (take(',') || stop()) + chain(sum, ',') : sum())
+  /** The arguments of a function: one, two of `atan2`, any number of `hypot`, at least two of `max` and `min`. */
+  const list = (name) => {
+    if (name === 'hypot') return chain(sum, ',')
+    if (Math[name].length === 1) return sum()
+    return sum() + (take(',') || stop()) + (name === 'atan2' ? sum() : chain(sum, ','))
+  }
   const code = sum()
   if (next < tokens.length) stop()
   return code

@@ -109,7 +109,7 @@ export class Exercise extends Instrument {
     verdict.textContent = words(`exercise.live.${state}`)
     seen.textContent = result === null ? '' : this.seenText(result, trial)
     watch.hidden = result === null
-    advice.hidden = state !== 'failed'
+    advice.hidden = state !== 'failed' || trial.hint === ''
   }
 
   seenText({ seen, failure }, { digits, unit }) {

@@ -94,6 +94,18 @@ class TestMarkup:
         cells = mathml(typeset_one(engine, rf"\begin{{matrix}} {rows} \end{{matrix}}")).iter("mtd")
         assert len({cell.get("style") for cell in cells}) == 2  # the first and the last of a row
 
+    def test_a_macro_is_what_its_formula_defines_or_its_arguments_say(
+        self, engine: MathEngine
+    ) -> None:
+        for tex, text in {
+            r"\braket{a|b}{c}": "⟨a|b⟩c",
+            r"\braket{a} {b}": "⟨a|b⟩",
+            r"\dv{f} {x}": "dfdx",
+            r"\providecommand{\tr}{t}\tr": "t",
+        }.items():
+            root = mathml(typeset_one(engine, tex))
+            assert "".join(root[0][0].itertext()) == text, tex
+
     def test_negated_relations_are_single_characters(self, engine: MathEngine) -> None:
         root = mathml(typeset_one(engine, r"a \not= b \not\in C"))
         assert [mo.text for mo in root.iter("mo")] == ["≠", "∉"]

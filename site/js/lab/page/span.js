@@ -2,7 +2,7 @@
 
 const ROOM = 0.06 // on either side of the data, as part of their range
 const FLAT = 0.05 // on either side of a flat line, as part of its value
-const SEEN = 1e-8 // of a value: what differs by less is a flat line, as labels of ten figures cannot tell it apart
+const SEEN = 1e-10 // of the sum of two values: what differs by less is a flat line, as labels of ten figures cannot tell it apart
 const LEAST = 1e-9
 
 /**
@@ -16,7 +16,8 @@ export function spanOf({ ymin, ymax, refLines = [] }, low, high) {
   const marks = refLines.map(({ y }) => y)
   const bottom = ymin ?? Math.min(low ?? Infinity, ...marks)
   const top = ymax ?? Math.max(high ?? -Infinity, ...marks)
-  if (top - bottom > SEEN * Math.abs(top + bottom) && Number.isFinite(top - bottom)) {
+  const seen = ymin === bottom && ymax === top ? 0 : SEEN * Math.abs(top + bottom)
+  if (top - bottom > seen && Number.isFinite(top - bottom)) {
     const room = ROOM * (top - bottom)
     return [ymin ?? bottom - room, ymax ?? top + room]
   }
