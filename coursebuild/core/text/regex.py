@@ -23,6 +23,8 @@ class _Regex:
         self._flags = flags
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # as a copy is asked for before it has a pattern
+            raise AttributeError(name)
         value = getattr(re.compile(self.pattern, self._flags), name)
         setattr(self, name, value)  # from now on it is found without this
         return value
