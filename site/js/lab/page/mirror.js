@@ -56,9 +56,10 @@ export class Mirror {
     scene.background = null
     // The surface itself is not in its reflection, but it may cast a shadow there.
     material.colorWrite = material.depthWrite = false
+    const picture = renderer.getRenderTarget()
     renderer.setRenderTarget(this.target)
     renderer.render(scene, this.lens)
-    renderer.setRenderTarget(null)
+    renderer.setRenderTarget(picture)
     material.colorWrite = material.depthWrite = true
     scene.background = background
   }

@@ -4,12 +4,14 @@
  * A browser gives a page few contexts, and a reader's machine may draw without a graphics processor. So all labs draw with one
  * renderer. Its canvas stands in the view that moves: nothing is copied and nobody waits for the drawing, which goes on in the
  * browser's own process. A view at rest shows a copy on a 2-D canvas, made when the renderer's canvas moves away. When several
- * views move at once the canvas stands in none of them and each picture is copied.
+ * views move at once the canvas stands in none of them and each picture is copied. Without a graphics processor a picture that
+ * moves is deferred, so that nobody waits for it there either.
  *
  * Pictures are drawn from requestAnimationFrame, and only where something changed.
  */
 
 import { ColorManagement, LinearSRGBColorSpace, PCFShadowMap, WebGLRenderer } from 'three'
+import { DeferredPicture } from './deferred.js'
 import { h } from './dom.js'
 
 const SHARPEST = 3 // device pixels per CSS pixel
@@ -22,6 +24,7 @@ ColorManagement.enabled = false
 export class Stage {
   constructor() {
     this.renderer = null
+    this.deferred = null
     this.views = new Set()
     this.movingViews = new Set()
     this.dirty = new Set()
@@ -40,6 +43,7 @@ export class Stage {
     this.renderer.shadowMap.enabled = !software
     this.renderer.shadowMap.type = PCFShadowMap
     this.software = software
+    if (software) this.deferred = new DeferredPicture(this.renderer)
     canvas.addEventListener('webglcontextrestored', () => this.views.forEach((view) => this.invalidate(view)))
   }
 
@@ -71,6 +75,10 @@ export class Stage {
   /** Plan to draw the picture of a view again. */
   invalidate(view) {
     this.dirty.add(view)
+    this.plan()
+  }
+
+  plan() {
     if (this.request === 0) this.request = requestAnimationFrame(this.tick)
   }
 
@@ -88,35 +96,74 @@ export class Stage {
       this.draw(previous)
       previous.copyCanvas(canvas)
     }
-    if (view === null) canvas.remove()
-    else {
-      view.takeCanvas(canvas)
-      this.draw(view)
-    }
+    canvas.remove()
+    if (view === null) return
+    if (this.deferred === null) this.show(view)
+    else this.invalidate(view)
   }
 
   paint(now) {
     this.request = 0
-    const views = [...this.dirty]
-    this.dirty.clear()
-    for (const view of views) {
-      if (!view.prepare(now)) continue
-      this.draw(view)
-      if (this.holder !== view) view.copyCanvas(this.renderer.domElement)
+    if (this.deferred?.view) {
+      this.finishDeferred()
+      return
+    }
+    const { holder, dirty } = this
+    const others = [...dirty].filter((view) => view !== holder && view.prepare(now))
+    // Drawing the others changes the canvas.
+    const isHolderDue = holder !== null && (others.length > 0 || dirty.has(holder)) && holder.prepare(now)
+    dirty.clear()
+    for (const view of others) this.show(view)
+    if (!isHolderDue) return
+    if (this.deferred === null || others.length > 0 || this.movingViews.size === 0) this.show(holder)
+    else {
+      this.deferred.begin(holder, this.sharpness, () => this.render(holder))
+      this.plan()
     }
   }
 
-  draw(view) {
-    const { width, height } = view
-    if (width === 0 || height === 0 || !view.scene) return
-    const { renderer } = this
-    if (this.width !== width || this.height !== height || this.ratio !== this.sharpness) {
-      this.width = width
-      this.height = height
-      this.ratio = this.sharpness
-      renderer.setPixelRatio(this.ratio)
-      renderer.setSize(width, height, false)
+  finishDeferred() {
+    const { deferred, holder } = this
+    this.plan()
+    if (!deferred.isFinished) return
+    if (deferred.view !== holder) deferred.drop()
+    else {
+      this.fit(holder)
+      deferred.copy()
+      this.place(holder)
     }
+  }
+
+  /** Draw the picture of a view and put it there. */
+  show(view) {
+    this.draw(view)
+    this.place(view)
+  }
+
+  place(view) {
+    const canvas = this.renderer.domElement
+    if (this.holder !== view) view.copyCanvas(canvas)
+    else if (canvas.parentNode !== view.element) view.takeCanvas(canvas)
+  }
+
+  draw(view) {
+    if (view.width === 0 || view.height === 0 || !view.scene) return
+    this.fit(view)
+    this.render(view)
+  }
+
+  /** Give the canvas the size of a view. */
+  fit({ width, height }) {
+    if (this.width === width && this.height === height && this.ratio === this.sharpness) return
+    this.width = width
+    this.height = height
+    this.ratio = this.sharpness
+    this.renderer.setPixelRatio(this.ratio)
+    this.renderer.setSize(width, height, false)
+  }
+
+  render(view) {
+    const { renderer } = this
     // A reflection is drawn first, which also makes the shadow maps.
     renderer.shadowMap.autoUpdate = true
     renderer.shadowMap.autoUpdate = !view.reflect(this)

@@ -50,7 +50,8 @@ export class Floor {
     const h = this.height + this.lift
     group.matrix.set(1, 0, -x, x * h, 0, 1, -y, y * h, 0, 0, 0, h, 0, 0, 0, 1)
     const material = new MeshBasicMaterial({
-      color: 0, opacity: 1 - (1 - SHADOW) ** (1 / count), transparent: true, depthWrite: false, side: DoubleSide,
+      color: 0, opacity: 1 - (1 - SHADOW) ** (1 / count), transparent: true, depthWrite: false,
+      side: DoubleSide, forceSinglePass: true, // in any order: the stencil lets each pixel be darkened once
       stencilWrite: true, stencilRef: i + 1, stencilFunc: NotEqualStencilFunc, stencilZPass: ReplaceStencilOp,
     }) // prettier-ignore
     const meshes = this.bodies.map((body) => {

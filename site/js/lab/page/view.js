@@ -120,8 +120,7 @@ export class View {
     this.world.update(this.frame, this.camera, this.ghost)
     aim(this.lens, this.camera, this.world.description, this.width, this.height)
     this.world.edges.update(this.width, this.height)
-    this.poster?.remove()
-    this.element.append(this.scale.element)
+    if (!this.scale.element.isConnected) this.element.append(this.scale.element)
     const viewHeight = 2 * this.camera.distance * Math.tan((this.lens.fov * Math.PI) / 360)
     this.scale.show(this.width, this.height, this.height / viewHeight)
     return true
@@ -135,6 +134,7 @@ export class View {
   takeCanvas(canvas) {
     canvas.setAttribute('role', 'img')
     canvas.setAttribute('aria-label', this.label)
+    this.poster?.remove()
     this.still.hidden = true
     this.element.append(canvas)
   }
@@ -142,6 +142,7 @@ export class View {
   /** Copy the picture on the stage's canvas. */
   copyCanvas(canvas) {
     const { still } = this
+    this.poster?.remove()
     if (still.width !== canvas.width || still.height !== canvas.height) {
       still.width = canvas.width
       still.height = canvas.height
