@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, Page
 
 from support.built_sites import Site
 from support.fixture_cases import fixture_text
-from support.lab_page import lab, watch_page
+from support.lab_page import lab, reach, watch_page
 
 pytestmark = [pytest.mark.browser, pytest.mark.long]
 
@@ -65,6 +65,22 @@ def test_a_mirror_shows_what_stands_on_it(drawn_page: tuple[Page, list[str]]) ->
     ready(page, DULL)
     mirrored, plain = (page.evaluate(REDS, number) for number in (MIRROR, DULL))
     assert mirrored > 1.5 * plain > 0
+
+
+@pytest.mark.parametrize("number", [0, MIRROR])
+def test_a_moving_picture_is_drawn_like_one_at_rest(
+    drawn_page: tuple[Page, list[str]], number: int
+) -> None:
+    page, console = drawn_page
+    ready(page, number)
+    element = lab(page, number)
+    element.get_by_role("button", name="Play").click()
+    element.locator(".lab-canvas").wait_for()
+    comparison = page.evaluate(COMPARE, number)
+    assert comparison["middle"] <= 2 and comparison["most"] <= 32, "coarser, but the same"
+    element.get_by_role("button", name="Pause").click()
+    reach(page, number, "paused")
+    assert console == []
 
 
 def test_with_a_graphics_processor_there_are_shadows_too(
