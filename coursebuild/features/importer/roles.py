@@ -237,10 +237,10 @@ def convert_wiki_link(whole: str, page: str, part: str, words: str, context: Les
     return write_link(words or page or part.lstrip("#"), address)
 
 
-_ATTRIBUTE = regex(r"(?<=\s)(href|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
+_ATTRIBUTE = regex(r"(?<=\s)(href|poster|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
 
 
-_WITH_FILE = regex(r"<(?:a|(?P<frame>iframe)|img|source|video)\b", re.IGNORECASE)
+_WITH_FILE = regex(r"<(?:a|audio|(?P<frame>iframe)|img|source|track|video)\b", re.IGNORECASE)
 _LOOK = regex(
     r"(?<=<table)(?:(?!\sid=)[^<>])*?\salign=[\"'\w]+"  # by which words would stand beside it
     r"|[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
@@ -259,7 +259,8 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     if name[0].isupper() and not name.isupper():  # no element of HTML
         return write_component(name, tag, context)
     kind = _WITH_FILE.match(tag)
-    attribute = _ATTRIBUTE.search(tag) if kind else None
+    attributes = [*_ATTRIBUTE.finditer(tag)] if kind else []
+    attribute = attributes[0] if attributes else None
     if attribute and kind and kind["frame"]:
         address = context.resolve_link(attribute[3])
         title = find_group(r"\stitle=[\"']([^\"']+)", tag)
@@ -269,16 +270,19 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     if attribute and re.match("<a[ ]", tag, re.IGNORECASE) and attribute[3].startswith("data:"):
         context.leave("link", f"a link to `{shorten_value(attribute[3])}`, data in the text")
         return tag[: attribute.start()].rstrip() + tag[attribute.end() + 1 :]
-    if attribute is None or re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
-        return tag
-    address = attribute[3].removeprefix("attachment:")
-    before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
-    if new_address := context.resolve_picture(address):
-        return before + new_address + after
-    context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
-    if re.match("<img", tag, re.IGNORECASE):
-        return find_group(r"\s(?i:alt)=[\"']([^\"']*)", tag)
-    return tag[: attribute.start()].rstrip() + after[1:]
+    for attribute in reversed(attributes):
+        if re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
+            continue
+        address = attribute[3].removeprefix("attachment:")
+        before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
+        if new_address := context.resolve_picture(address):
+            tag = before + new_address + after
+            continue
+        context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
+        if attribute[1].lower() == "src" and re.match("<img", tag, re.IGNORECASE):
+            return find_group(r"\s(?i:alt)=[\"']([^\"']*)", tag)
+        tag = tag[: attribute.start()].rstrip() + after[1:]
+    return tag
 
 
 def convert_attributes(match: re.Match[str]) -> str:
