@@ -162,7 +162,7 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("bounded", [row.shown for row in rows]),
         ("near small steps", [reach_text(row.near, row.searched) for row in rows]),
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
-        ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
+        ("theory", [_theory(row) for row in rows]),
     ]
     yield from fitted_table(columns, style.width)
     reasons: dict[str, list[str]] = {}
@@ -172,6 +172,11 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
                 reasons.setdefault(text, []).append(row.integrator)
     for reason, names in reasons.items():
         yield from style.wrap(f"beyond it {', '.join(dict.fromkeys(names))}: {reason}")
+
+
+def _theory(row: StableRow) -> str:
+    limit = row.theory
+    return seconds_text(limit, 5) if isinstance(limit, float) else reach_text(limit, row.searched)
 
 
 def _sweep(report: SweepReport, style: Style) -> Iterator[str]:

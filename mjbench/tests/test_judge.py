@@ -245,8 +245,9 @@ def test_five_lines_say_speed_error_verdict_and_limits() -> None:
     assert len(lines) == 5
     assert lines[0] == "Euler at 2 ms: 100 times real time"
     assert lines[3] == (
-        "Euler stays bounded at steps to 18.1 ms; near the motion of small steps at steps to 7 ms "
-        "(off by 0.1 rad at 0.8 s); with nothing going through at steps to 12 ms"
+        "Euler stays bounded at the steps tried to 18.1 ms; near the motion of small steps "
+        "at the steps tried to 7 ms (off by 0.1 rad at 0.8 s); with nothing going through "
+        "at the steps tried to 12 ms"
     )
     assert lines[4] == "not known: the error was not taken apart"
     all_stay = replace(
@@ -259,7 +260,7 @@ def test_five_lines_say_speed_error_verdict_and_limits() -> None:
     )
     lost = replace(limit, near=0.0183, near_reason="it is lost", through="all")
     lines = judged(rows_of((1, 0.5)), stable=(lost,)).verdict.lines
-    assert lines[3] == "Euler stays bounded at steps to 18.1 ms", "the rest says no more"
+    assert lines[3] == "Euler stays bounded at the steps tried to 18.1 ms", "the rest says no more"
 
 
 def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:
