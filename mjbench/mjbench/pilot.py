@@ -329,8 +329,6 @@ def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
         position_bound=2 * peaks.position + room * max(extent, 1.0) + round_and_round,
         sunk_bound=max(1.0, DEEPER * peaks.sunk),
     )
-    if (bound := scene.declaration.energy_bound) is not None:
-        return replace(setup, energy_bound=bound)
     if driving_force(model, scenario):
         return replace(setup, velocity_bound=room * max(peaks.velocity, fall, 1e-3))
     rest_energy = float(model.body_mass.sum()) * max(_REST_SPEED * fall, 1e-3) ** 2
