@@ -123,7 +123,7 @@ def _failure(model: Any, data: Any) -> SceneError:
         return SceneError(f"{message}: MuJoCo takes all of them as 0 then")
     setting = f"{simulation.integrator_of(model).value} at {seconds_text(model.opt.timestep)}"
     message = f"it diverges within {time} even under {setting}"
-    return _DivergenceError(message, help="another integrator may hold")
+    return _DivergenceError(message, help="another integrator, or smaller commands, may hold")
 
 
 def _pilot_of(model: Any, scene: Scene) -> Pilot:
