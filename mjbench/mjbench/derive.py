@@ -163,13 +163,8 @@ def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) ->
         return report
     rival = rival_row(report)
     rival_profile = next((p for p in profile if rival is report.rows[p.row]), None)
-    cost = None if rival is None else rival.cost
-    is_alike = cost is not None and cost.low <= 1 <= cost.high
-    return replace(
-        report,
-        profile=profile,
-        profile_text=profile_text(profile[0], rival_profile, is_alike=is_alike),
-    )
+    text = profile_text(profile[0], rival_profile, None if rival is None else rival.cost)
+    return replace(report, profile=profile, profile_text=text)
 
 
 def _is_cut_short(report: ScenarioReport) -> bool:
