@@ -290,7 +290,8 @@ def join_parts(
     `failures`: what was not measured.
     """
     if compiled_model.subject.is_fair:
-        scenarios = derive_seeds(scenarios)
+        names = [scenario.name for scenario in compiled_model.scenarios]
+        scenarios = derive_seeds(scenarios, names)
     report = SceneReport(
         model=compiled_model.subject.name,
         digest=compiled_model.subject.digest,

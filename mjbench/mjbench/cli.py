@@ -27,7 +27,7 @@ from mjbench.problems import all_problems
 from mjbench.pruning.survey import StoppedSurvey
 from mjbench.reports import PartFailure
 from mjbench.reports.diet_report import DietReport, Keep
-from mjbench.reports.model_report import SceneReport
+from mjbench.reports.model_report import CaseReport, SceneReport
 from mjbench.reports.page import scene_page
 from mjbench.reports.records import (
     BENCH,
@@ -295,21 +295,24 @@ def _stability(arguments: argparse.Namespace) -> int:
     recorded = None
     if arguments.check is not None:
         recorded = _read(arguments.check, STABILITY.decode)
-    machine, reports, parts = this_machine(pinned=True), [], Parts()
+    machine, reports, parts = this_machine(pinned=True), list[CaseReport](), Parts()
     for name, problem in cases.items():
         with one_processor():
             case = partial(measure_case, problem, machine, time.thread_time_ns)
             report = parts.run(name, case, None)
-        reports += [] if report is None else [report]
+        if report is None:
+            continue
+        if recorded is None and not arguments.json:  # all of them take long
+            print("\n" * bool(reports) + text.case_text(report, _style()), end="", flush=True)
+        reports.append(report)
     failures = [f"{failure.part} was not measured: {failure.reason}" for failure in parts.failures]
     if recorded is not None:
         names = {report.name for report in reports}
         departures = case_departures([c for c in recorded if c.name in names], reports)
         _print(arguments, _list(departures), text.departures_text(departures), failures)
         return 1 if departures or failures else 0
-    words = "\n".join(text.case_text(r, _style()) for r in reports)
     data = STABILITY.encode(tuple(reports))
-    _print(arguments, data, words, failures, record=not failures)
+    _print(arguments, data, "", failures, record=not failures)
     return _STOPPED if parts.stopped else int(bool(failures))
 
 

@@ -115,7 +115,6 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     room: Positive = 10.0
     horizon_error: dict[Literal["rad", "m"], Positive] = {}
     stable_for: Positive | None = None
-    energy_bound: float | None = None
     search: tuple[Positive, Positive] | None = None
 
     @property

@@ -108,41 +108,53 @@ def derive_failures(report: ScenarioReport, failures: Sequence[PartFailure]) -> 
     return _with_lines(replace(report, failures=tuple(failures)))
 
 
-def derive_seeds(reports: Sequence[ScenarioReport]) -> tuple[ScenarioReport, ...]:
-    """Reports on the same under commands from several seeds.
+def derive_seeds(
+    reports: Sequence[ScenarioReport], names: Sequence[str]
+) -> tuple[ScenarioReport, ...]:
+    """Reports on the same under commands from several seeds, which have these names.
 
     What is better under one seed is better if it is no worse under any: which one an author meets
     is chance.
     """
+    by_name = {report.name: report for report in reports}
     derived = []
     for report in reports:
         verdict, number = report.verdict, report.verdict.better
         if number is not None and report.own_row is not None and report.own_row.status == "ok":
             setting = report.rows[number].setting
-            rivals = (rival for rival in reports if rival is not report)
-            reason = next(filter(None, (_why_worse(rival, setting) for rival in rivals)), "")
-            if reason:
-                claim, semicolon, remark = verdict.text.partition("; ")
-                claim = claim.replace(" is better: it ", " ", 1)
-                text = f"no difference that holds: here {claim}, but {reason}{semicolon}{remark}"
+            others = [name for name in names if name != report.name]
+            reasons = {name: _why_worse(by_name.get(name), setting) for name in others}
+            worse = next((f"in {name} {reason}" for name, reason in reasons.items() if reason), "")
+            unknown = [name for name, reason in reasons.items() if reason is None]
+            claim, semicolon, remark = verdict.text.partition("; ")
+            claim = claim.replace(" is better: it ", " ", 1)
+            if worse:
+                text = f"no difference that holds: here {claim}, but {worse}{semicolon}{remark}"
+            else:
+                place = f"whether that holds in {', '.join(unknown)} was not measured"
+                text = f"{claim} here; {place}{semicolon}{remark}"
+            if worse or unknown:
                 verdict = replace(verdict, better=None, text=text)
                 report = _with_lines(replace(report, verdict=verdict))
         derived.append(report)
     return tuple(derived)
 
 
-def _why_worse(report: ScenarioReport, setting: MeasuredSetting) -> str:
-    """In what a setting is worse than the own one, in words; empty where it is in nothing."""
-    baseline = report.own_row
-    row = next((row for row in report.rows if row.setting == setting), None)
-    if baseline is None or baseline.status != "ok" or row is None:
+def _why_worse(report: ScenarioReport | None, setting: MeasuredSetting) -> str | None:
+    """In what a setting is worse than the own one; empty where in nothing, `None`: not measured."""
+    baseline = None if report is None else report.own_row
+    rows = () if report is None else report.rows
+    row = next((row for row in rows if row.setting == setting), None)
+    if report is None or baseline is None or row is None:
+        return None
+    if baseline.status != "ok":
         return ""
     if row.status != "ok":
-        return f"in {report.name} it is lost"
+        return "it is lost"
     if row.parted is not None and baseline.parted is None:
-        return f"in {report.name} it is off at {row.parted:.3g} s"
+        return f"it is off at {row.parted:.3g} s"
     worse = worse_texts(report, baseline, [row_ratios(report, baseline, row)])
-    return f"in {report.name} {worse[0]}" if worse else ""
+    return worse[0] if worse else ""
 
 
 def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) -> ScenarioReport:
@@ -151,13 +163,8 @@ def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) ->
         return report
     rival = rival_row(report)
     rival_profile = next((p for p in profile if rival is report.rows[p.row]), None)
-    cost = None if rival is None else rival.cost
-    is_alike = cost is not None and cost.low <= 1 <= cost.high
-    return replace(
-        report,
-        profile=profile,
-        profile_text=profile_text(profile[0], rival_profile, is_alike=is_alike),
-    )
+    text = profile_text(profile[0], rival_profile, None if rival is None else rival.cost)
+    return replace(report, profile=profile, profile_text=text)
 
 
 def _is_cut_short(report: ScenarioReport) -> bool:

@@ -123,7 +123,7 @@ def _failure(model: Any, data: Any) -> SceneError:
         return SceneError(f"{message}: MuJoCo takes all of them as 0 then")
     setting = f"{simulation.integrator_of(model).value} at {seconds_text(model.opt.timestep)}"
     message = f"it diverges within {time} even under {setting}"
-    return _DivergenceError(message, help="another integrator may hold")
+    return _DivergenceError(message, help="another integrator, or smaller commands, may hold")
 
 
 def _pilot_of(model: Any, scene: Scene) -> Pilot:
@@ -261,12 +261,17 @@ def horizon_errors(model: Any, scene: Scene) -> Array:
     return scales(model, errors.get("rad", math.inf), errors.get("m", math.inf))
 
 
+_KINDS = mujoco.mjtConstraint
+_LIMITS = [int(_KINDS.mjCNSTR_LIMIT_JOINT), int(_KINDS.mjCNSTR_LIMIT_TENDON)]
+
+
 class _Observer:
     """Looks at every state, and remembers what acted."""
 
     def __init__(self, model: Any) -> None:
-        self.contact = self.limit = self.constrained = False
-        self.friction = self.full = False
+        self.contact = self.constrained = self.friction = self.full = False
+        self._steps = self._limited_steps = 0
+        self._limits = set[tuple[int, int]]()
         clamped = [
             (int(model.actuator_actadr[i]) + k, model.actuator_actrange[i])
             for i in np.flatnonzero(model.actuator_actlimited)
@@ -278,8 +283,12 @@ class _Observer:
     def __call__(self, data: Any) -> None:
         if data.nefc:
             self.constrained = True
-            self.limit = self.limit or data.nl > 0
             self.friction = self.friction or data.nf > 0
+        self._steps += 1
+        if data.nl:
+            self._limited_steps += 1
+            rows = np.isin(data.efc_type, _LIMITS)
+            self._limits.update(zip(data.efc_type[rows], data.efc_id[rows], strict=True))
         self.contact = self.contact or data.ncon > 0
         if self._limited.size and not self.full:
             act = data.act[self._limited]
@@ -287,9 +296,11 @@ class _Observer:
 
     def jumps(self, model: Any) -> tuple[str, ...]:
         """The causes for jumps of accelerations, in words."""
+        part = f"{len(self._limits)} of {model.jnt_limited.sum() + model.tendon_limited.sum()}"
+        share = 100 * self._limited_steps / max(self._steps, 1)
         causes = (
             (self.contact, "contact"),
-            (self.limit, "a limit that is reached"),
+            (bool(self._limits), f"limits that are reached ({part}, {share:.0f} % of the time)"),
             (self.friction, "dry friction"),
             (self.full, "an activation at its limit"),
             (bool(model.nplugin), "a plugin"),
@@ -318,8 +329,6 @@ def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
         position_bound=2 * peaks.position + room * max(extent, 1.0) + round_and_round,
         sunk_bound=max(1.0, DEEPER * peaks.sunk),
     )
-    if (bound := scene.declaration.energy_bound) is not None:
-        return replace(setup, energy_bound=bound)
     if driving_force(model, scenario):
         return replace(setup, velocity_bound=room * max(peaks.velocity, fall, 1e-3))
     rest_energy = float(model.body_mass.sum()) * max(_REST_SPEED * fall, 1e-3) ** 2

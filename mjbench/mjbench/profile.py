@@ -20,6 +20,7 @@ import numpy as np
 
 from mjbench.costs import inputs_of
 from mjbench.problem import Array, Inputs
+from mjbench.reports import Interval
 from mjbench.reports.scene_report import PhaseProfile, WorkPrecisionRow
 from mjbench.reports.shown_errors import seconds_text
 from mjbench.reports.terminal import Style, fitted_table
@@ -169,17 +170,17 @@ def _phases(times: Array) -> dict[str, float]:
     return {**phases, "integration": integration, "other": forward - sum(phases.values())}
 
 
-_ALIKE = math.log(1.1)
-"""Times that differ by less are alike: the wall clock tells no more."""
+_ALIKE = 1.1
+"""Times that differ by a smaller factor are alike: the wall clock tells no more."""
 
 
 def profile_text(
-    own_profile: PhaseProfile, rival: PhaseProfile | None, *, is_alike: bool = False
+    own_profile: PhaseProfile, rival: PhaseProfile | None, cost: Interval | None = None
 ) -> str:
     """What of the time a verdict rests on that compares two settings.
 
-    Without a `rival` only what takes the longest is known. `is_alike`: whether the costs of both
-    scenarios are no more apart than timing can tell.
+    Without a `rival` only what takes the longest is known. `cost`: of the rival, relative to the
+    own setting's, by processor time, which other work on the machine does not disturb.
     """
     phases = [name for name in own_profile.phases if name != "other"]
     phase = max(phases, key=lambda name: own_profile.phases[name])
@@ -192,8 +193,11 @@ def profile_text(
         for name, time in own_profile.phases.items()
     }
     before, after = (sum(times) for times in zip(*pairs.values(), strict=True))
-    if is_alike or not (before and after) or abs(math.log(after / before)) < _ALIKE:
+    is_alike = cost is not None and cost.low <= 1 <= cost.high
+    if is_alike or not (before and after) or 1 / _ALIKE < after / before < _ALIKE:
         return f"{most}; the verdict rests on errors, not on time"
+    if cost is not None and not cost.low / _ALIKE <= after / before <= cost.high * _ALIKE:
+        return f"{most}; which the verdict rests on is not known: other work disturbed the timers"
     sign = math.copysign(1.0, after - before)
     phase = max(pairs, key=lambda name: sign * (pairs[name][1] - pairs[name][0]))
     change = " → ".join(map(_text, pairs[phase]))

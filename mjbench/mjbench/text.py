@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 from mjbench.profile import profile_lines
 from mjbench.reports import Interval
-from mjbench.reports.charts import plot_lines
+from mjbench.reports.charts import ON_FRONT, plot_lines
 from mjbench.reports.diet_report import (
     INTERFACE_LABEL,
     MEASURED_LABEL,
@@ -97,7 +97,10 @@ def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -
 def _settings(report: ScenarioReport, style: Style) -> Iterator[str]:
     rows = [row for row in report.rows if not row.idle]
     columns: list[tuple[str, list[str]]] = [
-        ("", [(">" if r.own else " ") + ("*" if r.front else " ") for r in rows]),
+        (
+            "",
+            [(">" if r.own else " ") + ("*" if r.front else "~" if r.lucky else " ") for r in rows],
+        ),
         ("setting", [r.name for r in rows]),
         ("cost", [interval_text(r.cost) for r in rows]),
     ]
@@ -120,12 +123,12 @@ def _settings(report: ScenarioReport, style: Style) -> Iterator[str]:
         ("× real time", ["" if r.realtime is None else f"{r.realtime:.3g}" for r in rows]),
     ]
     yield from fitted_table(columns, style.width)
-    yield "> the model's own   * nothing is better"
-    lost: dict[str, list[str]] = {}
+    yield f"> the model's own   * {ON_FRONT}" + "   ~ luck" * any(row.lucky for row in rows)
+    remarks: dict[str, list[str]] = {}
     for row in rows:
-        if row.status != "ok":
-            lost.setdefault(_lost(row.status, row.reasons), []).append(row.name)
-    for reason, names in lost.items():
+        if remark := _lost(row.status, row.reasons) or row.lucky:
+            remarks.setdefault(remark, []).append(row.name)
+    for reason, names in remarks.items():
         yield from style.wrap(f"{'; '.join(names)}: {reason}")
 
 
@@ -159,7 +162,7 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("bounded", [row.shown for row in rows]),
         ("near small steps", [reach_text(row.near, row.searched) for row in rows]),
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
-        ("theory", [reach_text(row.theory, row.searched, 5) for row in rows]),
+        ("theory", [_theory(row) for row in rows]),
     ]
     yield from fitted_table(columns, style.width)
     reasons: dict[str, list[str]] = {}
@@ -169,6 +172,11 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
                 reasons.setdefault(text, []).append(row.integrator)
     for reason, names in reasons.items():
         yield from style.wrap(f"beyond it {', '.join(dict.fromkeys(names))}: {reason}")
+
+
+def _theory(row: StableRow) -> str:
+    limit = row.theory
+    return seconds_text(limit, 5) if isinstance(limit, float) else reach_text(limit, row.searched)
 
 
 def _sweep(report: SweepReport, style: Style) -> Iterator[str]:

@@ -178,7 +178,8 @@ def test_what_is_better_under_one_seed_and_worse_under_another_is_not_better() -
         for n, rows in enumerate((good, masked()), 1)
     ]
     assert [seed.verdict.better for seed in seeds] == [1, None]
-    first, second = derive_seeds(seeds)
+    names = ["seed-1", "seed-2"]
+    first, second = derive_seeds(seeds, names)
     assert second == seeds[1]
     reason = "in seed-2 the error of position is 2.1 times as large over the whole run"
     claim = "no difference that holds: here implicit at 4.16667 ms takes 0.47 of the time and errs "
@@ -186,10 +187,14 @@ def test_what_is_better_under_one_seed_and_worse_under_another_is_not_better() -
     assert first.verdict.better is None
     assert any(reason in line for line in first.verdict.lines)
     alike = [replace(seeds[0], name=name) for name in ("seed-1", "seed-2")]
-    assert list(derive_seeds(alike)) == alike
+    assert list(derive_seeds(alike, names)) == alike
+    (alone,) = derive_seeds(alike[:1], names)
+    assert "here; whether that holds in seed-2 was not measured; " in alone.verdict.text
+    assert alone.verdict.better is None
     lost = masked(status="diverged", reasons=("it is not finite",))
-    (first, _) = derive_seeds([seeds[0], replace(judged(lost, contact_model=CONES), name="b")])
-    assert ", but in b it is lost; " in first.verdict.text
+    other = replace(judged(lost, contact_model=CONES), name="seed-2")
+    (first, _) = derive_seeds([seeds[0], other], names)
+    assert ", but in seed-2 it is lost; " in first.verdict.text
 
 
 def test_gains_are_told_with_their_spread() -> None:
@@ -224,7 +229,7 @@ def test_what_is_off_before_the_horizon_is_not_better() -> None:
     off = masked(**none, parted=0.9)
     assert judged(off, contact_model=CONES).verdict.better is None
     good = judged(masked(position=(0.0049, 0.0049)), contact_model=CONES)
-    (first, _) = derive_seeds([good, replace(judged(off, contact_model=CONES), name="b")])
+    (first, _) = derive_seeds([good, replace(judged(off, contact_model=CONES), name="b")], ["b"])
     assert ", but in b it is off at 0.9 s; " in first.verdict.text
 
 
@@ -245,8 +250,9 @@ def test_five_lines_say_speed_error_verdict_and_limits() -> None:
     assert len(lines) == 5
     assert lines[0] == "Euler at 2 ms: 100 times real time"
     assert lines[3] == (
-        "Euler stays bounded at steps to 18.1 ms; near the motion of small steps at steps to 7 ms "
-        "(off by 0.1 rad at 0.8 s); with nothing going through at steps to 12 ms"
+        "Euler stays bounded at the steps tried to 18.1 ms; near the motion of small steps "
+        "at the steps tried to 7 ms (off by 0.1 rad at 0.8 s); with nothing going through "
+        "at the steps tried to 12 ms"
     )
     assert lines[4] == "not known: the error was not taken apart"
     all_stay = replace(
@@ -259,7 +265,7 @@ def test_five_lines_say_speed_error_verdict_and_limits() -> None:
     )
     lost = replace(limit, near=0.0183, near_reason="it is lost", through="all")
     lines = judged(rows_of((1, 0.5)), stable=(lost,)).verdict.lines
-    assert lines[3] == "Euler stays bounded at steps to 18.1 ms", "the rest says no more"
+    assert lines[3] == "Euler stays bounded at the steps tried to 18.1 ms", "the rest says no more"
 
 
 def ladder(*errors: float, own_number: int = 0) -> tuple[WorkPrecisionRow, ...]:

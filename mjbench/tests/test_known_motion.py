@@ -70,7 +70,10 @@ def test_a_smooth_scene_is_integrated_twice() -> None:
     ("model", "reason"),
     [
         (pendulum(floor=-0.5), "contact"),
-        (pendulum("range='60 120' limited='true'"), "a limit that is reached"),
+        (
+            pendulum("range='60 120' limited='true'"),
+            "limits that are reached (1 of 1, 84 % of the time)",
+        ),
         (pendulum("frictionloss='0.2'"), "dry friction"),
     ],
     ids=["contact", "limit", "friction"],

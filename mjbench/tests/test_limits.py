@@ -37,6 +37,8 @@ def test_where_digits_do_not_hold_the_least_limit_is_given_and_why() -> None:
     assert limit_text(nowhere) == "none from 1 s on"
     near = StableRow("RK4", 0.056, (0.1, 1.0), None, 1.0, None, (0.05502, 0.05656))
     assert limit_text(near).startswith("55 ms; "), "not 60 ms"
+    spiky = replace(near, largest=0.01706, bracket=(0.01551, 0.01706))
+    assert limit_text(spiky) == "15 ms; from its own start 17 ms", "a start is lost at 15.7 ms"
 
 
 def test_the_sentence_tells_which_starts_it_speaks_of() -> None:
@@ -49,9 +51,8 @@ def test_the_sentence_tells_which_starts_it_speaks_of() -> None:
 
     all_steps, near = "every step tried, to 1000 s", "near the motion of small steps"
     assert sentence(largest="all", bracket=None) == f"RK4 stays bounded and {near} at {all_steps}"
-    text = (
-        f"RK4 stays bounded from every start at steps to 19 s; {near} from its own at {all_steps}"
-    )
+    text = f"RK4 stays bounded from every start at the steps tried to 19 s; {near} from its own "
+    text += f"at {all_steps}"
     assert sentence(largest="all", bracket=(19.0, HIGH)) == text
     text = f"RK4 stays bounded from every start at no step from 1 s on; {near} from its own at "
     assert sentence(largest="all", bracket=(0.0, HIGH)) == f"{text}{all_steps}"

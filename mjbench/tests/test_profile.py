@@ -129,13 +129,16 @@ def test_what_has_no_timer_is_no_phase() -> None:
 
 def test_the_rival_of_a_verdict_is_profiled_and_named() -> None:
     mine = row(own=True, seen=0.5, cost=1, dominated_by=1, name="Euler at 2 ms")
-    better = row(timestep=0.004, seen=0.4, cost=0.5, front=True, name="Euler at 4 ms")
+    better = row(timestep=0.004, seen=0.4, cost=0.67, front=True, name="Euler at 4 ms")
     dear_row = row("RK4", seen=0.1, cost=4, front=True)
     report = derive_scenario(scenario([mine, better, dear_row]), lambda _: ())
     assert list(compared_rows(report)) == [0, 1]
     pair = phases(collision=3, solver=6), phases(1, collision=0.5, solver=5.5)
     report = derive_profile(report, pair)
     assert "rests on collision" in report.profile_text
+    cheaper = replace(report.rows[1], cost=interval(0.5))
+    disturbed = replace(report, rows=(report.rows[0], cheaper, report.rows[2]))
+    assert "disturbed the timers" in derive_profile(disturbed, pair).profile_text
     alike = replace(report.rows[1], cost=replace(interval(1.0), low=0.8, high=1.2))
     dominated = replace(report.rows[0], dominated_by=1)
     report = derive_profile(replace(report, rows=(dominated, alike, report.rows[2])), pair)

@@ -139,3 +139,14 @@ def test_costs_that_are_uncertain_say_so() -> None:
     wide: WorkPrecisionRow = replace(row(own=True, seen=0.5), cost=Interval(1.0, 0.5, 2.0))
     text = scene_text(scene(derive_scenario(scenario([wide]), lambda _: ())))
     assert "1 ± 75 %" in text
+
+
+def test_an_error_that_is_luck_is_marked_with_its_reason() -> None:
+    rows = [row("Euler", 4e-3, seen=0.2), row("Euler", 2e-3, own=True, seen=0.5)]
+    report = derive_charts(derive_scenario(scenario(rows), lambda _: ()))
+    text = scene_text(scene(report), Style(80))
+    assert "\n     ~  Euler at 4 ms" in text and "errs more   ~ luck\n" in text
+    assert "Euler at 4 ms: its error rises with shorter timesteps\n" in text
+    assert (
+        report.charts[0].marks[1].text == "another is better, and worse in nothing, or it is luck"
+    )

@@ -86,7 +86,7 @@ def test_a_scene_that_blows_up_at_its_timesteps_is_measured_at_shorter_ones() ->
     assert (own_row.position, own_row.velocity, own_row.seen) == (None, None, None)
     text = "the scene does not run under its own setting, Euler at 100 ms: "
     assert report.verdict.text.startswith(text)
-    assert report.verdict.lines[3].startswith("Euler stays bounded at steps to 5.7")
+    assert report.verdict.lines[3].startswith("Euler stays bounded at the steps tried to 5.7")
     limits = {line.integrator: line.largest for line in report.stable}
     for name in ("Euler", "implicit", "implicitfast"):
         # Below 2/ω it swings within bounds, with up to 1/(1 − hω/2) times its energy.

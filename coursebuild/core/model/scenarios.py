@@ -180,9 +180,6 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
         Positive | None,
         describe("seconds over which a timestep has to be stable; else the duration"),
     ] = None
-    energy_bound: Annotated[
-        float | None, describe("J; the most potential and kinetic energy that the motion can have")
-    ] = None
     search: Annotated[
         tuple[Positive, Positive] | None,
         describe("seconds; the timesteps between which the largest stable one is sought"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 from markupsafe import Markup
@@ -283,8 +284,9 @@ def _reach(words: Strings, limit: Reach | None, row: StableRow) -> str:
             return words("measured.stable_all", time=high)
         case "none":
             return words("measured.stable_none", time=low)
-        case _:
-            return seconds_text(limit, 2)
+        case _:  # rounded down: beyond it runs are lost
+            unit = 10.0 ** (math.floor(math.log10(limit)) - 1)
+            return seconds_text(math.floor(limit / unit * (1 + 1e-9)) * unit, 2)
 
 
 def _theory(words: Strings, limit: Reach | None) -> str:

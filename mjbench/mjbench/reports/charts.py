@@ -72,6 +72,9 @@ class Chart(Record, frozen=True):
     """Without them there is no key."""
 
 
+ON_FRONT = "whatever is cheaper errs more"
+"""What is said of a run on the front."""
+
 _LETTERS = "EIFRDABCGHJKLMNOPQSTUVWXYZ"
 """Of lines, by their number: Euler, implicit, implicitfast, RK4, discrete, and others."""
 _WIDTH, _HEIGHT = 60, 14
@@ -108,7 +111,7 @@ def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
     yield f"{'':>11}{''.join(axis)}".rstrip()
     yield f"{'':>11}{chart.axes[0]}"
     names = [f"{_LETTERS[line.number % len(_LETTERS)]} {line.name}" for line in chart.lines]
-    keys = [f"{_OWN} the model's own", f"{_LOST} lost", "capital: nothing is better"]
+    keys = [f"{_OWN} the model's own", f"{_LOST} lost", f"capital: {ON_FRONT}"]
     yield "  ".join([*names, *keys])
     texts = [level.text for level, at in zip(levels, heights, strict=True) if at in near]
     if texts:

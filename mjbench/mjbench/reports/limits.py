@@ -34,21 +34,21 @@ def limit_text(row: StableRow) -> str:
     digits = math.floor(math.log10(low)) - math.ceil(math.log10(least) - 1e-9) + 1
     digits = digits if row.islands is None else min(digits, _FEW_DIGITS)
     if digits < 2:
-        most = seconds_text(high, 2)
+        most = _floor_text(high)
         if row.theory == high:
             reason = f"theory allows {most}"
         elif reach_bound(row.largest) >= 0.99 * high:
             reason = f"from its own start {most}"
         else:
             reason = f"elsewhere {most}"
-        return f"{seconds_text(low, 2)}; {reason}"
+        return f"{_floor_text(low)}; {reason}"
     value = float(f"{low:.{digits}g}")
     if value > high:
         value -= 10.0 ** (math.floor(math.log10(low)) + 1 - digits)
     return seconds_text(value, digits)
 
 
-def reach_text(limit: Reach | None, searched: tuple[float, float], digits: int = 2) -> str:
+def reach_text(limit: Reach | None, searched: tuple[float, float]) -> str:
     """A limit, and where it is none, what was tried; empty where it was not measured."""
     if limit is None:
         return ""
@@ -57,7 +57,13 @@ def reach_text(limit: Reach | None, searched: tuple[float, float], digits: int =
     if limit == "none":
         return f"none from {seconds_text(searched[0], 3)} on"
     assert isinstance(limit, float)
-    return seconds_text(limit, digits)
+    return _floor_text(limit)
+
+
+def _floor_text(limit: float) -> str:
+    """A limit in two digits, never above it: beyond it runs are lost."""
+    unit = 10.0 ** (math.floor(math.log10(limit)) - 1)
+    return seconds_text(math.floor(limit / unit * (1 + 1e-9)) * unit, 2)
 
 
 def stability_text(report: ScenarioReport) -> str:
@@ -79,7 +85,7 @@ def stability_text(report: ScenarioReport) -> str:
             continue  # not asked, or as long as it stays bounded
         text = bound if words == "bounded" else reach_text(limit, row.searched)
         if text[:1].isdigit():
-            text = f"steps to {text}"
+            text = f"the steps tried to {text}"
         else:
             is_all = text.startswith("all")
             text = f"every step tried, to {high}" if is_all else f"no step from {low} on"

@@ -12,7 +12,15 @@ import statistics
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from mjbench.reports import Interval
-from mjbench.reports.charts import Chart, ChartLevel, ChartLine, ChartMark, ChartPoint, chart_point
+from mjbench.reports.charts import (
+    ON_FRONT,
+    Chart,
+    ChartLevel,
+    ChartLine,
+    ChartMark,
+    ChartPoint,
+    chart_point,
+)
 from mjbench.reports.model_report import CaseReport, ErrorLine
 from mjbench.reports.scene_report import FLOORS, ErrorQuantity, ScenarioReport, WorkPrecisionRow
 from mjbench.reports.shown_errors import (
@@ -48,9 +56,10 @@ def _chart(report: ScenarioReport, quantity: ErrorQuantity, work: str) -> Chart:
         axis = f"cost, relative to {base}"
     lines = _lines(lambda name: _points(report, quantity, works, name))
     visible = [point for line in lines for point in line.points if point.y is not None]
-    marks = [ChartMark("front", "nothing is better")] if any(p.full for p in visible) else []
+    marks = [ChartMark("front", ON_FRONT)] if any(p.full for p in visible) else []
     if not all(point.full for point in visible):
-        marks.append(ChartMark("beaten", "another is better, and worse in nothing"))
+        luck = ", or it is luck" if any(row.lucky for row in report.rows) else ""
+        marks.append(ChartMark("beaten", f"another is better, and worse in nothing{luck}"))
     if any(point.small for point in visible):
         marks.append(ChartMark("other", "other solver, iterations or cone"))
     own_names = (setting_text(row.setting, row.setting) for row in report.rows if row.own)
@@ -188,7 +197,7 @@ def _point_title(
     if row.own:
         yield "the scene’s own setting"
     if row.front:
-        yield "nothing is better"
+        yield ON_FRONT
     elif row.dominated_by is not None:
         rival = setting_text(report.rows[row.dominated_by].setting, row.setting)
         yield f"{rival} is better, and worse in nothing"

@@ -63,7 +63,7 @@ def test_every_row_is_a_mark_that_says_what_it_is(narrow: bool) -> None:
     assert len(tooltips) == len(report.rows)
     assert (
         "RK4 at 20 ms · error 0.00307 · cost 0.39 ± 1 % · 50 steps · 200 evaluations · "
-        "nothing is better" in tooltips
+        "whatever is cheaper errs more" in tooltips
     )
     assert (
         "Euler at 2 ms · error 0.0048 · cost 1 ± 1 % · 500 steps · the scene’s own setting · "
@@ -111,10 +111,10 @@ def test_from_where_on_an_error_is_visible() -> None:
 def test_the_key_says_what_there_is_and_nothing_else() -> None:
     labels = texts(parse_plot(swing()))
     assert labels[-5:] == [
-        *("RK4", "nothing is better", "another is better, and worse in nothing"),
+        *("RK4", "whatever is cheaper errs more", "another is better, and worse in nothing"),
         *("the scene’s own: Euler at 2 ms", "run lost"),
     ]
-    assert texts(parse_plot(scenario([row(front=True)])))[-1] == "nothing is better"
+    assert texts(parse_plot(scenario([row(front=True)])))[-1] == "whatever is cheaper errs more"
 
 
 def test_eight_lines_differ_in_dash_and_mark() -> None:
