@@ -23,14 +23,14 @@ from coursebuild.features.importer.source_files import TOO_MUCH, find_group
 
 CALLOUTS = {
     **{name: name for name in model.CALLOUTS},
-    "hint": "tip",
+    **dict.fromkeys(("hint", "success"), "tip"),
     **dict.fromkeys(("attention", "failure", "bug"), "caution"),
     **dict.fromkeys(("danger", "error"), "warning"),
     **dict.fromkeys(("seealso", "info", "abstract", "summary", "quote", "topic"), "note"),
     **dict.fromkeys(("admonition", "margin", "sidebar", "dropdown", "example"), "note"),
     **dict.fromkeys(("aside", "details", "toggle", "todo"), "note"),
     **dict.fromkeys(("exercise", "question"), "try"),
-    **dict.fromkeys(("answer", "success"), "solution"),
+    "answer": "solution",
 }
 """Kinds of callouts here, by those that other tools have."""
 

@@ -7,12 +7,17 @@ is shown, and so is its label. An attribute whose value is computed has none her
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 
-from coursebuild.api import regex
+from coursebuild.api import marks, regex
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.source_files import find_group
 
-_BRACES = r"\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
+_STRING = r"(?:\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*'|`(?:\\.|[^`\\])*`)"
+_BRACES = r"\{[^{}]*\}"
+for _ in range(8):  # braces in braces; those in strings are text
+    _BRACES = rf"\{{(?>(?:(?>[^{{}}\"'`]+)|{_STRING}|[\"'`]|{_BRACES})*)\}}"
+_ATTRIBUTES = rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)"
 _STATEMENT = (
     r"(?:\A\n*|(?<=\n\n))"  # in a paragraph it is text
     r"(?:import[ ](?:(?:[\w$*{},. \t]|\n(?!\n))+?\sfrom[ ])?['\"]"
@@ -27,7 +32,7 @@ _PART = regex(
     r"|\{/\*(?P<comment>.*?)\*/\}"
     r"|(?P<expression>(?<![\\$#\w{}^])\{(?!#)[^{}\n`]+\})"
     r"|<(?P<end>/?)(?P<name>[A-Za-z][\w.]*)"
-    rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)>",
+    rf"{_ATTRIBUTES}>",
     re.MULTILINE | re.DOTALL,
 )
 _INDENT = regex(
@@ -36,6 +41,11 @@ _INDENT = regex(
     re.DOTALL,
 )
 """The indentation of what a component holds; code and tags are passed over."""
+_WORDS = regex(
+    rf"<(?P<name>[A-Z]\w*){_ATTRIBUTES}>"
+    r"\s*(?P<words>[^\s<>{}](?:[^<>{}\n]|\n(?!\n))*?)\s*</(?P=name)>"
+)
+"""A component that holds a few words."""
 _COMPUTED = regex(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
 _LABELS = [
     regex(rf"\s(?:{names})=(?:\"([^\"]*)\"|'([^']*)')")
@@ -47,6 +57,13 @@ _SENTENCE = regex(
     re.DOTALL,
 )
 """An attribute of more than a word that begins as a sentence does."""
+_VALUE = regex(rf"\s[\w-]+=(?P<value>{_BRACES})")
+_DATA = regex(
+    rf"(?P<brace>[{{}}])|(?:(?P<key>[\w$-]+)[\"']?\s*:\s*)?(?P<string>{_STRING})", re.DOTALL
+)
+"""What matters in a literal of JavaScript: where an object begins or ends, and its texts."""
+_HEADS = "title", "label", "name", "heading"
+_TARGETS = "href", "to", "link", "url"
 _ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
 """The address of a picture where it is computed."""
 
@@ -54,7 +71,15 @@ _ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.defau
 def without_jsx(text: str, context: LessonContext) -> str:
     """Return prose without JavaScript."""
     text = _INDENT.sub(lambda match: match["kept"] or "", text)
+    text = _WORDS.sub(_write_linked_words, text)
     return _PART.sub(lambda part: _convert_part(part, context), text)
+
+
+def _write_linked_words(component: re.Match[str]) -> str:
+    """Return a component that only leads somewhere as a link."""
+    title, value, address = (find_group(label, component["attributes"]) for label in _LABELS)
+    is_link = address and not (title or value)
+    return f"[{component['words']}]({address})" if is_link else component[0]
 
 
 def write_component(name: str, attributes: str, context: LessonContext) -> str:
@@ -69,7 +94,46 @@ def write_component(name: str, attributes: str, context: LessonContext) -> str:
     sentences = [text for _, text in _SENTENCE.findall(attributes) if text not in (words, address)]
     address = address if context.is_mdx else address and context.resolve_link(address)
     head = f"[{words}]({address})" if words and address else words
-    return " ".join([f"**{head}**" if head else "", *sentences]).strip()
+    whole = " ".join([f"**{head}**" if head else "", *sentences]).strip()
+    if not attributes.rstrip(" \n>").endswith("/"):  # what it shows stands in it
+        return whole
+    values = (match["value"][1:-1].strip() for match in _VALUE.finditer(attributes))
+    return "\n\n".join(filter(None, (whole, *map(_write_value, values))))
+
+
+def _write_value(value: str) -> str:
+    """Return the texts of a computed value: a list of its objects, or its code."""
+    if re.fullmatch(r"`[^`]+`", value):
+        is_line = "\n" not in value
+        return value if is_line else marks.fence("text", value.strip("`").strip("\n"))
+    if value[:1] != "[":
+        return ""
+    objects: list[tuple[int, dict[str, str]]] = []
+    around: list[dict[str, str]] = []
+    for part in _DATA.finditer(value):
+        if part["brace"] == "{":
+            objects.append((len(around), {}))
+            around.append(objects[-1][1])
+        elif part["brace"]:
+            around = around[:-1]
+        elif around:
+            key = part["key"] or next(reversed(around[-1]), "")  # the rest of a sum of strings
+            words = re.sub(r"\\(?=[\"'`\\])", "", part["string"][1:-1]).replace("\\n", " ")
+            around[-1][key] = around[-1].get(key, "") + words
+    return "\n".join("  " * depth + f"- {_write_object(fields)}" for depth, fields in objects)
+
+
+def _write_object(fields: Mapping[str, str]) -> str:
+    """Return an object in a line: its name with its address, and its other texts behind it."""
+    head, target = (next((k for k in keys if k in fields), "") for keys in (_HEADS, _TARGETS))
+    rest = [
+        text if re.match(r"(?!.*[<>{}|])\W*[A-Z].*[a-z] ", text) or "`" in text else f"`{text}`"
+        for key, text in fields.items()
+        if key not in (head, target)
+    ]
+    words = fields.get(head, "")
+    link = f"[{words}]({fields[target]})" if target and words else words
+    return ": ".join(filter(None, (link and f"**{link}**", " ".join(rest))))
 
 
 def _convert_part(part: re.Match[str], context: LessonContext) -> str:

@@ -101,7 +101,7 @@ _LINE = regex(
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
 _FIELDS = regex(
-    r"(?<![^\n]\n)(?:^:[A-Za-z][\w -]*:(?:[ \t]+\S[^\n]*)?(?:\n[ \t]+\S[^\n]*)*\n?)+^(?!.)",
+    r"(?<![^\n]\n)(?:^:[A-Za-z][\w. -]*:(?:[ \t]+\S[^\n]*)?(?:\n[ \t]+\S[^\n]*)*\n?)+^(?!.)",
     re.MULTILINE,
 )
 """A paragraph of lines such as `:name: words`, a list of fields in Sphinx."""
@@ -110,6 +110,8 @@ _EDGE = regex(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
 _PICTURE_LINE = regex(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)
 """A picture of HTML above words, which would be HTML as well."""
+_HOLDER = regex(r"[ \t]*<\w+\b[^<>]*\smarkdown(?:=.?(?:1|block).?)?(?:\s[^<>]*)?>[ \t]*")
+"""A tag of HTML around Markdown, which would be HTML without a blank line."""
 _EMPTY_HEADING = regex(r"[ ]{0,3}#{1,6}[ \t]*$")
 _ENDS = {"<!--": "-->", "$$": "$$"}
 _COMMENT = regex(
@@ -223,8 +225,9 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = account.replace(text, _FIELDS, _write_fields, "list of fields", change)
     for rule in _PARAGRAPHS:
         text = account.replace(text, *rule)
-    out, mark = [], ""
-    for number, line in enumerate(text.split("\n")):
+    out, mark, lines = [], "", text.split("\n")
+    for number, line in enumerate(lines):
+        is_open = _HOLDER.fullmatch(line) and any(map(str.strip, lines[number + 1 : number + 2]))
         edge = _EDGE.match(line)
         if edge is None and not mark:
             line = _rewrite_line(_EMPTY_HEADING.sub("", line), context.line_below(number))
@@ -232,7 +235,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
             mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
         elif edge is not None and edge[1].startswith(mark):
             mark = "" if mark else edge[1]
-        out.append(line)
+        out.append(f"{line}\n" if is_open else line)
 
     def leave_cells(line: int, cells: str) -> None:
         message = f"`{cells}`, cells of a row that no column of the table has"
@@ -337,7 +340,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if match["path"] is not None:
                 return write_link(words, context.resolve_anchor(to_anchor(match["path"])))
             return words if re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called) else whole
-        case "math" | "digits" if not whole.startswith(context.files.dollars):
+        case "math" | "digits" if not whole.startswith(context.files.dollars) or (
+            match["tex"] and _WORD.search(match["tex"])  # two prices
+        ):
             return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if context.files.dollars != "$":
             return rf"\({_rewrite_line(match['inner'], context)}\)"
