@@ -145,16 +145,20 @@ _KEPT = {
 }
 """What is Markdown here as well."""
 _OVER_LINES = regex(
-    r"(?<!`)(`+)(?!`).+?(?<!`)\1(?!`)"  # what looks like one in code is none
+    r"(?P<block>^[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)*(?P<mark>`{3,}|~{3,})[^`\n]*\n"
+    r"(?:(?![ \t>]*(?P=mark))[^\n]*\n)*[^\n]*)"  # what looks like one in code is none
+    r"|(?<!`)(?P<ticks>`+)(?!`)(?:[^\n]|\n(?![ \t]*(?:\n|[-+*>#|:]|\d+[.)]|`{3}|~{3})))+?"
+    r"(?<!`)(?P=ticks)(?!`)"
     r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
     r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
     r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
-    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
+    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)",
+    re.MULTILINE,
 )
-"""A role, a note, a citation, the address of a link or a formula that goes on in the next line."""
+"""Code, a role, a note, a citation, an address or a formula that goes on in the next line."""
 _TAG_OVER_LINES = regex(
     r"<(?i:a|img|source|video|iframe)[ \t\n](?=[^<>\n]*\n)[^<>]*>(?:\s*</iframe>)?"
 )
@@ -264,6 +268,8 @@ _BLOCKS: Rules = (
 
 def _join_lines(match: re.Match[str]) -> str:
     """Return a role or note on one line, and behind it the line ends that stood in it."""
+    if match["block"]:
+        return match[0]
     lines = match[0].split("\n")
     return " ".join(line.strip() for line in lines) + "\n" * (len(lines) - 1)
 
@@ -340,10 +346,10 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if match["path"] is not None:
                 return write_link(words, context.resolve_anchor(to_anchor(match["path"])))
             return words if re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called) else whole
-        case "math" | "digits" if not whole.startswith(context.files.dollars) or (
-            match["tex"] and _WORD.search(match["tex"])  # two prices
-        ):
+        case "math" | "digits" if not whole.startswith(context.files.dollars):
             return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
+        case "digits" if _WORD.search(match["tex"]):  # two prices
+            return "$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if context.files.dollars != "$":
             return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":

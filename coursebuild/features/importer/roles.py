@@ -90,7 +90,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case "kbd" | "sub" | "sup" | "u" | "underline" | "del" | "strike":
             tag = {"underline": "u", "strike": "del"}.get(name, name)
             return f"<{tag}>{body}</{tag}>"
-        case _ if name.rpartition(":")[2] in _CODE_ROLES:
+        case _ if name.rpartition(":")[2] in CODE_ROLES:
             name_of_part = re.sub(r"^(?:!|~(?:.*\.)?)", "", target)  # as Sphinx shows it
             return f"`{words or name_of_part}`"
         case _ if name in _WORD_ROLES:
@@ -103,7 +103,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             return f"`{body}`"
 
 
-_CODE_ROLES = frozenset(
+CODE_ROLES = frozenset(
     "code file command program option envvar samp func function class mod module meth method attr "
     "attribute data const exc exception obj object type".split()
 )
@@ -170,7 +170,8 @@ _FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split
 
 
 _CALL = regex(r"\{\{-?[ ]*[\w.]+\((?P<arguments>.*)\)[ ]*-?\}\}")
-_QUOTED = regex(r"\"([^\"]+)\"|'([^']+)'")
+_QUOTED = regex(r"(?<![=\w])(?:\"([^\"]+)\"|'([^']+)')")
+"""A text among arguments, but no setting."""
 
 
 def convert_substitution(whole: str, context: LessonContext, is_statement: bool) -> str:
@@ -197,7 +198,8 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     if (value := context.substitutions.get(key)) is not None:
         return value
     call = _CALL.fullmatch(whole)
-    texts = ["".join(text) for text in _QUOTED.findall(call["arguments"])] if call else []
+    holder = call["arguments"] if call else whole * whole.startswith("{{<")
+    texts = ["".join(text) for text in _QUOTED.findall(holder)]
     message = f"`{whole}`, which its tool replaces: write what it stands for"
     context.leave("substitution", message)
     texts = texts or [whole[3:-3].strip() if whole.startswith("{{<") else whole]
