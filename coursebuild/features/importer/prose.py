@@ -38,6 +38,7 @@ from coursebuild.features.importer.roles import (
     convert_tag,
     convert_wiki_link,
     draw_emoji,
+    join_broken_lines,
     words_of_link,
     write_icon,
     write_link,
@@ -144,21 +145,6 @@ _KEPT = {
     regex(r"\$\$[^$]+\n[^$]*\$\$"): "formula",
 }
 """What is Markdown here as well."""
-_OVER_LINES = regex(
-    r"(?P<block>^[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)*(?P<mark>`{3,}|~{3,})[^`\n]*\n"
-    r"(?:(?![ \t>]*(?P=mark))[^\n]*\n)*[^\n]*)"  # what looks like one in code is none
-    r"|(?<!`)(?P<ticks>`+)(?!`)(?:[^\n]|\n(?![ \t]*(?:\n|[-+*>#|:]|\d+[.)]|`{3}|~{3})))+?"
-    r"(?<!`)(?P=ticks)(?!`)"
-    r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
-    r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
-    r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
-    r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
-    r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
-    r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
-    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)",
-    re.MULTILINE,
-)
-"""Code, a role, a note, a citation, an address or a formula that goes on in the next line."""
 _TAG_OVER_LINES = regex(
     r"<(?i:a|img|source|video|iframe)[ \t\n](?=[^<>\n]*\n)[^<>]*>(?:\s*</iframe>)?"
 )
@@ -218,7 +204,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = read_escapes(text)
     if context.files.dollars != "\n":
         text = normalize_formulas(text)
-    text = _OVER_LINES.sub(_join_lines, text)
+    text = join_broken_lines(text)
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
     for abbreviation in _ABBREVIATION.finditer(text):
         message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
@@ -264,14 +250,6 @@ _BLOCKS: Rules = (
     (_HELD_COMMENT, r"\1\2", "comment", "without the parentheses that hold nothing else"),
 )
 """What is changed before the lines of a text are read, and how the account calls it."""
-
-
-def _join_lines(match: re.Match[str]) -> str:
-    """Return a role or note on one line, and behind it the line ends that stood in it."""
-    if match["block"]:
-        return match[0]
-    lines = match[0].split("\n")
-    return " ".join(line.strip() for line in lines) + "\n" * (len(lines) - 1)
 
 
 def _write_fields(match: re.Match[str]) -> str:

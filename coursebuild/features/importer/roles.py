@@ -22,6 +22,33 @@ from coursebuild.features.importer.context import (
 from coursebuild.features.importer.jsx import write_component
 from coursebuild.features.importer.source_files import find_group, title_of_file
 
+_BLOCK_START = r"[ \t]*(?:\n|[>|]|(?:[-*+]|\#+|\d+[.)])[ \t\n]|:::|```|~~~)"
+_OVER_LINES = regex(
+    r"(?P<block>^[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)*(?P<mark>`{3,}|~{3,})[^`\n]*\n"
+    r"(?:(?![ \t>]*(?P=mark))[^\n]*\n)*[^\n]*)"  # what looks like one in code is none
+    rf"|(?<!`)(?P<ticks>`+)(?!`)(?:[^\n]|\n(?!{_BLOCK_START}))+?"
+    r"(?<!`)(?P=ticks)(?!`)"
+    r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
+    r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
+    r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
+    r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
+    r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
+    r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
+    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)",
+    re.MULTILINE,
+)
+"""Code, a role, a note, a citation, an address or a formula that goes on in the next line."""
+
+
+def join_broken_lines(text: str) -> str:
+    """Return prose in which such a part is in one line, with its line ends behind it."""
+
+    def join(part: re.Match[str]) -> str:
+        lines = [line.strip() for line in part[0].split("\n")]
+        return part[0] if part["block"] else " ".join(lines) + "\n" * (len(lines) - 1)
+
+    return _OVER_LINES.sub(join, text)
+
 
 def write_link(text: str, address: str, title: str = "") -> str:
     """Return a link; its text alone where there is no address."""
