@@ -217,7 +217,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = account.replace(text, *rule)
     out, mark, lines = [], "", text.split("\n")
     for number, line in enumerate(lines):
-        is_open = _HOLDER.fullmatch(line) and any(map(str.strip, lines[number + 1 : number + 2]))
+        below = "".join(lines[number + 1 : number + 2])
+        is_open = _HOLDER.fullmatch(line) and re.match(r"[ ]{,3}\S", below)
         edge = _EDGE.match(line)
         if edge is None and not mark:
             line = _rewrite_line(_EMPTY_HEADING.sub("", line), context.line_below(number))
