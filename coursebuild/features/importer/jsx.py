@@ -7,7 +7,6 @@ is shown, and so is its label. An attribute whose value is computed has none her
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 
 from coursebuild.api import marks, regex
 from coursebuild.features.importer.context import LessonContext
@@ -62,8 +61,9 @@ _DATA = regex(
     rf"(?P<brace>[{{}}])|(?:(?P<key>[\w$-]+)[\"']?\s*:\s*)?(?P<string>{_STRING})", re.DOTALL
 )
 """What matters in a literal of JavaScript: where an object begins or ends, and its texts."""
-_HEADS = "title", "label", "name", "heading"
-_TARGETS = "href", "to", "link", "url"
+_NAMES = ("title", "label", "name", "heading")
+_ADDRESSES = ("href", "to", "link", "url")
+_TARGET = regex(rf"[^{{}}]*?\b(?:{'|'.join(_ADDRESSES)})\s*:\s*[\"']([^\"'\n]*)[\"']")
 _ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
 """The address of a picture where it is computed."""
 
@@ -102,38 +102,23 @@ def write_component(name: str, attributes: str, context: LessonContext) -> str:
 
 
 def _write_value(value: str) -> str:
-    """Return the texts of a computed value: a list of its objects, or its code."""
+    """Return the texts of a computed value: its code, or an item of a list for each object."""
     if re.fullmatch(r"`[^`]+`", value):
-        is_line = "\n" not in value
-        return value if is_line else marks.fence("text", value.strip("`").strip("\n"))
-    if value[:1] != "[":
-        return ""
-    objects: list[tuple[int, dict[str, str]]] = []
-    around: list[dict[str, str]] = []
-    for part in _DATA.finditer(value):
-        if part["brace"] == "{":
-            objects.append((len(around), {}))
-            around.append(objects[-1][1])
-        elif part["brace"]:
-            around = around[:-1]
-        elif around:
-            key = part["key"] or next(reversed(around[-1]), "")  # the rest of a sum of strings
-            words = re.sub(r"\\(?=[\"'`\\])", "", part["string"][1:-1]).replace("\\n", " ")
-            around[-1][key] = around[-1].get(key, "") + words
-    return "\n".join("  " * depth + f"- {_write_object(fields)}" for depth, fields in objects)
-
-
-def _write_object(fields: Mapping[str, str]) -> str:
-    """Return an object in a line: its name with its address, and its other texts behind it."""
-    head, target = (next((k for k in keys if k in fields), "") for keys in (_HEADS, _TARGETS))
-    rest = [
-        text if re.match(r"(?!.*[<>{}|])\W*[A-Z].*[a-z] ", text) or "`" in text else f"`{text}`"
-        for key, text in fields.items()
-        if key not in (head, target)
-    ]
-    words = fields.get(head, "")
-    link = f"[{words}]({fields[target]})" if target and words else words
-    return ": ".join(filter(None, (link and f"**{link}**", " ".join(rest))))
+        return value if "\n" not in value else marks.fence("text", value.strip("`").strip("\n"))
+    items, depth = [""], 0
+    for part in _DATA.finditer(value if value[:1] == "[" else ""):
+        if brace := part["brace"]:
+            depth += 1 if brace == "{" else -1
+            items += [f"{'  ' * (depth - 1)}- "] * (brace == "{")
+        elif part["key"] not in _ADDRESSES:
+            text = re.sub(r"\\(?=[\"'`\\])", "", part["string"][1:-1]).replace("\\n", " ")
+            if part["key"] in _NAMES and items[-1].endswith("- "):
+                target = _TARGET.match(value, part.end())
+                items[-1] += f"**[{text}]({target[1]})**: " if target else f"**{text}**: "
+            else:
+                is_code = part["key"] and not re.search(r"`|\A\W*[A-Z][^<]*\w \w\w[^<]*\Z", text)
+                items[-1] += f"`{text}` " if is_code else f"{text} "
+    return "\n".join(item.rstrip(": ") for item in items if item)
 
 
 def _convert_part(part: re.Match[str], context: LessonContext) -> str:
