@@ -170,10 +170,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         names = (stem, path, f"{folder}/index", f"{folder}/README", own_route, bare)
         target = next(filter(None, map(self.targets.get, names)), None)
         if target is None and address.startswith("/"):  # the folder of a site's texts is no route
-            ends = {f"/{bare}", f"/{bare}/index"}
-            found = {
-                link for stem, link in self.targets.items() if any(map(f"/{stem}".endswith, ends))
-            }
+            ends = (f"/{bare}", f"/{bare}/index")
+            found = {link for stem, link in self.targets.items() if f"/{stem}".endswith(ends)}
             target = found.pop() if len(found) == 1 else None
         if target is not None:
             return target + anchor

@@ -39,6 +39,7 @@ from coursebuild.features.importer.roles import (
     convert_wiki_link,
     draw_emoji,
     join_broken_lines,
+    rewrite_html_links,
     words_of_link,
     write_icon,
     write_link,
@@ -206,6 +207,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = normalize_formulas(text)
     text = join_broken_lines(text)
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
+    text = rewrite_html_links(text, context)
     for abbreviation in _ABBREVIATION.finditer(text):
         message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
         context.leave("abbreviation", message)

@@ -20,7 +20,7 @@ from coursebuild.features.importer.context import (
     to_anchor,
 )
 from coursebuild.features.importer.jsx import write_component
-from coursebuild.features.importer.source_files import find_group, title_of_file
+from coursebuild.features.importer.source_files import find_group, stem_of, title_of_file
 
 _BLOCK_START = r"[ \t]*(?:\n|[>|]|(?:[-*+]|\#+|\d+[.)])[ \t\n]|:::|```|~~~)"
 _OVER_LINES = regex(
@@ -304,10 +304,37 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
     if new_address := context.resolve_picture(address):
         return before + new_address + after
-    context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
+    problem = "which is not in the folder"
+    if stem_of(context.resolve_path(urlsplit(address).path)) in context.targets:
+        problem = "which HTML cannot link: write the link in Markdown"
+    context.leave("tag of HTML", f"the file `{address}`, {problem}")
     if re.match("<img", tag, re.IGNORECASE):
         return find_group(r"\s(?i:alt)=[\"']([^\"']*)", tag)
     return tag[: attribute.start()].rstrip() + after[1:]
+
+
+_HTML_LINK = regex(
+    r"<a[ \t](?:[^<>]*[ \t])?href=([\"'])(?P<page>[^\"'\n:]+)\1[^<>]*>"
+    r"(?P<words>(?:(?!</?a\b)[^\n`])*)</a>",
+    re.IGNORECASE,
+)
+_IN_HTML = regex(
+    r"(?:\A|\n[ \t]*\n)\s*<(?!/?(?:a|b|code|em|i|img|span|strong)\b)(?:[^\n]|\n(?!\s*\n))*\Z"
+)
+"""A paragraph that begins with an element around blocks, in which Markdown is not read."""
+
+
+def rewrite_html_links(text: str, context: LessonContext) -> str:
+    """Return prose whose links to texts are in Markdown: in HTML they have no address."""
+
+    def rewrite(link: re.Match[str]) -> str:
+        before = text[: link.start()]
+        is_text = stem_of(context.resolve_path(urlsplit(link["page"]).path)) in context.targets
+        if not is_text or _IN_HTML.search(before) or before.rpartition("\n\n")[2].count("`") % 2:
+            return link[0]
+        return f"[{link['words']}]({link['page']})"
+
+    return _HTML_LINK.sub(rewrite, text)
 
 
 def convert_attributes(match: re.Match[str]) -> str:
