@@ -171,8 +171,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         target = next(filter(None, map(self.targets.get, names)), None)
         if target is None and address.startswith("/"):  # the folder of a site's texts is no route
             ends = (f"/{bare}", f"/{bare}/index")
-            found = {link for stem, link in self.targets.items() if f"/{stem}".endswith(ends)}
-            target = found.pop() if len(found) == 1 else None
+            links = {link for stem, link in self.targets.items() if f"/{stem}".endswith(ends)}
+            target = links.pop() if len(links) == 1 else None
         if target is not None:
             return target + anchor
         if path in self.files:
