@@ -91,9 +91,10 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             name, _, title = (part.strip() for part in head.partition("|"))
             if name == "tab":
                 return _write_tab(title, text, context)
-            if name in ("html", "define", "caption", ""):
+            options = find_group(r"\A((?:[ ]{4}[\w-]+:.*(?:\n|\Z))+)", text)
+            text, name = text[len(options) :], find_group(r" type:[ ]*(\S+)", options) or name
+            if name in ("html", "define", "") or name.endswith("caption"):
                 return _convert_nested(text, context)
-            text = re.sub(r"\A(?:[ ]{4}[\w-]+:.*\n?)+", "", text)
             return _write_callout(name, title, text, context, name == "details")
         case _:
             return _convert_fence(head, text, context)
@@ -115,7 +116,7 @@ def _write_tab(title: str, text: str, context: LessonContext) -> str:
 def _convert_division(head: str, text: str, context: LessonContext) -> str:
     """Convert what stands between colons: a callout of Quarto or Docusaurus, or a division."""
     callout = re.search(r"callout-(\w+)", head)
-    plain = re.fullmatch(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?", head)  # as in Docusaurus
+    plain = None if callout else _PLAIN_CALLOUT.fullmatch(head)
     label = re.search(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", head)
     title = find_group(_TITLE, head)
     classes = re.findall(r"\.([\w-]+)", head)
@@ -142,6 +143,8 @@ def _convert_division(head: str, text: str, context: LessonContext) -> str:
     return _convert_nested(text, context)
 
 
+_PLAIN_CALLOUT = regex(r"([A-Za-z][\w-]*)(?:\[(.*)\]|[ \t]+(.*))?")
+"""The head of a callout of Docusaurus."""
 _PROOF_CLASSES = ("theorem", "lemma", "definition", "proof", "remark", "solution", "exercise")
 
 

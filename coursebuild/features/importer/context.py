@@ -166,9 +166,13 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         anchor = f"#{parts.fragment}" if parts.fragment else ""
         stem = stem_of(path)  # the first text of a folder is often called by the folder
         folder = path if stem == path else stem.removesuffix("/index")
-        own_route = path.removeprefix("docs/")
-        names = (stem, path, f"{folder}/index", f"{folder}/README", own_route)
+        own_route, bare = path.removeprefix("docs/"), without_order(stem)
+        names = (stem, path, f"{folder}/index", f"{folder}/README", own_route, bare)
         target = next(filter(None, map(self.targets.get, names)), None)
+        if target is None and address.startswith("/"):  # the folder of a site's texts is no route
+            ends = (f"/{bare}", f"/{bare}/index")
+            links = {link for stem, link in self.targets.items() if f"/{stem}".endswith(ends)}
+            target = links.pop() if len(links) == 1 else None
         if target is not None:
             return target + anchor
         if path in self.files:
@@ -303,6 +307,11 @@ def script_path_of(document: str) -> str:
     """Return the path of the script that the cells of a lesson or page become, by its own path."""
     words = re.findall("[a-z0-9]+", posixpath.basename(stem_of(document)).lower())
     return f"examples/{'' if words and words[0].isalpha() else 'l'}{'_'.join(words)}.py"
+
+
+def without_order(path: str) -> str:
+    """Return a path without the numbers that only order its names; many tools' links lack them."""
+    return re.sub(r"(?:^|(?<=/))\d+[-_.]+(?=[^\W\d])", "", path)
 
 
 def label_anchor(label: str) -> str:

@@ -25,7 +25,12 @@ from coursebuild.features.importer.anchors import find_anchors
 from coursebuild.features.importer.blocks import convert_segment
 from coursebuild.features.importer.cells import print_values
 from coursebuild.features.importer.contents import read_contents
-from coursebuild.features.importer.context import LessonContext, script_path_of, to_anchor
+from coursebuild.features.importer.context import (
+    LessonContext,
+    script_path_of,
+    to_anchor,
+    without_order,
+)
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
 from coursebuild.features.importer.jsx import MDX
 from coursebuild.features.importer.lost_words import find_lost_words
@@ -310,7 +315,8 @@ def _convert_texts(
 ) -> tuple[dict[str, bytes], LessonContext]:
     routes = ((text.substitutions.get("slug", "").strip("/"), text.link) for text in texts)
     targets = {route: link for route, link in routes if route}
-    targets |= {stem_of(text.file): text.link for text in texts if text.file}
+    stems = {stem_of(text.file): text.link for text in texts if text.file}
+    targets |= {without_order(stem): link for stem, link in stems.items()} | stems
     texts = [text for text in texts if text.path]
     context = LessonContext(
         targets=targets,

@@ -17,20 +17,20 @@ from coursebuild.features.importer.context import NUMBERED, LessonContext, label
 from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.roles import convert_role, words_of_link, write_link
+from coursebuild.features.importer.roles import CODE_ROLES, convert_role, words_of_link, write_link
 from coursebuild.features.importer.rst import read_rst
 from coursebuild.features.importer.source_files import TOO_MUCH, find_group
 
 CALLOUTS = {
     **{name: name for name in model.CALLOUTS},
-    "hint": "tip",
+    **dict.fromkeys(("hint", "success"), "tip"),
     **dict.fromkeys(("attention", "failure", "bug"), "caution"),
     **dict.fromkeys(("danger", "error"), "warning"),
     **dict.fromkeys(("seealso", "info", "abstract", "summary", "quote", "topic"), "note"),
     **dict.fromkeys(("admonition", "margin", "sidebar", "dropdown", "example"), "note"),
     **dict.fromkeys(("aside", "details", "toggle", "todo"), "note"),
     **dict.fromkeys(("exercise", "question"), "try"),
-    **dict.fromkeys(("answer", "success"), "solution"),
+    "answer": "solution",
 }
 """Kinds of callouts here, by those that other tools have."""
 
@@ -175,6 +175,10 @@ def _write(directive: Directive, context: LessonContext) -> str:
             return rewrite_prose(f"[{words}]({address})", context)
         case "epigraph" | "pull-quote" | "blockquote" | "highlights":
             return marks.block_quote(directive.nested(text))
+        case _ if name.rpartition(":")[2] in CODE_ROLES:  # the signature of what has this kind
+            return "\n\n".join(
+                (*(f"`{line}`" for line in argument.splitlines()), directive.nested(text))
+            )
         case _ if name in _MAPS:
             return ""
         case "eval-rst":

@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import re
 
-from coursebuild.api import regex
+from coursebuild.api import marks, regex
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.source_files import find_group
 
-_BRACES = r"\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
+_STRING = r"(?:\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*'|`(?:\\.|[^`\\])*`)"
+_BRACES = r"\{[^{}]*\}"
+for _ in range(8):  # braces in braces; those in strings are text
+    _BRACES = rf"\{{(?>(?:(?>[^{{}}\"'`]+)|{_STRING}|[\"'`]|{_BRACES})*)\}}"
+_ATTRIBUTES = rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)"
 _STATEMENT = (
     r"(?:\A\n*|(?<=\n\n))"  # in a paragraph it is text
     r"(?:import[ ](?:(?:[\w$*{},. \t]|\n(?!\n))+?\sfrom[ ])?['\"]"
@@ -27,7 +31,7 @@ _PART = regex(
     r"|\{/\*(?P<comment>.*?)\*/\}"
     r"|(?P<expression>(?<![\\$#\w{}^])\{(?!#)[^{}\n`]+\})"
     r"|<(?P<end>/?)(?P<name>[A-Za-z][\w.]*)"
-    rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)>",
+    rf"{_ATTRIBUTES}>",
     re.MULTILINE | re.DOTALL,
 )
 _INDENT = regex(
@@ -36,6 +40,11 @@ _INDENT = regex(
     re.DOTALL,
 )
 """The indentation of what a component holds; code and tags are passed over."""
+_WORDS = regex(
+    rf"<(?P<name>[A-Z]\w*){_ATTRIBUTES}>"
+    r"\s*(?P<words>[^\s<>{}](?:[^<>{}\n]|\n(?!\n))*?)\s*</(?P=name)>"
+)
+"""A component that holds a few words."""
 _COMPUTED = regex(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
 _LABELS = [
     regex(rf"\s(?:{names})=(?:\"([^\"]*)\"|'([^']*)')")
@@ -47,6 +56,14 @@ _SENTENCE = regex(
     re.DOTALL,
 )
 """An attribute of more than a word that begins as a sentence does."""
+_VALUE = regex(rf"\s[\w-]+=(?P<value>{_BRACES})")
+_DATA = regex(
+    rf"(?P<brace>[{{}}])|(?:(?P<key>[\w$-]+)[\"']?\s*:\s*)?(?P<string>{_STRING})", re.DOTALL
+)
+"""What matters in a literal of JavaScript: where an object begins or ends, and its texts."""
+_NAMES = ("title", "label", "name", "heading")
+_ADDRESSES = ("href", "to", "link", "url")
+_TARGET = regex(rf"[^{{}}]*?\b(?:{'|'.join(_ADDRESSES)})\s*:\s*[\"']([^\"'\n]*)[\"']")
 _ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.default)?")
 """The address of a picture where it is computed."""
 
@@ -54,7 +71,15 @@ _ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.defau
 def without_jsx(text: str, context: LessonContext) -> str:
     """Return prose without JavaScript."""
     text = _INDENT.sub(lambda match: match["kept"] or "", text)
+    text = _WORDS.sub(_write_linked_words, text)
     return _PART.sub(lambda part: _convert_part(part, context), text)
+
+
+def _write_linked_words(component: re.Match[str]) -> str:
+    """Return a component that only leads somewhere as a link."""
+    title, value, address = (find_group(label, component["attributes"]) for label in _LABELS)
+    is_link = address and not (title or value)
+    return f"[{component['words']}]({address})" if is_link else component[0]
 
 
 def write_component(name: str, attributes: str, context: LessonContext) -> str:
@@ -69,7 +94,31 @@ def write_component(name: str, attributes: str, context: LessonContext) -> str:
     sentences = [text for _, text in _SENTENCE.findall(attributes) if text not in (words, address)]
     address = address if context.is_mdx else address and context.resolve_link(address)
     head = f"[{words}]({address})" if words and address else words
-    return " ".join([f"**{head}**" if head else "", *sentences]).strip()
+    whole = " ".join([f"**{head}**" if head else "", *sentences]).strip()
+    if not attributes.rstrip(" \n>").endswith("/"):  # what it shows stands in it
+        return whole
+    values = (match["value"][1:-1].strip() for match in _VALUE.finditer(attributes))
+    return "\n\n".join(filter(None, (whole, *map(_write_value, values))))
+
+
+def _write_value(value: str) -> str:
+    """Return the texts of a computed value: its code, or an item of a list for each object."""
+    if re.fullmatch(r"`[^`]+`", value):
+        return value if "\n" not in value else marks.fence("text", value.strip("`").strip("\n"))
+    items, depth = [""], 0
+    for part in _DATA.finditer(value if value[:1] == "[" else ""):
+        if brace := part["brace"]:
+            depth += 1 if brace == "{" else -1
+            items += [f"{'  ' * (depth - 1)}- "] * (brace == "{")
+        elif part["key"] not in _ADDRESSES:
+            text = re.sub(r"\\(?=[\"'`\\])", "", part["string"][1:-1]).replace("\\n", " ")
+            if part["key"] in _NAMES and items[-1].endswith("- "):
+                target = _TARGET.match(value, part.end())
+                items[-1] += f"**[{text}]({target[1]})**: " if target else f"**{text}**: "
+            else:
+                is_code = part["key"] and not re.search(r"`|\A\W*[A-Z][^<]*\w \w\w[^<]*\Z", text)
+                items[-1] += f"`{text}` " if is_code else f"{text} "
+    return "\n".join(item.rstrip(": ") for item in items if item)
 
 
 def _convert_part(part: re.Match[str], context: LessonContext) -> str:

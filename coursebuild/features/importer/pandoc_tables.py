@@ -294,7 +294,7 @@ def cut_rows(lines: Sequence[str], leave: Callable[[int, str], None]) -> Iterato
 
 
 MEANING = regex(
-    r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n:])[ \t]*\n"
+    r"^(?<![^\n]\n)(?P<term>(?![|:#>\s<]|[-*+][ ])[^\n]*[^\s\n])[ \t]*\n"
     r"(?P<meanings>(?:\n?:[ \t]+\S[^\n]*\n?(?:(?:\n*[ ]{2,}|(?!:)(?=[^\s:]))[^\n]+\n?)*)+)",
     re.MULTILINE,
 )
@@ -306,7 +306,7 @@ def write_meanings(match: re.Match[str]) -> str:
     meanings = re.split(r"^:[ \t]+", match["meanings"].lstrip("\n"), flags=re.MULTILINE)[1:]
     parts = (textwrap.dedent(f"    {part.lstrip()}").strip() for part in meanings)
     lines = (re.sub(r"^[ ]{2,4}", "", part, flags=re.MULTILINE) for part in parts)
-    return f"**{match['term']}**: " + "\n\n".join(lines) + "\n"
+    return f"**{match['term'].removesuffix(':')}**: " + "\n\n".join(lines) + "\n"
 
 
 _EXAMPLE = regex(r"^([ ]{0,3})\(@([\w-]*)\)(?=[ \t]+\S)", re.MULTILINE)

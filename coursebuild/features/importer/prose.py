@@ -38,6 +38,8 @@ from coursebuild.features.importer.roles import (
     convert_tag,
     convert_wiki_link,
     draw_emoji,
+    join_broken_lines,
+    rewrite_html_links,
     words_of_link,
     write_icon,
     write_link,
@@ -101,7 +103,7 @@ _LINE = regex(
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
 _FIELDS = regex(
-    r"(?<![^\n]\n)(?:^:[A-Za-z][\w -]*:(?:[ \t]+\S[^\n]*)?(?:\n[ \t]+\S[^\n]*)*\n?)+^(?!.)",
+    r"(?<![^\n]\n)(?:^:[A-Za-z][\w. -]*:(?:[ \t]+\S[^\n]*)?(?:\n[ \t]+\S[^\n]*)*\n?)+^(?!.)",
     re.MULTILINE,
 )
 """A paragraph of lines such as `:name: words`, a list of fields in Sphinx."""
@@ -110,6 +112,8 @@ _EDGE = regex(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$
 """The first or last line of code in a quotation or a list, or the first of a comment or formula."""
 _PICTURE_LINE = regex(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)
 """A picture of HTML above words, which would be HTML as well."""
+_HOLDER = regex(r"[ \t]*<\w+\b[^<>]*\smarkdown(?:=.?(?:1|block).?)?(?:\s[^<>]*)?>[ \t]*")
+"""A tag of HTML around Markdown, which would be HTML without a blank line."""
 _EMPTY_HEADING = regex(r"[ ]{0,3}#{1,6}[ \t]*$")
 _ENDS = {"<!--": "-->", "$$": "$$"}
 _COMMENT = regex(
@@ -142,18 +146,6 @@ _KEPT = {
     regex(r"\$\$[^$]+\n[^$]*\$\$"): "formula",
 }
 """What is Markdown here as well."""
-_OVER_LINES = regex(
-    r"(?<!`)(`+)(?!`).+?(?<!`)\1(?!`)"  # what looks like one in code is none
-    r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
-    r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
-    r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
-    r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
-    r"|(?<![^\n])[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n[ \t]*[^\s<]+[ \t]*(?![^\n])"
-    r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
-    r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
-    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
-)
-"""A role, a note, a citation, the address of a link or a formula that goes on in the next line."""
 _TAG_OVER_LINES = regex(
     r"<(?i:a|img|source|video|iframe)[ \t\n](?=[^<>\n]*\n)[^<>]*>(?:\s*</iframe>)?"
 )
@@ -213,8 +205,9 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = read_escapes(text)
     if context.files.dollars != "\n":
         text = normalize_formulas(text)
-    text = _OVER_LINES.sub(_join_lines, text)
+    text = join_broken_lines(text)
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
+    text = rewrite_html_links(text, context)
     for abbreviation in _ABBREVIATION.finditer(text):
         message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
         context.leave("abbreviation", message)
@@ -224,8 +217,10 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = account.replace(text, _FIELDS, _write_fields, "list of fields", change)
     for rule in _PARAGRAPHS:
         text = account.replace(text, *rule)
-    out, mark = [], ""
-    for number, line in enumerate(text.split("\n")):
+    out, mark, lines = [], "", text.split("\n")
+    for number, line in enumerate(lines):
+        below = "".join(lines[number + 1 : number + 2])
+        is_open = _HOLDER.fullmatch(line) and re.match(r"[ ]{,3}\S", below)
         edge = _EDGE.match(line)
         if edge is None and not mark:
             line = _rewrite_line(_EMPTY_HEADING.sub("", line), context.line_below(number))
@@ -233,7 +228,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
             mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
         elif edge is not None and edge[1].startswith(mark):
             mark = "" if mark else edge[1]
-        out.append(line)
+        out.append(f"{line}\n" if is_open else line)
 
     def leave_cells(line: int, cells: str) -> None:
         message = f"`{cells}`, cells of a row that no column of the table has"
@@ -258,12 +253,6 @@ _BLOCKS: Rules = (
     (_HELD_COMMENT, r"\1\2", "comment", "without the parentheses that hold nothing else"),
 )
 """What is changed before the lines of a text are read, and how the account calls it."""
-
-
-def _join_lines(match: re.Match[str]) -> str:
-    """Return a role or note on one line, and behind it the line ends that stood in it."""
-    lines = match[0].split("\n")
-    return " ".join(line.strip() for line in lines) + "\n" * (len(lines) - 1)
 
 
 def _write_fields(match: re.Match[str]) -> str:
@@ -340,6 +329,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return words if re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called) else whole
         case "math" | "digits" if not whole.startswith(context.files.dollars):
             return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
+        case "digits" if _WORD.search(match["tex"]):  # two prices
+            return "$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if context.files.dollars != "$":
             return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "paren":

@@ -20,7 +20,35 @@ from coursebuild.features.importer.context import (
     to_anchor,
 )
 from coursebuild.features.importer.jsx import write_component
-from coursebuild.features.importer.source_files import find_group, title_of_file
+from coursebuild.features.importer.source_files import find_group, stem_of, title_of_file
+
+_BLOCK_START = r"[ \t]*(?:\n|[>|]|(?:[-*+]|\#+|\d+[.)])[ \t\n]|:::|```|~~~)"
+_OVER_LINES = regex(
+    r"(?P<block>^[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)*(?P<mark>`{3,}|~{3,})[^`\n]*\n"
+    r"(?:(?![ \t>]*(?P=mark))[^\n]*\n)*[^\n]*)"  # what looks like one in code is none
+    rf"|(?<!`)(?P<ticks>`+)(?!`)(?:[^\n]|\n(?!{_BLOCK_START}))+?"
+    r"(?<!`)(?P=ticks)(?!`)"
+    r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
+    r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
+    r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
+    r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
+    r"|(?<![^\n])[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n[ \t]*[^\s<]+[ \t]*(?![^\n])"
+    r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
+    r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
+    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)",
+    re.MULTILINE,
+)
+"""Code, a role, a note, a citation, an address or a formula that goes on in the next line."""
+
+
+def join_broken_lines(text: str) -> str:
+    """Return prose in which such a part is in one line, with its line ends behind it."""
+
+    def join(part: re.Match[str]) -> str:
+        lines = [line.strip() for line in part[0].split("\n")]
+        return part[0] if part["block"] else " ".join(lines) + "\n" * (len(lines) - 1)
+
+    return _OVER_LINES.sub(join, text)
 
 
 def write_link(text: str, address: str, title: str = "") -> str:
@@ -90,7 +118,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case "kbd" | "sub" | "sup" | "u" | "underline" | "del" | "strike":
             tag = {"underline": "u", "strike": "del"}.get(name, name)
             return f"<{tag}>{body}</{tag}>"
-        case _ if name.rpartition(":")[2] in _CODE_ROLES:
+        case _ if name.rpartition(":")[2] in CODE_ROLES:
             name_of_part = re.sub(r"^(?:!|~(?:.*\.)?)", "", target)  # as Sphinx shows it
             return f"`{words or name_of_part}`"
         case _ if name in _WORD_ROLES:
@@ -103,7 +131,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             return f"`{body}`"
 
 
-_CODE_ROLES = frozenset(
+CODE_ROLES = frozenset(
     "code file command program option envvar samp func function class mod module meth method attr "
     "attribute data const exc exception obj object type".split()
 )
@@ -170,7 +198,8 @@ _FRAMES = "pagebreak fa toc raw tabs tab code embed content-ref highlight".split
 
 
 _CALL = regex(r"\{\{-?[ ]*[\w.]+\((?P<arguments>.*)\)[ ]*-?\}\}")
-_QUOTED = regex(r"\"([^\"]+)\"|'([^']+)'")
+_QUOTED = regex(r"(?<![=\w])(?:\"([^\"]+)\"|'([^']+)')")
+"""A text among arguments, but no setting."""
 
 
 def convert_substitution(whole: str, context: LessonContext, is_statement: bool) -> str:
@@ -197,7 +226,8 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     if (value := context.substitutions.get(key)) is not None:
         return value
     call = _CALL.fullmatch(whole)
-    texts = ["".join(text) for text in _QUOTED.findall(call["arguments"])] if call else []
+    holder = call["arguments"] if call else whole * whole.startswith("{{<")
+    texts = ["".join(text) for text in _QUOTED.findall(holder)]
     message = f"`{whole}`, which its tool replaces: write what it stands for"
     context.leave("substitution", message)
     texts = texts or [whole[3:-3].strip() if whole.startswith("{{<") else whole]
@@ -278,11 +308,38 @@ def convert_tag(tag: str, context: LessonContext) -> str:
         if new_address := context.resolve_picture(address):
             tag = before + new_address + after
             continue
-        context.leave("tag of HTML", f"the file `{address}`, which is not in the folder")
+        problem = "which is not in the folder"
+        if stem_of(context.resolve_path(urlsplit(address).path)) in context.targets:
+            problem = "which HTML cannot link: write the link in Markdown"
+        context.leave("tag of HTML", f"the file `{address}`, {problem}")
         if attribute[1].lower() == "src" and re.match("<img", tag, re.IGNORECASE):
             return find_group(r"\s(?i:alt)=[\"']([^\"']*)", tag)
         tag = tag[: attribute.start()].rstrip() + after[1:]
     return tag
+
+
+_HTML_LINK = regex(
+    r"<a[ \t](?:[^<>]*[ \t])?href=([\"'])(?P<page>[^\"'\n:]+)\1[^<>]*>"
+    r"(?P<words>(?:(?!</?a\b)[^\n`])*)</a>",
+    re.IGNORECASE,
+)
+_IN_HTML = regex(
+    r"(?:\A|\n[ \t]*\n)\s*<(?!/?(?:a|b|code|em|i|img|span|strong)\b)(?:[^\n]|\n(?!\s*\n))*\Z"
+)
+"""A paragraph that begins with an element around blocks, in which Markdown is not read."""
+
+
+def rewrite_html_links(text: str, context: LessonContext) -> str:
+    """Return prose whose links to texts are in Markdown: in HTML they have no address."""
+
+    def rewrite(link: re.Match[str]) -> str:
+        before = text[: link.start()]
+        is_text = stem_of(context.resolve_path(urlsplit(link["page"]).path)) in context.targets
+        if not is_text or _IN_HTML.search(before) or before.rpartition("\n\n")[2].count("`") % 2:
+            return link[0]
+        return f"[{link['words']}]({link['page']})"
+
+    return _HTML_LINK.sub(rewrite, text)
 
 
 def convert_attributes(match: re.Match[str]) -> str:

@@ -179,11 +179,13 @@ _HINT = regex(
 )
 """A callout of GitBook."""
 _ALERT = regex(
-    r"^(?P<fence>`{3,}|~{3,})[^\n]*\n.*?^(?P=fence)|^<div\b[^<>]*\bclass=[\"'][^\"'<>]*\balert-(?!block\b)(?P<kind>\w+)[^<>]*>"
-    r"(?P<text>(?:(?!<div\b).)*?)</div>[ \t]*$",
+    r"^(?P<fence>`{3,}|~{3,})[^\n]*\n.*?^(?P=fence)|^<(?:div\b[^<>]*\bclass=[\"'][^\"'<>]*\balert-"
+    r"(?!block\b)(?P<kind>\w+)|(?P<name>note|tip|info|important|warning|caution|danger)\b"
+    r"(?:[^<>]*\btype=[\"'](?P<type>\w+))?)[^<>]*(?<!/)>"
+    r"(?P<text>(?:(?!<div\b).)*?)</(?(name)(?P=name)|div)>[ \t]*$",
     re.MULTILINE | re.DOTALL | re.IGNORECASE,
 )
-"""A callout of Jupyter, as its style sheet has it; or code, in which there is none."""
+"""A callout of Jupyter, as its style sheet has it, or a component; or code, in which is none."""
 _HIGHLIGHT = regex(
     r"^\{[%{][<%-]?[ ]*(?:(highlight)[ ]+|(\w+)[ ]+lang=\"?)(\w+)[^\n]*\n(.*?)\n"
     r"\{[%{][<%-]?[ ]*(?:end|/)(?:\1|\2)\b[^\n]*$",
@@ -195,7 +197,9 @@ _HIGHLIGHT = regex(
 def _write_alert(alert: re.Match[str]) -> str:
     if alert["fence"]:
         return alert[0]
-    kind = {"success": "tip", "warning": "warning", "danger": "danger"}.get(alert["kind"], "note")
+    kind = (alert["kind"] or alert["type"] or alert["name"]).lower()
+    kinds = ("tip", "success", "important", "warning", "caution", "danger")
+    kind = kind if kind in kinds else "note"
     return f"::::::{kind}\n{textwrap.dedent(alert['text']).strip()}\n::::::"
 
 
