@@ -80,6 +80,7 @@ _BEHIND_COMMA = regex(r"[^\W\d_]{2}|.*[/^²³°A-Z].*|[a-z]+s")
 _SOLIDUS = regex(r"\s*/\s*(?P<unit>[^/=:]+)\Z")
 _DENOMINATOR = regex(r"(?<=\w/)\([^()]*\)")
 """As in `c in J/(g K)`, a part of a unit and not the unit in brackets."""
+_BEFORE_UNIT = regex(r"[\s/(\[,]+(?:in\s+)?\Z")
 _IN_WORDS = regex(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
 _SYMBOL = regex(r"\w{1,2}|\\[a-z]+")
 _TO_NUMBER = regex(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
@@ -264,6 +265,13 @@ def unit_of_header(text: str) -> UnitText:
         return NO_UNIT
     is_certain &= not is_name(unit.text) and not (unit.text == "min" and _has_maximum(text))
     return unit if is_certain else NO_UNIT
+
+
+def name_of_header(text: str) -> tuple[str, int]:
+    """A label or header without its unit, as `gain` of `gain / dB`; where that begins, or -1."""
+    unit = unit_of_header(text).text.replace(" ", "·")
+    at = text.replace(" ", "·").rfind(unit) if unit else -1  # `J/(kg K)`
+    return (_BEFORE_UNIT.sub("", text[:at]) if at > 0 else text), at
 
 
 def unit_of_label(before: str) -> UnitText:
