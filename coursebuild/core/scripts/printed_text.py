@@ -32,7 +32,7 @@ from coursebuild.core.text.quantities import (
     name_of_header,
     numbers_of_quantities,
     read_unit,
-    title_of_column,
+    title_above,
     unit_behind,
     unit_of_printed,
 )
@@ -240,11 +240,11 @@ class PrintedText:
         heading = self._headings[at]
         if heading < 0 or self._words[heading].endswith(":"):
             return ""
-        row = self.lines[at].text
-        words = title_of_column(row, number.start, self.lines[heading].text)
-        if words or not heading or self._headings[heading] != heading - 1:
-            return words
-        return title_of_column(row, number.start, self.lines[heading - 1].text)  # pandas' frames
+        first = heading
+        while first > 0 and self._headings[first] == first - 1:
+            first -= 1
+        headers = [line.text for line in self.lines[first : heading + 1]]
+        return title_above(self.lines[at].text, number, headers[::-1])
 
     def unit(self, at: int, number: Number) -> UnitText:
         """The unit that is printed with a number."""

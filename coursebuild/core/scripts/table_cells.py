@@ -311,8 +311,9 @@ class ColumnTitle(Struct, frozen=True):
 
     def is_printed_as(self, printed: str) -> bool:
         """Whether a printed title has the same words, whatever its unit."""
-        words, unit = words_of(printed), words_of(unit_of_header(printed).text)
-        return bool(self.words) and self.words <= words and words - self.words <= unit
+        words = words_of(printed)
+        units = words_of(f"{unit_of_header(printed).text} {self.unit.text}")  # `rain_mm`
+        return bool(self.words) and self.words <= words and words - self.words <= units
 
     def best_places(self, labels: Iterable[str]) -> list[int]:
         """The numbers of a line, by index, in whose labels most of the title's words are."""
