@@ -23,7 +23,7 @@ from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.model.lesson_record import Address
-from coursebuild.core.scripts.lines import MARK, MappedText, Side, canonicalize, plain_text
+from coursebuild.core.scripts.lines import MappedText, Side, masked, plain_text
 from coursebuild.core.scripts.table_cells import ColumnTitle, RowCell, table_rows
 from coursebuild.core.text.numbers import Number, as_printed, has_groups, scan
 from coursebuild.core.text.quantities import (
@@ -240,11 +240,10 @@ class PrintedText:
         heading = self._headings[at]
         if heading < 0 or self._words[heading].endswith(":"):
             return ""
-        first = heading
-        while first > 0 and self._headings[first] == first - 1:
-            first -= 1
-        headers = [line.text for line in self.lines[first : heading + 1]]
-        return title_above(self.lines[at].text, number, headers[::-1])
+        headers = [heading]
+        while headers[-1] > 0 and self._headings[headers[-1]] == headers[-1] - 1:
+            headers.append(headers[-1] - 1)
+        return title_above(self.lines[at].text, number, [self.lines[k].text for k in headers])
 
     def unit(self, at: int, number: Number) -> UnitText:
         """The unit that is printed with a number."""
@@ -350,6 +349,12 @@ class PrintedText:
             for first in range(len(line.numbers) - count + 1):
                 yield PrintedPlace(self, at, line.numbers[first : first + count])
 
+    def is_called(self, at: int, first: int, words: str) -> bool:
+        """Whether words are all that is printed right before a number, or all of its title."""
+        title = self.title(at, self.lines[at].numbers[first])
+        names = (self.leads(at)[first], title, name_of_header(title)[0])
+        return _split(words) in map(_split, names)
+
     def words_before(self, place: PrintedPlace, rivals: Iterable[PrintedPlace] = ()) -> str:
         """The fewest words that tell printed numbers from the others of the output and `rivals`.
 
@@ -361,8 +366,8 @@ class PrintedText:
 
     def _words_among(self, places: Iterable[PrintedPlace], place: PrintedPlace) -> str:
         address = self, place.at, place.first
-        rivals = [(p.output, p.at, p.first) for p in places]
-        contexts = [c for o, *at in rivals if (o, *at) != address for c in o._contexts(*at)]
+        rivals = [rival for p in places if (rival := (p.output, p.at, p.first)) != address]
+        contexts = [context for o, line, first in rivals for context in o._contexts(line, first)]
         in_heading = len(_split(self.heading(place.at)))
         choices: list[tuple[bool, bool, int, str]] = []
         for context in self._contexts(place.at, place.first):
@@ -374,17 +379,22 @@ class PrintedText:
             for words in (plain_words, row_words):
                 for start in range(len(words) - 1, -1, -1):
                     is_unit = start - 1 in numbers and bool(unit_behind(words[start]))
-                    sought = _split(" ".join(words[start:]))
+                    text = " ".join(words[start:])
+                    sought = _split(text)
                     if words[start] == "#" or is_unit:
                         continue
-                    if _FORBIDDEN.search(" ".join(words[start:])):
+                    if _FORBIDDEN.search(text):
                         break
                     if not any(_ends_with(rival, sought) for rival in contexts):
                         is_result = words is row_words  # a number may be another tomorrow
-                        text = " ".join(words[start:])
                         choices.append((is_result, "#" in text, len(words) - start, text))
                         break
-        return min(choices, key=lambda choice: choice[:3])[3] if choices else ""
+        if choices:
+            return min(choices, key=lambda choice: choice[:3])[3]
+        lead = self.leads(place.at)[place.first] or self.title(place.at, place.numbers[0])
+        label = " ".join(word for word, _ in _split(lead))
+        is_shared = any(o.is_called(line, first, label) for o, line, first in rivals)
+        return "" if is_shared or _FORBIDDEN.search(label) else label
 
     def _read_contexts(self, at: int, first: int) -> list[_Words]:
         """All words before a number, also the heading's, and again with the title of the column.
@@ -409,12 +419,6 @@ class PrintedText:
         return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
 
 
-def masked(text: str, is_grouped: bool = False) -> str:
-    """A text with `#` for each of its numbers, white space folded."""
-    skeleton = canonicalize(text, is_grouped=is_grouped).skeleton
-    return plain_text(skeleton.replace(MARK, " # "))
-
-
 def _split(text: str) -> _Words:
     parts: list[tuple[str, bool]] = []
     at = 0
@@ -434,9 +438,6 @@ def _ends_with(context: _Words, sought: _Words) -> bool:
         word == sought_word or (sought_word == "#" and is_number)
         for (word, is_number), (sought_word, _) in pairs
     )
-
-
-# --- recorded tables
 
 
 def _locator_in_fence(body: Excerpt, side: Side, at: int) -> Locate:
