@@ -69,8 +69,11 @@ class Strings(Struct, frozen=True):
         if text is None:
             raise KeyError(f"no interface text {key!r}")
         texts = {k: self.number(v) if isinstance(v, float) else v for k, v in values.items()}
-        text = text.format_map(texts) if values else text
-        if not values or direction(self.language) == "ltr":
+        return self.isolate(text.format_map(texts)) if values else text
+
+    def isolate(self, text: str) -> str:
+        """A text whose quantities keep their direction among letters from right to left."""
+        if direction(self.language) == "ltr":
             return text
         return "".join(
             f"\u2066{q}\u2069" if isolated else q for q, isolated in split_quantities(text)

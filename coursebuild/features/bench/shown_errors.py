@@ -139,7 +139,7 @@ def translator(words: Strings) -> Translate:
             return words.join(map(translate, text.split(", ")))
         return words.decimals(text) if _MEASURE.fullmatch(text) else text
 
-    return translate
+    return lambda text: words.isolate(translate(text))
 
 
 def _pattern(key: str) -> re.Pattern[str]:

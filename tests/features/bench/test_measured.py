@@ -94,7 +94,7 @@ def test_what_was_measured_is_told_in_the_language_of_the_page(make: Make) -> No
     assert "Das Szenario dauert 2,5 s." in words
     assert re.search(r"RK4 mit 20 ms 0,39 ", words)
     labels = re.findall(r"<(?:text|title|desc)\b[^>]*>([^<]+)", page)
-    assert "Kosten, relativ zu: die Einstellung der Szene" in labels
+    assert "Kosten, relativ zur Einstellung der Szene" in labels
     english = re.compile(r"\b(the|is|of|at|than|with|errors?|cost|steps|better)\b")
     assert [t for t in labels if english.search(t)] == []
 
