@@ -42,7 +42,6 @@ from coursebuild.features.bench.scenario_view import (
     plots,
     scenario_view,
 )
-from coursebuild.features.bench.shown_errors import translator
 
 
 class BenchView(Struct, frozen=True):
@@ -150,7 +149,7 @@ def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     report = None if view.scenario is None else view.scenario.report
     if isinstance(report, ScenarioReport) and "plot" in block.shows:
         # The table of a sweep holds all that its plot shows.
-        translate = translator(writer.page.words)
+        translate = writer.page.words.translate
         texts = (f"{translate(c.title)}. {translate(c.text)}" for c in report.charts)
         rest = [*(guard_lines(escape_marks(text)) for text in texts), *rest]
     return "\n\n".join((head, *rest))

@@ -20,6 +20,7 @@ from coursebuild.core.model.measurements import (
     SweepReport,
     SweepRow,
 )
+from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench.chart import (
     FINE,
     MARK,
@@ -44,7 +45,6 @@ from coursebuild.features.bench.chart import (
 from coursebuild.features.bench.grids import whole_number
 from coursebuild.features.bench.shown_errors import (
     FIGURES,
-    Translate,
     cell,
     figure_interval,
     row_name,
@@ -53,11 +53,11 @@ from coursebuild.features.bench.shown_errors import (
 
 
 def plot_svgs(
-    report: ScenarioReport, translate: Translate, *, name: str, narrow: bool = False
+    report: ScenarioReport, words: Strings, *, name: str, narrow: bool = False
 ) -> tuple[str, ...]:
     """The charts of a report as `svg` elements, with a `name` that is unique on the page."""
     size = NARROW_SIZE if narrow else WIDE_SIZE
-    return tuple(filter(None, (chart_svg(chart, name, size, translate) for chart in report.charts)))
+    return tuple(filter(None, (chart_svg(chart, name, size, words) for chart in report.charts)))
 
 
 _SPREAD = 20.0
@@ -68,7 +68,7 @@ _GAP = 18.0
 """Between two scales."""
 
 
-def sweep_svg(sweep: SweepReport, translate: Translate, *, name: str, narrow: bool = False) -> str:
+def sweep_svg(sweep: SweepReport, words: Strings, *, name: str, narrow: bool = False) -> str:
     """The plot as an `svg` element; empty where nothing was measured."""
     figures = sweep.show[:_MAX_FIGURES]
     width, _ = NARROW_SIZE if narrow else WIDE_SIZE
@@ -93,15 +93,16 @@ def sweep_svg(sweep: SweepReport, translate: Translate, *, name: str, narrow: bo
         pad = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
         scale = Scale(start, start + scale_width, low - pad, high + pad, is_log)
         names = left if n % column_count == 0 else 0.0
-        bottom = _panel(parts, sweep, figure, scale, top, names, translate)
+        bottom = _panel(parts, sweep, figure, scale, top, names, words)
         top = bottom if narrow else top
     if any(row.own for row in sweep.rows):
-        key_svg, bottom = key([Entry("own", translate("as the model is"))], 6.0, bottom + 20, width)
+        own_entry = Entry("own", words.translate("as the model is"))
+        key_svg, bottom = key([own_entry], 6.0, bottom + 20, width)
         parts.append(key_svg)
-    titles = {figure: translate(FIGURES[figure]) for figure in figures}
+    titles = {figure: words.translate(FIGURES[figure]) for figure in figures}
     title = f"{sweep.title}: {', '.join(titles.values())}"
     cells = [
-        (row, [f"{titles[f]} {translate(cell(row, f) or row.status)}" for f in figures])
+        (row, [f"{titles[f]} {words.translate(cell(row, f) or row.status)}" for f in figures])
         for row in sweep.rows
     ]
     text = " ".join(f"{row.parameter} {row.value}: {', '.join(texts)}." for row, texts in cells)
@@ -115,12 +116,12 @@ def _panel(
     scale: Scale,
     top: float,
     names: float,
-    translate: Translate,
+    words: Strings,
 ) -> float:
     """Add one figure of all rows, with their names where there is room; return its lower end."""
     y = top + 34
     ticks = scale.ticks(max(2, int((scale.end - scale.start) / 56)))
-    title = shorten_to_width(translate(FIGURES[figure]), scale.end - scale.start + 10, SIZE)
+    title = shorten_to_width(words.translate(FIGURES[figure]), scale.end - scale.start + 10, SIZE)
     parts.append(label(scale.start, top + 14, title))
     groups = [list(rows) for _, rows in groupby(sweep.rows, key=lambda row: row.parameter)]
     row_parts: list[str] = []
@@ -128,13 +129,13 @@ def _panel(
         if names:
             head = shorten_to_width(rows[0].parameter, names - 8, TICK_SIZE)
             row_parts.append(label(2, y + 4, head, f'{FINE} font-weight="600"'))
-        row_parts += _group(rows, figure, scale, y + ROW, number, names, translate)
+        row_parts += _group(rows, figure, scale, y + ROW, number, names, words)
         y += ROW * (len(rows) + 1) + 4
     lines = [f"M{x:.1f} {top + 22:.1f}V{y - 10:.1f}" for x, _ in ticks]
     parts.append(path("".join(lines), 'stroke="currentColor" stroke-opacity="0.16"'))
     parts += row_parts
     look = f'text-anchor="middle" {FINE}'
-    parts += [label(x, y + 4, translate(text), look) for x, text in ticks]
+    parts += [label(x, y + 4, words.translate(text), look) for x, text in ticks]
     return y + 12
 
 
@@ -145,7 +146,7 @@ def _group(
     top: float,
     number: int,
     names: float,
-    translate: Translate,
+    words: Strings,
 ) -> Iterator[str]:
     places = [(figure_interval(row, figure), top + ROW * n) for n, row in enumerate(rows)]
     for (start, y), (end, end_y) in pairwise(places):
@@ -156,20 +157,18 @@ def _group(
         if names:
             yield label(names - 8, y + 4, row.value, f'text-anchor="end" {FINE}')
         if interval is None:
-            text = "" if row.status == "ok" else translate(row.status)
+            text = "" if row.status == "ok" else words.translate(row.status)
             yield label(scale.start, y + 4, text, FINE)
             continue
         x = scale(interval.value)
-        title = f"{row.parameter} {row.value}: {translate(cell(row, figure))}"
+        title = f"{row.parameter} {row.value}: {words.translate(cell(row, figure))}"
         yield path(bar(scale(interval.low), scale(interval.high), y), f'stroke="{colour(number)}"')
         yield symbols(number, [symbol(number, x, y, MARK, full=True, title=title)])
         if row.own:
             yield ring(x, y, 7)
 
 
-def engine_svg(
-    report: EngineScenario, translate: Translate, *, name: str, narrow: bool = False
-) -> str:
+def engine_svg(report: EngineScenario, words: Strings, *, name: str, narrow: bool = False) -> str:
     """The time of a step by the number of worlds; empty where nothing was timed."""
     lines = []
     for number, row in enumerate(report.rows):
@@ -185,8 +184,8 @@ def engine_svg(
         )
         lines += [ChartLine(row_name(row), number, points)] if points else []
     text = " ".join(
-        f"{translate(line.name)}: "
-        f"{', '.join(translate(point.title.rsplit(', ', 1)[1]) for point in line.points)}."
+        f"{words.translate(line.name)}: "
+        f"{', '.join(words.translate(point.title.rsplit(', ', 1)[1]) for point in line.points)}."
         for line in lines
     )
     chart = Chart(
@@ -196,4 +195,4 @@ def engine_svg(
         lines=tuple(lines),
         marks=(ChartMark("note", "lowest of at least 8 rounds"),),
     )
-    return chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE, translate)
+    return chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE, words)

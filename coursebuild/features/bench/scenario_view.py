@@ -28,7 +28,6 @@ from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids
 from coursebuild.features.bench.shown_errors import (
     FIGURES,
-    Translate,
     cell,
     horizon_error_text,
     interval_text,
@@ -36,8 +35,6 @@ from coursebuild.features.bench.shown_errors import (
     seconds_text,
     setting_text,
     solving_parts,
-    status_text,
-    translator,
 )
 
 _FEWEST_STEPS = 20
@@ -80,9 +77,8 @@ def scenario_view(
     words: Strings, report: ScenarioReport | SweepReport, anchor: str = ""
 ) -> ScenarioView:
     """Make the view of a scenario or a sweep; `anchor` is its id on the page, if it has one."""
-    translate = translator(words)
     if isinstance(report, SweepReport):
-        names = {key: translate(name) for key, name in FIGURES.items()}
+        names = {key: words.translate(name) for key, name in FIGURES.items()}
         columns = [
             (words("measured.parameter"), [row.parameter for row in report.rows]),
             (words("measured.value"), [row.value for row in report.rows]),
@@ -90,11 +86,11 @@ def scenario_view(
         ]
         minor = tuple(name for key, name in names.items() if key not in report.show)
         own_rows = tuple(n for n, row in enumerate(report.rows) if row.own)
-        notes = lost_runs(translate, ((f"{row.parameter} {row.value}", row) for row in report.rows))
+        notes = lost_runs(words, ((f"{row.parameter} {row.value}", row) for row in report.rows))
         table = grids.grid(report.title, columns, minor=minor, highlights=own_rows)
         return ScenarioView(anchor, report.title, table, tuple(notes), report)
-    notes = lost_runs(translate, ((row.name, row) for row in report.rows))
-    softened = [translate(row.name) for row in report.rows if row.refsafe]
+    notes = lost_runs(words, ((row.name, row) for row in report.rows))
+    softened = [words.translate(row.name) for row in report.rows if row.refsafe]
     if softened:
         notes.append(words("measured.refsafe", settings="; ".join(softened)))
     rows = []
@@ -107,9 +103,9 @@ def scenario_view(
     return ScenarioView(
         anchor=anchor,
         title=report.title or report.name,
-        description=tuple(_describe(words, translate, report)),
-        verdict=grids.sentence(translate(report.verdict.text)),
-        settings=_settings_table(words, translate, report),
+        description=tuple(_describe(words, report)),
+        verdict=grids.sentence(words.translate(report.verdict.text)),
+        settings=_settings_table(words, report),
         notes=tuple(notes),
         orders=orders_table(words, words("measured.orders"), report.orders),
         stable=integrator_table(words, label, (*STABLE, "measured.remark"), rows),
@@ -117,7 +113,7 @@ def scenario_view(
     )
 
 
-def _describe(words: Strings, translate: Translate, report: ScenarioReport) -> list[str]:
+def _describe(words: Strings, report: ScenarioReport) -> list[str]:
     sentences: list[str] = [
         words("measured.duration", time=words.decimals(seconds_text(report.duration)))
     ]
@@ -135,7 +131,7 @@ def _describe(words: Strings, translate: Translate, report: ScenarioReport) -> l
         sentences.append(words("measured.hold", time=words.decimals(seconds_text(report.hold))))
     parts = [] if report.own_setting is None else solving_parts(report.own_setting)
     if parts:
-        sentences.append(words("measured.usual", setting=translate(", ".join(parts))))
+        sentences.append(words("measured.usual", setting=words.translate(", ".join(parts))))
     reference, floor = f"measured.reference_{report.reference}", grids.power(report.floor, 1)
     sentences.append(grids.phrase(words, reference, source=report.source, floor=floor))
     if report.second:
@@ -147,7 +143,7 @@ def _describe(words: Strings, translate: Translate, report: ScenarioReport) -> l
     return sentences
 
 
-def _settings_table(words: Strings, translate: Translate, report: ScenarioReport) -> grids.Grid:
+def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
     rows = [row for row in report.rows if not row.idle]
 
     def error_column(quantity: ErrorQuantity) -> tuple[str, list[str]]:
@@ -155,14 +151,14 @@ def _settings_table(words: Strings, translate: Translate, report: ScenarioReport
         sizes = (value[0] if isinstance(value, tuple) else value for value in values)
         errors: list[str] = [grids.bounded(size, quantity.least) for size in sizes]
         key = _QUANTITIES.get(quantity.name)
-        return translate(quantity.label) if key is None else words(key), errors
+        return words.translate(quantity.label) if key is None else words(key), errors
 
     names = ("remark", "realtime", "seconds", "evaluations", "iterations")
     remarks, speed, time, evaluations, iterations = (words(f"measured.{name}") for name in names)
     columns: list[tuple[str, list[str]]] = [
         (
             words("measured.setting"),
-            [translate(row.name) for row in rows],
+            [words.translate(row.name) for row in rows],
         ),
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [grids.factor(row.realtime) for row in rows]),
@@ -181,7 +177,7 @@ def _settings_table(words: Strings, translate: Translate, report: ScenarioReport
         (words("measured.depth"), [grids.power(row.penetration or None, 2) for row in rows]),
         (words("measured.slip"), [grids.power(row.slip, 2) for row in rows]),
         (words("measured.model_error"), [grids.power(row.model_error, 2) for row in rows]),
-        (remarks, [_remark(words, translate, report, row) for row in rows]),
+        (remarks, [_remark(words, report, row) for row in rows]),
     ]
     own_rows = tuple(n for n, row in enumerate(rows) if row.own)
     label = words("measured.settings", title=report.title or report.name)
@@ -189,12 +185,10 @@ def _settings_table(words: Strings, translate: Translate, report: ScenarioReport
     return grids.grid(label, columns, words=(remarks,), minor=minor, highlights=own_rows)
 
 
-def _remark(
-    words: Strings, translate: Translate, report: ScenarioReport, row: WorkPrecisionRow
-) -> str:
+def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> str:
     parts = [words("measured.own")] if row.own else []
     if row.status != "ok":
-        parts.append(translate(status_text(row.status)))
+        parts.append(words.translate(row.status))
     if row.refsafe:
         parts.append("refsafe")
     if row.lucky:
@@ -203,19 +197,17 @@ def _remark(
         parts.append(words("measured.front"))
     elif row.dominated_by is not None:
         name = report.rows[row.dominated_by].name
-        parts.append(words("measured.better", setting=translate(name)))
+        parts.append(words("measured.better", setting=words.translate(name)))
     return "; ".join(parts)
 
 
-def lost_runs(
-    translate: Translate, runs: Iterable[tuple[str, MeasuredRun | SweepRow]]
-) -> list[str]:
+def lost_runs(words: Strings, runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
     """Say why runs were lost; runs with the same reasons stand together."""
     names_by_reasons: dict[tuple[str, ...], list[str]] = {}
     for name, run in runs:
         if run.status != "ok":
-            reasons = tuple(map(translate, (status_text(run.status), *run.reasons)))
-            names_by_reasons.setdefault(reasons, []).append(translate(name))
+            reasons = tuple(map(words.translate, (run.status, *run.reasons)))
+            names_by_reasons.setdefault(reasons, []).append(words.translate(name))
     groups = names_by_reasons.items()
     return [f"{'; '.join(names)}: {'; '.join(reasons)}." for reasons, names in groups]
 
@@ -336,9 +328,9 @@ _UNCERTAIN = 0.1
 
 def engine_view(words: Strings, scenario: EngineScenario, report: EngineReport) -> EngineView:
     """Make the view of a scenario in other engines."""
-    title, translate = scenario.title or scenario.name, translator(words)
+    title = scenario.title or scenario.name
     description = [
-        words("measured.usual", setting=translate(setting_text(scenario.setting))),
+        words("measured.usual", setting=words.translate(setting_text(scenario.setting))),
         words("measured.duration", time=words.decimals(seconds_text(scenario.duration))),
     ]
     if scenario.horizon < scenario.duration:
@@ -357,9 +349,10 @@ def engine_view(words: Strings, scenario: EngineScenario, report: EngineReport) 
     return EngineView(
         title=title,
         description=tuple(description),
-        table=_engine_table(words, translate, scenario, words("measured.engines_of", title=title)),
+        table=_engine_table(words, scenario, words("measured.engines_of", title=title)),
         notes=tuple(
-            f"{translate(row_name(row))}, {words('measured.worlds', n=cost.worlds)}: {cost.remark}."
+            f"{words.translate(row_name(row))}, "
+            f"{words('measured.worlds', n=cost.worlds)}: {cost.remark}."
             for row in scenario.rows
             for cost in row.costs
             if cost.remark
@@ -368,9 +361,7 @@ def engine_view(words: Strings, scenario: EngineScenario, report: EngineReport) 
     )
 
 
-def _engine_table(
-    words: Strings, translate: Translate, scenario: EngineScenario, label: str
-) -> grids.Grid:
+def _engine_table(words: Strings, scenario: EngineScenario, label: str) -> grids.Grid:
     rows = scenario.rows
     place, speed = FLOORS * scenario.floor, FLOORS * scenario.velocity_floor
 
@@ -387,13 +378,13 @@ def _engine_table(
         if row.status == "ok":
             return ""
         if row.status == "diverged":
-            return f"{translate(row.status)}: {row.message}"
+            return f"{words.translate(row.status)}: {row.message}"
         key = "unsupported" if row.status == "unsupported" else "failed"
         return words(f"measured.{key}", reason=row.message)
 
     counts = sorted({cost.worlds for row in rows for cost in row.costs})
     columns: list[tuple[str, list[str]]] = [
-        (words("measured.engine"), [translate(row_name(row)) for row in rows]),
+        (words("measured.engine"), [words.translate(row_name(row)) for row in rows]),
         (words("measured.position"), errors("position", place)),
         (words("measured.attitude"), errors("attitude", place)),
         (words("measured.velocity"), errors("velocity", speed)),
@@ -424,16 +415,14 @@ def plots(
     """Draw the plots, each for wide and for narrow screens; `name` is unique on the page."""
     from coursebuild.features.bench import report_plots  # late: few pages need it
 
-    translate = translator(words)
-
     def draw(kind: str) -> tuple[str, ...]:
         key, narrow = f"{name}-{kind}", kind == "narrow"
         if isinstance(report, ScenarioReport):
-            return report_plots.plot_svgs(report, translate, name=key, narrow=narrow)
+            return report_plots.plot_svgs(report, words, name=key, narrow=narrow)
         if isinstance(report, SweepReport):
-            svg = report_plots.sweep_svg(report, translate, name=key, narrow=narrow)
+            svg = report_plots.sweep_svg(report, words, name=key, narrow=narrow)
         else:
-            svg = report_plots.engine_svg(report, translate, name=key, narrow=narrow)
+            svg = report_plots.engine_svg(report, words, name=key, narrow=narrow)
         return (svg,) if svg else ()
 
     pairs = zip(draw("wide"), draw("narrow"), strict=True)

@@ -1,15 +1,12 @@
-"""Words for what is measured: settings, times, figures of sweeps, engines; translated."""
+"""Words for what is measured: settings, times, figures of sweeps, engines."""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 from coursebuild.core.drawing.scales import tick_texts
 from coursebuild.core.model.measurements import EngineRow, Interval, MeasuredSetting, SweepRow
-from coursebuild.core.pages.renderer import Strings
-from coursebuild.core.text.regex import regex
 
 INTEGRATORS = ("Euler", "implicit", "implicitfast", "RK4", "discrete")
 """Integrators in the order in which they are shown, which also sets their colour and mark."""
@@ -48,11 +45,6 @@ def solving_parts(setting: MeasuredSetting) -> list[str]:
         parts.append(f"{setting.iterations} {many}")
     parts += [f"{setting.cone} cone"] if setting.cone else []
     return parts + [f"{name} {value}" for name, value in setting.options]
-
-
-def status_text(status: str) -> str:
-    """How a run went, in words."""
-    return "grew" if status == "slow-growth" else status
 
 
 FIGURES = {
@@ -95,54 +87,3 @@ def row_name(row: EngineRow) -> str:
     elif device not in ("", "cpu"):
         parts.append(device)
     return ", ".join(parts)
-
-
-Translate = Callable[[str], str]
-"""An English text of a report → the same in the language of a page."""
-_SEPARATOR = regex(r"((?<=\.) | · |; | / )")
-_MEASURE = regex(r"[-\u2212]?[0-9][0-9.]*(?:[e·]\S+)?(?: ± [0-9.]+ %)?(?: [^\s.]{1,5})?")
-_REPORT = "report."
-_AUTHORS = ("name", "title")
-"""Parts that an author has written."""
-
-
-def translator(words: Strings) -> Translate:
-    """Make a function that translates what mjbench, and this module, write in English.
-
-    The key of a text is its English, with the names of parts that are translated on their own. A
-    text without a key stays as it is, but for the decimal sign of a measured figure.
-    """
-    texts = {
-        key.removeprefix(_REPORT): text
-        for key, text in words.texts.items()
-        if key.startswith(_REPORT) and key != _REPORT + text
-    }
-    keys = [key for key in texts if "{" in key]
-    keys.sort(key=lambda key: len(re.sub(r"\{\w+\}", "", key)), reverse=True)
-    patterns = [(_pattern(key), texts[key]) for key in keys]
-
-    def translate(text: str) -> str:
-        if text in texts:
-            return texts[text]
-        parts = _SEPARATOR.split(text)
-        if len(parts) > 1:
-            return "".join(part if n % 2 else translate(part) for n, part in enumerate(parts))
-        matches = ((pattern.fullmatch(text), translation) for pattern, translation in patterns)
-        for match, translation in matches:
-            if match is not None:
-                values = {
-                    name: value if name in _AUTHORS else translate(value)
-                    for name, value in match.groupdict().items()
-                }
-                return translation.format(**values)
-        if ", " in text:
-            return words.join(map(translate, text.split(", ")))
-        return words.decimals(text) if _MEASURE.fullmatch(text) else text
-
-    return lambda text: words.isolate(translate(text))
-
-
-def _pattern(key: str) -> re.Pattern[str]:
-    """The pattern of a key; its part `{n}` is a number, others are any text."""
-    groups = re.sub(r"\\{(\w+)\\}", r"(?P<\1>.+?)", re.escape(key))
-    return re.compile(groups.replace("(?P<n>.+?)", "(?P<n>[0-9][0-9.]*)"))

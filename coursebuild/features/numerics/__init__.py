@@ -20,7 +20,7 @@ from coursebuild.core.model.report_files import STABILITY
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench import grids, scenario_view
 from coursebuild.features.bench.chart import PAIR_SIZE, chart_svg
-from coursebuild.features.bench.shown_errors import INTEGRATORS, seconds_text, translator
+from coursebuild.features.bench.shown_errors import INTEGRATORS, seconds_text
 
 _DIGITS = 3
 _BOUNDARY = (
@@ -181,7 +181,6 @@ def _cells(figures: Mapping[str, tuple[float, str]]) -> tuple[MatrixCell, ...]:
 
 def case_view(words: Strings, report: CaseReport) -> CaseView:
     """A case as the page shows it."""
-    translate = translator(words)
     label = words("numerics.orders", title=report.title)
     orders = scenario_view.orders_table(words, label, report.orders, merge=True)
     rows = [
@@ -201,7 +200,7 @@ def case_view(words: Strings, report: CaseReport) -> CaseView:
     tables = (boundaries, _figures(words, report), orders)
     name = urls.encode(report.name)
     drawings = [
-        Markup(chart_svg(chart, f"{name}-{number}", PAIR_SIZE, translate))
+        Markup(chart_svg(chart, f"{name}-{number}", PAIR_SIZE, words))
         for number, chart in enumerate(report.charts, 1)
     ]
     return CaseView(
@@ -271,7 +270,7 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
         times = words.decimals(", ".join(map(seconds_text, softened_steps)))
         notes.append(words("measured.refsafe", settings=times))
     runs = ((f"{run.integrator} at {seconds_text(run.timestep)}", run) for run in report.errors)
-    return [*notes, *scenario_view.lost_runs(translator(words), runs)]
+    return [*notes, *scenario_view.lost_runs(words, runs)]
 
 
 KIND = PageKind(

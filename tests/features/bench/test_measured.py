@@ -13,7 +13,6 @@ from msgspec.structs import replace
 from coursebuild.core.model.results import Reports
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.features.bench.grids import bounded, factor, percent, power, sentence, size
-from coursebuild.features.bench.shown_errors import translator
 from mjbench.reports.model_report import StepCost
 from samples.reports import interval
 from support.bench_reports import swing
@@ -100,9 +99,7 @@ def test_what_was_measured_is_told_in_the_language_of_the_page(make: Make) -> No
 
 
 def test_every_text_of_the_reports_has_a_translation(make: Make) -> None:
-    english, german = (
-        translator(strings_for(make.assets.templates, name)) for name in ("en", "de")
-    )
+    english, german = (strings_for(make.assets.templates, name).translate for name in ("en", "de"))
     for report_text, expected in fixture_tables("measured")["german"]:
         assert german(report_text) == expected
         assert english(report_text) == report_text
