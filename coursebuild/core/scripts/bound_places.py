@@ -189,6 +189,7 @@ def mark_edits(binding: model.NumberBinding, target: str) -> tuple[Edit, ...]:
     attribute = binding.span.source.text[end : binding.span.end]
     braces = binding.span.source.span(end + attribute.find("{"), binding.span.end)
     is_whole = attribute.endswith("}") and "{" in attribute
+    is_whole &= binding.span.contains(binding.text_span)  # and not in a formula
     return (Edit(braces, f"{{out={target}}}"),) if is_whole else ()
 
 
