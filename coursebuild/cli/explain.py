@@ -49,7 +49,7 @@ from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.printed_text import PrintedPlace, describe_line
+from coursebuild.core.scripts.printed_text import PrintedPlace
 from coursebuild.core.scripts.table_cells import row_values, table_rows
 from coursebuild.core.text.characters import printable
 from coursebuild.core.text.near import nearest
@@ -389,7 +389,7 @@ def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ..
     for binding, value in bound_values(document, outputs):
         at = addresses.get(value, ())
         bound = BoundNumber(binding, outputs, at)
-        texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
+        texts = tuple(f"number {a.place + 1} of {a.description}" for a in at)
         if bound.text.numbers:
             places = [place for group in bound.groups for place in bound.look_up(group)]
             spans = [place.span for place in places if place.span is not None]
@@ -410,7 +410,7 @@ def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ..
         rows = table_rows(body, filters) if isinstance(body, Table) else ()
         for row, value in zip(rows, row_values(document, verdict.recording, filters), strict=True):
             at = addresses.get(value, ())
-            texts = tuple(f"number {a.place + 1} of {describe_line(a)}" for a in at)
+            texts = tuple(f"number {a.place + 1} of {a.description}" for a in at)
             span = row[0].cell.span.to(row[-1].cell.span)
             origins.append((span, ValueOrigin(value.text, value.script, texts)))
     return tuple(origin for span, origin in origins if span.line <= line <= span.end_line)

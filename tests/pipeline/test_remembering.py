@@ -36,6 +36,7 @@ def test_a_table_and_its_numbers_follow_a_changed_parameter(make: Make) -> None:
     assert result.status == 0, result.out
     assert "| steel | 169.8 | 0.0121 | 167.0 |" in cups(folder)
     assert '`157.0 min`{out="mean of tau"}, and for glass `147.0`{out}.' in cups(folder)
+    assert 'For steel it takes `167.0`{out="steel τ"} min.' in cups(folder)
     assert folder.main("check").status == 0
     assert "every recorded output is up to date" in folder.main("update").out
 

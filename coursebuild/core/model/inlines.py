@@ -137,7 +137,7 @@ class Math(Located, frozen=True):
     source: str | None = None
     """Likewise: the source of its numbers, as in `NumberBinding`."""
     value: NumberBinding | None = None
-    """What `value=…` says that the symbol is worth."""
+    """What `value=…` says that the symbol is worth, or the number of the formula that is bound."""
 
 
 class Term(Parent, frozen=True):

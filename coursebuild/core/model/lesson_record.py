@@ -15,6 +15,7 @@ text. Nothing is known of what has no line; a line that cannot be read counts fo
 from __future__ import annotations
 
 import hashlib
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeAlias
@@ -24,6 +25,7 @@ from msgspec import Struct, field
 from msgspec.structs import replace
 
 from coursebuild.core.model.blocks import Comparison, Mode, Recording
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 
 Versions: TypeAlias = tuple[tuple[str, str], ...]
@@ -45,6 +47,8 @@ _PROPER_NAMES = {
 """Names as their makers write them; other packages have the names of their distributions."""
 _MOST_NAMED = 3
 """The most packages that a message names of those that others brought along."""
+_PER_UNIT = regex(r"(?<=# )# (?=/[^\W\d_])")
+"""The 1 of a unit among the words of a line, as in `# # /s`: it is none of its numbers."""
 
 
 class Address(Struct, frozen=True, omit_defaults=True):
@@ -57,6 +61,17 @@ class Address(Struct, frozen=True, omit_defaults=True):
     name: str = ""
     names: tuple[str, ...] = ()
     """The numbers that tell the line from others with its words, and those of all such lines."""
+
+    @property
+    def description(self) -> str:
+        """The line in words."""
+        numbers = iter(self.name.split())
+        outer, slash, heading = self.heading.rpartition(" / ")
+        heading = outer + slash + re.sub("#", lambda match: next(numbers, match[0]), heading)
+        first = " ".join(numbers)
+        begins = f", where it begins with {first}" if first else ""
+        line = _PER_UNIT.sub("1", self.line)
+        return f"`{line}`{begins}" + (f" below `{heading}`" if heading else "")
 
 
 class ShownValue(Struct, frozen=True, omit_defaults=True):

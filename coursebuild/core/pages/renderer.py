@@ -45,6 +45,7 @@ from msgspec import Struct, field
 from coursebuild.core.model.course import TEMPLATES
 from coursebuild.core.model.results import Formula, MathError, Mathml
 from coursebuild.core.pages.typography import split_quantities, text_html
+from coursebuild.core.text.regex import regex
 
 DEFAULT_LANGUAGE = "en"
 Category: TypeAlias = Literal["zero", "one", "two", "few", "many", "other"]
@@ -53,7 +54,14 @@ CATEGORIES: tuple[Category, ...] = ("zero", "one", "two", "few", "many", "other"
 """All categories; every language has the last."""
 
 
-class Strings(Struct, frozen=True):
+_REPORT = "report."
+_BETWEEN_SENTENCES = regex(r"((?<=\.) | · |; | / )")
+_MEASURE = regex(r"[-\u2212]?[0-9][0-9.]*(?:[e·]\S+)?(?: ± [0-9.]+ %)?(?: [^\s.]{1,5})?")
+_AUTHORS = ("name", "title")
+"""Parts of a text of a report that an author has written."""
+
+
+class Strings(Struct, frozen=True, dict=True):
     """The interface texts in one language."""
 
     texts: Mapping[str, str]
@@ -69,12 +77,55 @@ class Strings(Struct, frozen=True):
         if text is None:
             raise KeyError(f"no interface text {key!r}")
         texts = {k: self.number(v) if isinstance(v, float) else v for k, v in values.items()}
-        text = text.format_map(texts) if values else text
-        if not values or direction(self.language) == "ltr":
+        return self.isolate(text.format_map(texts)) if values else text
+
+    def isolate(self, text: str) -> str:
+        """A text whose quantities keep their direction among letters from right to left."""
+        if direction(self.language) == "ltr":
             return text
         return "".join(
             f"\u2066{q}\u2069" if isolated else q for q, isolated in split_quantities(text)
         )
+
+    def translate(self, text: str) -> str:
+        """What mjbench's reports say in English, in this language.
+
+        The key of a text is its English, with the names of parts that are translated on their own.
+        A text without a key stays as it is, but for the decimal sign of a measured figure.
+        """
+        return self.isolate(self._translate(text))
+
+    def _translate(self, text: str) -> str:
+        if self.has(_REPORT + text):
+            return self.texts[_REPORT + text]
+        parts = _BETWEEN_SENTENCES.split(text)
+        if len(parts) > 1:
+            pairs = enumerate(parts)
+            return "".join(part if n % 2 else self._translate(part) for n, part in pairs)
+        for pattern, translation in self._report_patterns:
+            if (match := pattern.fullmatch(text)) is not None:
+                values = {
+                    name: value if name in _AUTHORS else self._translate(value)
+                    for name, value in match.groupdict().items()
+                }
+                return translation.format(**values)
+        if ", " in text:
+            return self.join(map(self._translate, text.split(", ")))
+        return self.decimals(text) if _MEASURE.fullmatch(text) else text
+
+    @functools.cached_property
+    def _report_patterns(self) -> list[tuple[re.Pattern[str], str]]:
+        """The patterns of texts with parts, those with more words of their own first."""
+        patterns: list[tuple[int, re.Pattern[str], str]] = []
+        for key, text in self.texts.items():
+            english = key.removeprefix(_REPORT)
+            if english not in (key, text) and "{" in english:
+                words = re.sub(r"\{\w+\}", "", english)
+                groups = re.sub(r"\\{(\w+)\\}", r"(?P<\1>.+?)", re.escape(english))
+                groups = groups.replace("(?P<n>.+?)", "(?P<n>[0-9][0-9.]*)")
+                patterns.append((len(words), re.compile(groups), text))
+        patterns.sort(key=lambda pattern: -pattern[0])
+        return [(pattern, text) for _, pattern, text in patterns]
 
     def prefer(self, prefix: str) -> Strings:
         """The texts in which one of the key `prefix` + KEY replaces that of KEY."""

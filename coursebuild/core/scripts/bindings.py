@@ -37,7 +37,7 @@ from coursebuild.core.scripts.bound_places import (
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_key
-from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, describe_line
+from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose, did_you_mean
 from coursebuild.core.text.numbers import Number, difference
@@ -346,7 +346,7 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
             wordless = replace(bound, binding=replace(binding, words=""))
             noted_places = rivals = wordless.current_places
     else:
-        line_text = describe_line(bound.lost_address())
+        line_text = bound.lost_address().description
         message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
         noted_places = rivals = replace(bound, addresses=()).places()
         help = 'bind it anew: choose the words before it, as in `{out="tau"}`'

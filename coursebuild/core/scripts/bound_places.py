@@ -27,9 +27,9 @@ from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Address, Addresses, ShownValue, shown_values
 from coursebuild.core.model.results import Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.bound_numbers import BoundText
-from coursebuild.core.scripts.lines import plain_text
+from coursebuild.core.scripts.lines import masked, plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body
-from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText, masked
+from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import ColumnTitle, row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
 from coursebuild.core.text.quantities import is_same_unit, unit_behind, unit_of_label
@@ -189,6 +189,7 @@ def mark_edits(binding: model.NumberBinding, target: str) -> tuple[Edit, ...]:
     attribute = binding.span.source.text[end : binding.span.end]
     braces = binding.span.source.span(end + attribute.find("{"), binding.span.end)
     is_whole = attribute.endswith("}") and "{" in attribute
+    is_whole &= binding.span.contains(binding.text_span)  # and not in a formula
     return (Edit(braces, f"{{out={target}}}"),) if is_whole else ()
 
 
@@ -305,8 +306,10 @@ class BoundNumber(Struct, frozen=True, dict=True):
         behind_words = [p for output in outputs for p in output.find_words(words, count)]
         if len(behind_words) == 1:
             return behind_words
-        chosen_places = [place for place in places if place in behind_words]
-        return chosen_places or list(filter(self.text.shows, behind_words)) or behind_words
+        known_places = [place for place in places if place in behind_words]
+        chosen_places = known_places or [*filter(self.text.shows, behind_words)] or behind_words
+        called_places = [p for p in chosen_places if p.output.is_called(p.at, p.first, words)]
+        return called_places or chosen_places
 
     def lost_address(self) -> Address:
         """The first of its addresses that is gone."""

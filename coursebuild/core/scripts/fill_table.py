@@ -15,8 +15,8 @@ from itertools import takewhile
 from msgspec import Struct
 
 from coursebuild.core import model
-from coursebuild.core.scripts.lines import Side, plain_text
-from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText, masked
+from coursebuild.core.scripts.lines import Side, masked, plain_text
+from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import ColumnTitle
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
 from coursebuild.core.text.numbers import write_comma

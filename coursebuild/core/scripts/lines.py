@@ -210,6 +210,12 @@ def canonicalize(
     return CanonicalText(skeleton, numbers)
 
 
+def masked(text: str, is_grouped: bool = False) -> str:
+    """A text with `#` for each of its numbers, white space folded."""
+    skeleton = canonicalize(text, is_grouped=is_grouped).skeleton
+    return plain_text(skeleton.replace(MARK, " # "))
+
+
 def same_number(recorded: Number, printed: Number, comparison: Comparison) -> bool:
     """Whether a printed number matches the recorded one in this comparison."""
     if recorded.text == printed.text:

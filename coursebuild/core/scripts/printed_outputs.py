@@ -7,9 +7,8 @@ from collections.abc import Iterable, Sequence
 
 from coursebuild.core import model
 from coursebuild.core.model.results import ScriptRun, Verdict
-from coursebuild.core.scripts.printed_text import PrintedLine, PrintedText
+from coursebuild.core.scripts.printed_text import PrintedText
 from coursebuild.core.scripts.tables import TableMatcher, updated_row
-from coursebuild.core.text.numbers import as_printed, has_groups
 
 
 class PrintedOutputs:
@@ -72,10 +71,7 @@ class PrintedOutputs:
         if isinstance(body := recording.body, model.Table):
             printed = self.runs[recording.script or ""].output_of(recording.part)
             rows = TableMatcher(body, comparison, printed, verdict.row_addresses).match().rows
-            cells_of_rows = ([c.mapped.text for c in updated_row(r, comparison)] for r in rows)
-            lines = [" ".join(as_printed(t, body.comma) for t in texts) for texts in cells_of_rows]
-            is_grouped = has_groups("\n".join(lines))
-            return PrintedText(PrintedLine(line, None, is_grouped) for line in lines)
+            return PrintedText.of_rows(body, [updated_row(row, comparison) for row in rows])
         return self.text_of_run(recording.script or "", comparison.own_filters, recording.part)
 
     def text_of_run(

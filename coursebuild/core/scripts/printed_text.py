@@ -13,9 +13,8 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, cached_property
 from itertools import accumulate
 from typing import TypeAlias
@@ -24,15 +23,16 @@ from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.model.lesson_record import Address
-from coursebuild.core.scripts.lines import MARK, MappedText, Side, canonicalize, plain_text
+from coursebuild.core.scripts.lines import MappedText, Side, masked, plain_text
 from coursebuild.core.scripts.table_cells import ColumnTitle, RowCell, table_rows
 from coursebuild.core.text.numbers import Number, as_printed, has_groups, scan
 from coursebuild.core.text.quantities import (
     UnitText,
     is_same_unit,
+    name_of_header,
     numbers_of_quantities,
     read_unit,
-    title_of_column,
+    title_above,
     unit_behind,
     unit_of_printed,
 )
@@ -47,8 +47,7 @@ _Words: TypeAlias = tuple[tuple[str, bool], ...]
 _IN_BRACKETS = regex(r"[(\[]([^()\[\]]+)[)\]]")
 _UNIT_IN_BRACKETS = regex(r"\s*[(\[][^()\[\]]*[)\]][\s:=]*\Z")
 _REST_OF_ROW = regex(r"\A(?:[-+]?\d[\d.e+-]*(?=[\s)\],])|(?:and|to)\s|[\s)\],])*")
-_PER_UNIT = regex(r"(?<=# )# (?=/[^\W\d_])")
-"""The 1 of a unit among the words of a line, as in `# # /s`: it is none of its numbers."""
+_ARGUMENTS = regex(r"(?<=\w)[(\[][^()\[\]]*[)\]](?=\s*[=:])")
 _FORBIDDEN = regex(r'["{}]')
 """What the words of `{out="words"}` cannot hold."""
 
@@ -158,6 +157,7 @@ class PrintedText:
     def __init__(self, lines: Iterable[PrintedLine]) -> None:
         self.lines = tuple(lines)
         self.labels = cache(self._read_labels)
+        self.leads = cache(self._read_leads)
         self._contexts = cache(self._read_contexts)
         self._headings: list[int] = []
         """The index of the heading of each line; -1 for none."""
@@ -180,13 +180,26 @@ class PrintedText:
         """A recorded output; without filters, as the author sees it."""
         body = recording.body
         if isinstance(body, Table):
-            return cls(_lines_of_table(body))
+            return cls.of_rows(body, table_rows(body))
         side = Side.of(body.text, filters)
         is_grouped = has_groups("\n".join(side.lines))
         return cls(
             PrintedLine(line, _locator_in_fence(body, side, at), is_grouped)
             for at, line in enumerate(side.lines)
         )
+
+    @classmethod
+    def of_rows(cls, table: Table, rows: Sequence[Sequence[RowCell]]) -> PrintedText:
+        """The rows of a table as lines, with the titles of its columns."""
+        titles = list(map(ColumnTitle.of, table.header))
+        texts = [" ".join(as_printed(c.mapped.text, table.comma) for c in row) for row in rows]
+        is_grouped, lines = has_groups("\n".join(texts)), []
+        for row, text in zip(rows, texts, strict=True):
+            ends = accumulate(len(cell.mapped.text) + 1 for cell in row)
+            columns = tuple((end - 1, titles[c.column]) for end, c in zip(ends, row, strict=True))
+            locate = _locator_in_row(row, table.span.source)
+            lines.append(PrintedLine(text, locate, is_grouped, columns))
+        return cls(lines)
 
     # --- what is printed with a number
 
@@ -227,11 +240,10 @@ class PrintedText:
         heading = self._headings[at]
         if heading < 0 or self._words[heading].endswith(":"):
             return ""
-        row = self.lines[at].text
-        words = title_of_column(row, number.start, self.lines[heading].text)
-        if words or not heading or self._headings[heading] != heading - 1:
-            return words
-        return title_of_column(row, number.start, self.lines[heading - 1].text)  # pandas' frames
+        headers = [heading]
+        while headers[-1] > 0 and self._headings[headers[-1]] == headers[-1] - 1:
+            headers.append(headers[-1] - 1)
+        return title_above(self.lines[at].text, number, [self.lines[k].text for k in headers])
 
     def unit(self, at: int, number: Number) -> UnitText:
         """The unit that is printed with a number."""
@@ -245,10 +257,17 @@ class PrintedText:
         pairs = zip(self.leads(at), self.lines[at].numbers, strict=True)
         return tuple(f"{lead} {self.title(at, number)}".strip() for lead, number in pairs)
 
-    def leads(self, at: int) -> list[str]:
-        """What stands before the numbers of a line, behind the one before with its unit."""
+    def _read_leads(self, at: int) -> list[str]:
+        """What stands before the numbers of a line, behind the one before with its unit.
+
+        Those in a name, as in `T(0.25) = 79.3`, are no values: nothing stands before them.
+        """
         text, start, leads = self.lines[at].text, 0, []
+        arguments = [match.span() for match in _ARGUMENTS.finditer(text)]
         for number in self.lines[at].numbers:
+            if any(a < number.start < b for a, b in arguments):
+                leads.append("")
+                continue
             leads.append(text[start : number.start])
             start = number.end
             if unit := unit_behind(text, start):
@@ -330,6 +349,12 @@ class PrintedText:
             for first in range(len(line.numbers) - count + 1):
                 yield PrintedPlace(self, at, line.numbers[first : first + count])
 
+    def is_called(self, at: int, first: int, words: str) -> bool:
+        """Whether words are all that is printed right before a number, or all of its title."""
+        title = self.title(at, self.lines[at].numbers[first])
+        names = (self.leads(at)[first], title, name_of_header(title)[0])
+        return _split(words) in map(_split, names)
+
     def words_before(self, place: PrintedPlace, rivals: Iterable[PrintedPlace] = ()) -> str:
         """The fewest words that tell printed numbers from the others of the output and `rivals`.
 
@@ -341,8 +366,8 @@ class PrintedText:
 
     def _words_among(self, places: Iterable[PrintedPlace], place: PrintedPlace) -> str:
         address = self, place.at, place.first
-        rivals = [(p.output, p.at, p.first) for p in places]
-        contexts = [c for o, *at in rivals if (o, *at) != address for c in o._contexts(*at)]
+        rivals = [rival for p in places if (rival := (p.output, p.at, p.first)) != address]
+        contexts = [context for o, line, first in rivals for context in o._contexts(line, first)]
         in_heading = len(_split(self.heading(place.at)))
         choices: list[tuple[bool, bool, int, str]] = []
         for context in self._contexts(place.at, place.first):
@@ -354,52 +379,44 @@ class PrintedText:
             for words in (plain_words, row_words):
                 for start in range(len(words) - 1, -1, -1):
                     is_unit = start - 1 in numbers and bool(unit_behind(words[start]))
-                    sought = _split(" ".join(words[start:]))
+                    text = " ".join(words[start:])
+                    sought = _split(text)
                     if words[start] == "#" or is_unit:
                         continue
-                    if _FORBIDDEN.search(" ".join(words[start:])):
+                    if _FORBIDDEN.search(text):
                         break
                     if not any(_ends_with(rival, sought) for rival in contexts):
                         is_result = words is row_words  # a number may be another tomorrow
-                        text = " ".join(words[start:])
                         choices.append((is_result, "#" in text, len(words) - start, text))
                         break
-        return min(choices, key=lambda choice: choice[:3])[3] if choices else ""
+        if choices:
+            return min(choices, key=lambda choice: choice[:3])[3]
+        lead = self.leads(place.at)[place.first] or self.title(place.at, place.numbers[0])
+        label = " ".join(word for word, _ in _split(lead))
+        is_shared = any(o.is_called(line, first, label) for o, line, first in rivals)
+        return "" if is_shared or _FORBIDDEN.search(label) else label
 
     def _read_contexts(self, at: int, first: int) -> list[_Words]:
         """All words before a number, also the heading's, and again with the title of the column.
 
-        The title may stand right behind what its row begins with, and without its unit.
+        The label may stand right behind what its row begins with, and without its unit.
         """
         line = self.lines[at]
         number = line.numbers[first]
         heading, title = self.heading(at), self.title(at, number)
         before = f"{heading} {line.text[: number.start]}"
         texts = [before, f"{before} {title}"] if title else [before]
-        if title and first > 0:
+        if first > 0:
             end = line.numbers[0].end + len(unit_behind(line.text, line.numbers[0].end).text) + 1
             above = self.heading(self._headings[at]) if line.title(number) is None else ""
-            texts += (f"{words} {line.text[:end]} {title}" for words in (heading, above))
-            texts += (f"{above} {title}", f"{line.text[: line.numbers[0].start]} {title}")
+            label = title or self.leads(at)[first]
+            texts += (f"{words} {line.text[:end]} {label}" for words in (heading, above))
+            if title:
+                texts += (f"{above} {title}", f"{line.text[: line.numbers[0].start]} {title}")
+        bare_title, _ = name_of_header(title)
         bare_texts = [_UNIT_IN_BRACKETS.sub("", text) for text in texts]
+        bare_texts += (text.removesuffix(title) + bare_title for text in texts if title)
         return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
-
-
-def masked(text: str, is_grouped: bool = False) -> str:
-    """A text with `#` for each of its numbers, white space folded."""
-    skeleton = canonicalize(text, is_grouped=is_grouped).skeleton
-    return plain_text(skeleton.replace(MARK, " # "))
-
-
-def describe_line(address: Address) -> str:
-    """The printed line of an address in words, with the numbers that name it."""
-    numbers = iter(address.name.split())
-    outer, slash, heading = address.heading.rpartition(" / ")
-    heading = outer + slash + re.sub("#", lambda match: next(numbers, match[0]), heading)
-    first = " ".join(numbers)
-    begins = f", where it begins with {first}" if first else ""
-    line = _PER_UNIT.sub("1", address.line)
-    return f"`{line}`{begins}" + (f" below `{heading}`" if heading else "")
 
 
 def _split(text: str) -> _Words:
@@ -423,28 +440,11 @@ def _ends_with(context: _Words, sought: _Words) -> bool:
     )
 
 
-# --- recorded tables
-
-
-def _lines_of_table(table: Table) -> Iterator[PrintedLine]:
-    rows, titles = table_rows(table), list(map(ColumnTitle.of, table.header))
-    joined_rows = [_join_cells(row) for row in rows]
-    texts = [" ".join(as_printed(c.mapped.text, table.comma) for c in row) for row in rows]
-    is_grouped = has_groups("\n".join(texts))
-    for row, joined_row, text in zip(rows, joined_rows, texts, strict=True):
-        ends = accumulate(len(cell.mapped.text) + 1 for cell in row)
-        columns = tuple((end - 1, titles[cell.column]) for end, cell in zip(ends, row, strict=True))
-        yield PrintedLine(text, _locator_in_row(joined_row, table.span.source), is_grouped, columns)
-
-
 def _locator_in_fence(body: Excerpt, side: Side, at: int) -> Locate:
     return lambda start, end: body.span(*side.origin(at, start, end))
 
 
-def _join_cells(row: tuple[RowCell, ...]) -> MappedText:
+def _locator_in_row(row: Iterable[RowCell], source: Source) -> Locate:
     gap = MappedText.substitute_for(0, 0, " ")
-    return MappedText.join([part for cell in row for part in (gap, cell.mapped)][1:])
-
-
-def _locator_in_row(row: MappedText, source: Source) -> Locate:
-    return lambda start, end: Span(source, *row.origin(start, end))
+    text = MappedText.join([part for cell in row for part in (gap, cell.mapped)][1:])
+    return lambda start, end: Span(source, *text.origin(start, end))

@@ -38,6 +38,7 @@ from coursebuild.core.text.quantities import (
     UnitText,
     are_different,
     is_same_unit,
+    name_of_header,
     numbers_of_quantities,
     read_unit,
     unit_of_header,
@@ -280,6 +281,8 @@ class ColumnTitle(Struct, frozen=True):
 
     span: Span
     text: str
+    name: str
+    """The text without the unit."""
     words: frozenset[str]
     unit: UnitText
     """None where its source is said, as in `` τ (`s`{given="a guess"}) ``; so with words."""
@@ -293,14 +296,14 @@ class ColumnTitle(Struct, frozen=True):
         inlines = model.walk_inlines(cell.children)
         bindings = (i for i in inlines if isinstance(i, model.NumberBinding))
         excepted_text = " ".join(i.text for i in bindings if i.source is not None)
-        text = title.text.replace(" ", "·")  # `J/(kg K)`
-        at = text.rfind(unit.text.replace(" ", "·")) if unit else -1
-        unit_span, words = cell.span, words_of(title.text)
+        name, at = name_of_header(title.text)
+        unit_span = cell.span
         if at >= 0:
             unit_span = Span(cell.span.source, *title.origin(at, at + len(unit.text)))
-            words = words_of(title.text[:at])
-        words -= words_of(excepted_text)
-        return cls(cell.span, title.text, words, NO_UNIT if excepted_text else unit, unit_span)
+        words = words_of(title.text[:at] if at >= 0 else title.text) - words_of(excepted_text)
+        if excepted_text:
+            name, unit = "", NO_UNIT
+        return cls(cell.span, title.text, name, words, unit, unit_span)
 
     def has(self, word: str) -> bool:
         """Whether a printed word is one of the title, or a mere sign."""
@@ -308,8 +311,9 @@ class ColumnTitle(Struct, frozen=True):
 
     def is_printed_as(self, printed: str) -> bool:
         """Whether a printed title has the same words, whatever its unit."""
-        words, unit = words_of(printed), words_of(unit_of_header(printed).text)
-        return bool(self.words) and self.words <= words and words - self.words <= unit
+        words = words_of(printed)
+        units = words_of(f"{unit_of_header(printed).text} {self.unit.text}")  # `rain_mm`
+        return bool(self.words) and self.words <= words and words - self.words <= units
 
     def best_places(self, labels: Iterable[str]) -> list[int]:
         """The numbers of a line, by index, in whose labels most of the title's words are."""
@@ -382,7 +386,11 @@ def misplaced_titles(
     for column, place in places.items():
         title, own_name = titles[column], numbers[place]
         text = squeeze(title.text)
-        matches = [at for at, name in enumerate(numbers) if text == squeeze(name.above)]
+        matches = [
+            at
+            for at, name in enumerate(numbers)
+            if text == squeeze(name.above) or squeeze(name.text) == squeeze(title.name) != ""
+        ]
         matches = matches or [a for a, n in enumerate(numbers) if title.is_printed_as(n.text)]
         at = matches[0] if matches and place not in matches else place
         if at < place and (own_name.above or words_of(own_name.text)):

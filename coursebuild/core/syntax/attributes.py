@@ -27,12 +27,13 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     did_you_mean,
 )
+from coursebuild.core.text.quantities import plain_unit, read_unit
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 from coursebuild.core.text.units import check_unit
 
 TERM = regex(r"(\{\s*term\b[^{}]{0,400}\}?)")
-SYMBOL = regex(r"(\{\s*(?:symbol|unit|value|given)\b[^{}]{0,400}\}?)")
+SYMBOL = regex(r"(\{\s*(?:symbol|unit|value|given|out)\b[^{}]{0,400}\}?)")
 LABEL = regex(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 """The attributes of a term, a symbol or a formula; group 1 is the braces, the last of which may be
 missing."""
@@ -44,10 +45,15 @@ _MISQUOTED = regex(
 )
 _SPACES = regex(r"\s+")
 _NUMBER = regex(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
+_RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?!\d)(.*)\Z")
+"""A formula that ends with a number, and what stands behind it."""
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
 _SYMBOL_HELP = 'write `{symbol="what it stands for" unit="m/s"}`, of which the unit may be left out'
-_VALUE_HELP = "write `value=9.81`, or `value=9.81 out=examples/x.py` for what a script prints"
+_VALUE_HELP = (
+    "write `value=9.81`, or `value=9.81 out=examples/x.py` for what a script prints; without "
+    "`value`, `out` is of the number that ends the formula"
+)
 NO_SOURCE = "`given` names no source here"
 SOURCE_HELP = (
     'name it, as in `{given="models/pendulum.xml"}`; a number that is chosen needs no mark, so '
@@ -116,16 +122,22 @@ def read_term(braces: Excerpt, report: Callable[[Diagnostic], None]) -> str | No
 
 
 def read_meaning(
-    braces: Excerpt, report: Callable[[Diagnostic], None]
+    braces: Excerpt, tex: Excerpt, report: Callable[[Diagnostic], None]
 ) -> tuple[Meaning | None, str | None, NumberBinding | None]:
-    """The meaning of a symbol, the source of given numbers, and its value, if they are there."""
+    """The meaning of a symbol, the source of given numbers, and its value, if they are there.
+
+    `out` alone is of the value that stands in the formula.
+    """
     keys = ("symbol", "unit", "value", "given", "out")
     values = read_pairs(braces, keys, "symbol-attribute", _SYMBOL_HELP)
     if isinstance(values, Diagnostic):
         report(values)
         return None, None, None
     source = value_text(values["given"]) if "given" in values else None
-    value, number = values.get("value"), None
+    value, number, unit = values.get("value"), None, value_text(values.get("unit"))
+    result = _RESULT.match(tex.text) if "out" in values and value is None else None
+    if result is not None and (not result[2].strip() or read_unit(result[2])):
+        value, unit = tex.slice(*result.span(1)), plain_unit(result[2]) or unit
     is_number = value is not None and _NUMBER.fullmatch(value.text) is not None
     if value is not None and is_number and not {"out", "given"} <= {*values}:
         printed = values.get("out")
@@ -133,16 +145,15 @@ def read_meaning(
         is_quoted = printed is not None and printed.source.text[printed.span().start - 1] == '"'
         script, words = (None, origin_text) if is_quoted else (origin_text or None, "")
         origin = None if "out" in values else source or ""
-        unit = value_text(values.get("unit"))
         number = NumberBinding(
             braces.span(), value.text, value.span(), script, origin, unit, words=words
         )
-    elif "value" in values or "out" in values:
+    elif value is not None or "out" in values:
         text = "" if value is None else value.text
         reason = f"`{text}` is no value of a symbol"
         if is_number:
             reason = "a value is either given or printed by a script"
-        elif "value" not in values:
+        elif value is None:
             reason = "`out` binds a value, and there is none"
         place = braces if value is None else value
         report(diagnose("symbol-attribute", place.span(), reason, help=_VALUE_HELP))

@@ -292,7 +292,7 @@ class _TokenReader:
             return model.Math(span, tex, display)
         braces, report = self.content.slice(*token.meta["braces"]), self.report
         if not display:
-            return model.Math(span, tex, display, None, *read_meaning(braces, report))
+            return model.Math(span, tex, display, None, *read_meaning(braces, tex, report))
         label = self.state.take_label(braces, "eq")
         return model.Math(span, tex, display, label)
 

@@ -33,7 +33,10 @@ _MAGNITUDES = frozenset("BGMP")
 """In text they count billions and millions more often than they are units."""
 _SIGNS = frozenset(("/", "·", "⋅", "*", *PER, "pour", "square", "cubic", "sq", "cu"))
 """After these, more of a unit must follow."""
+_AND = ("and", "und", "et", "y")
 _PER_UNIT = regex(r"/[^\W\d_]")
+_DIVISOR = regex(rf"\A(?:/|(?:{'|'.join(PER)}) )(?=[^\W\d_])")
+"""How a unit begins that is 1 over another, as in `3 /s` and `3 per second`."""
 _GAP = regex(r"[ \t]{2,}|\t")
 _NEXT_COLUMN = regex(r"[ \t]{2,}|\t|[ \t]?\|[ \t]?|,(?=[^\W\d])")
 _REACH = 80
@@ -77,9 +80,10 @@ _BRACKET_WITH_WORDS = regex(
 """`E (J, in total)`, `E [J] of the ball`; behind a comma another label may stand."""
 _BEHIND_COMMA = regex(r"[^\W\d_]{2}|.*[/^²³°A-Z].*|[a-z]+s")
 """What is a unit behind a comma, as in `duration, ms`; another word may be one as well."""
-_SOLIDUS = regex(r"\s*/\s*(?P<unit>[^/=:]+)\Z")
+_SOLIDUS = regex(r"\s*/\s*(?P<unit>\([^()]*\)|[^/=:]+)\Z")
 _DENOMINATOR = regex(r"(?<=\w/)\([^()]*\)")
 """As in `c in J/(g K)`, a part of a unit and not the unit in brackets."""
+_BEFORE_UNIT = regex(r"[\s/(\[,]+(?:in\s+)?\Z")
 _IN_WORDS = regex(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
 _SYMBOL = regex(r"\w{1,2}|\\[a-z]+")
 _TO_NUMBER = regex(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
@@ -113,6 +117,10 @@ def read_unit(text: str) -> UnitText:
     """The unit that a whole text is, with all its readings."""
     text = plain_unit(text)
     readings = [*find_units(text)] if text.strip("()1 ") else []
+    divisor = "" if readings else _DIVISOR.sub("", text)
+    if divisor not in ("", text) and not is_name(divisor):
+        symbols = divisor, *_SECOND_READINGS.get(NAMES.get(divisor, divisor), ())
+        readings = [unit for symbol in symbols for unit in find_units(f"1 per {symbol}")]
     if (symbol := NAMES.get(text, text)) in LEVELS:
         readings = [Unit(Fraction(1), ((symbol, Fraction(1)),))]  # it has no size, but a name
     for reading in _SECOND_READINGS.get(symbol, ()):
@@ -183,7 +191,7 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
         follows = words[count] if bare == product and count < len(words) else ""
         is_open = bare.count("(") > bare.count(")") or word in _SIGNS
         longer = read_unit(bare)
-        may_not_follow = r"[=:\d.+−-]" if has_names or count > 1 else "[=:]"
+        may_not_follow = r"[=:\d.+−]|-(?!>)" if has_names or count > 1 else "[=:]"
         is_certain = re.match(may_not_follow, follows) is None
         is_certain &= count == 1 or not word.endswith(":")  # a label, as in `3 kg N: 1`
         if longer and not unit:
@@ -203,6 +211,8 @@ def unit_behind(text: str, at: int = 0, *, has_names: bool = False) -> UnitText:
             unit = longer
         if not longer and not is_open and words[count - 2] in PER:
             return NO_UNIT  # `degrees per step`
+        if word in _AND and not {*PER}.isdisjoint(words[:count]):
+            return NO_UNIT if read_unit(_without_closing(follows)) else unit  # `mg per kg and day`
         if bare != product or not (longer or is_open):
             break
     is_attached = at > 0 and text[at : at + 1].isalpha()
@@ -264,6 +274,13 @@ def unit_of_header(text: str) -> UnitText:
         return NO_UNIT
     is_certain &= not is_name(unit.text) and not (unit.text == "min" and _has_maximum(text))
     return unit if is_certain else NO_UNIT
+
+
+def name_of_header(text: str) -> tuple[str, int]:
+    """A label or header without its unit, as `gain` of `gain / dB`; where that begins, or -1."""
+    unit = unit_of_header(text).text.replace(" ", "·")
+    at = text.replace(" ", "·").rfind(unit) if unit else -1  # `J/(kg K)`
+    return (_BEFORE_UNIT.sub("", text[:at]) if at > 0 else text), at
 
 
 def unit_of_label(before: str) -> UnitText:
@@ -349,6 +366,31 @@ def title_of_column(line: str, start: int, header: str, *, has_names: bool = Fal
             title = titles[column - shift]
             return header[title.start() : title.end()]
     return ""
+
+
+def title_above(row: str, number: Number, headers: Sequence[str]) -> str:
+    """The title of a printed number's column, in the nearest of the headers above its row.
+
+    In frames of pandas the row of an index may stand between, and a title of several columns above.
+    """
+    for at, header in enumerate(headers[:2]):
+        if title := title_of_column(row, number.start, header):
+            groups = [_title_of_group(number.end, header, above) for above in headers[at + 1 :][:1]]
+            return " ".join(filter(None, (*groups, title)))
+    return ""
+
+
+def _title_of_group(end: int, header: str, above: str) -> str:
+    """The title of several columns, for the one whose cells end at `end`.
+
+    It ends with the first of its columns. Where no title stands twice below, it tells nothing.
+    """
+    groups, titles = ([*_CELLS[0].finditer(text)] for text in (above, header))
+    ends = {title.end() for title in titles}
+    are_groups = groups[1:] and {group.end() for group in groups} <= ends and end in ends
+    if not are_groups or len({title[0] for title in titles}) == len(titles):
+        return ""
+    return next((group[0] for group in reversed(groups) if group.end() <= end), "")
 
 
 def _with_signs_of(neighbour: str, line: str) -> str:

@@ -156,7 +156,7 @@ FLOPS* 1 1/s
 fps 1,0.3048:m/s 1/s
 px 1 px pixel pixels
 pt! 0.0254/72,0.473176473e-3:m^3,0.56826125e-3:m^3 m
-dB ? 1 decibel
+dB ? 1 decibel dBA dB(A) dBC dB(C)
 Np ? 1
 """
 """Symbol, with marks; sizes in the third column's unit; names.

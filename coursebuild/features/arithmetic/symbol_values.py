@@ -136,6 +136,12 @@ def _source(formula: _Formula) -> str | None:
     return formula.source if isinstance(formula, model.Math) else None
 
 
+def _value_beside(formula: _Formula) -> model.NumberBinding | None:
+    """The value that a formula does not say itself."""
+    value = formula.value if isinstance(formula, model.Math) else None
+    return None if value is None or formula.tex.span().contains(value.text_span) else value
+
+
 def _read_symbols(document: model.Document) -> DocumentQuantities:
     places = tuple(_read_places(document))
     declarations: dict[str, SymbolQuantity] = {}
@@ -143,7 +149,7 @@ def _read_symbols(document: model.Document) -> DocumentQuantities:
     diagnostics: list[Diagnostic] = []
     for place in sorted(places, key=lambda place: place.formula.meaning is None):
         formula, span = place.formula, place.formula.span
-        number = formula.value if isinstance(formula, model.Math) else None
+        number = _value_beside(formula)
         if formula.meaning is None and number is None and _source(formula) is None:
             continue
         try:
@@ -187,7 +193,7 @@ def _read_quantity(
         NotUnderstood: the formula is not understood.
     """
     formula, tex = place.formula, place.formula.tex.text
-    number = formula.value if isinstance(formula, model.Math) else None
+    number = _value_beside(formula)
     sides = [side for statement in read_statements(tex, place.comma) for side in statement.sides]
     if number is not None and (len(sides) != 1 or sides[0].get_expression().kind != "symbol"):
         raise NotUnderstood("it is not a single symbol", 0, len(tex))

@@ -11,9 +11,11 @@ allow no inline styles. The same chart gives the same bytes.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from typing import NamedTuple
+
+from msgspec.structs import replace
 
 from coursebuild.core.drawing.scales import (
     Scale,
@@ -25,6 +27,7 @@ from coursebuild.core.drawing.scales import (
     text_width,
 )
 from coursebuild.core.model.measurements import Chart, ChartPoint
+from coursebuild.core.pages.renderer import Strings
 
 _DASHES = ("", "7 3", "2 3", "10 3 2 3", "1 4", "5 2 1 2 1 2", "12 4", "6 6")
 """One more than colours, as are the marks, so that the eighth line is not the first again."""
@@ -187,13 +190,35 @@ _NAME = 15.0
 """The distance from one name to the next."""
 
 
-def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
+def translate_chart(chart: Chart, translate: Callable[[str], str]) -> Chart:
+    """The chart with its words in the language of a page."""
+    x, y = map(translate, chart.axes)
+    return replace(
+        chart,
+        title=translate(chart.title),
+        text=translate(chart.text),
+        axes=(x, y),
+        lines=tuple(
+            replace(
+                line,
+                name=translate(line.name),
+                points=tuple(replace(p, title=translate(p.title)) for p in line.points),
+            )
+            for line in chart.lines
+        ),
+        levels=tuple(replace(level, text=translate(level.text)) for level in chart.levels),
+        marks=tuple(replace(mark, text=translate(mark.text)) for mark in chart.marks),
+    )
+
+
+def chart_svg(chart: Chart, name: str, size: tuple[float, float], words: Strings) -> str:
     """The chart as an `svg` element; empty where there is no point to be drawn.
 
     `name` is unique among the drawings on the page, as ids are made from it.
     """
     if not any(line.visible_points for line in chart.lines):
         return ""
+    chart = translate_chart(chart, words.translate)
     points = [point for line in chart.lines for point in line.points]
     xs = [log(x) for point in points for x in point.ends]
     ys = [log(point.y) for point in points if point.y]
@@ -210,7 +235,7 @@ def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
     left = 32 + max((text_width(text, TICK_SIZE) for _, text in _ticks_y(y)), default=0.0)
     right = size[0] - (10 if chart.marks else _NAMES)
     x = Scale(left, right, min(xs) - pad, max(xs) + pad)
-    body, height = "".join(_parts(chart, x, y)), y.start + 48
+    body, height = "".join(_parts(chart, x, y, words)), y.start + 48
     if chart.marks:
         lines = (Entry("line", line.name, line.number) for line in chart.lines)
         key_left = 6.0 if size == NARROW_SIZE else x.start
@@ -220,9 +245,9 @@ def chart_svg(chart: Chart, name: str, size: tuple[float, float]) -> str:
     return svg(body, (size[0], height), name, (chart.title, chart.text))
 
 
-def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
-    lines, texts = _grid(x, y, chart.axes)
-    yield from _levels(chart, x, y)
+def _parts(chart: Chart, x: Scale, y: Scale, words: Strings) -> Iterator[str]:
+    lines, texts = _grid(x, y, chart.axes, words)
+    yield from _levels(chart, x, y, words)
     yield path("".join(lines), 'stroke="currentColor" stroke-opacity="0.16"')
     edge = f"M{x.start:.1f} {y.end:.1f}V{y.start:.1f}H{x.end:.1f}"
     yield path(edge, 'stroke="currentColor" stroke-opacity="0.7"')
@@ -261,17 +286,17 @@ def _parts(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
         yield label(x.end + 9, at + 4, line.name, look)
 
 
-def _levels(chart: Chart, x: Scale, y: Scale) -> Iterator[str]:
+def _levels(chart: Chart, x: Scale, y: Scale, words: Strings) -> Iterator[str]:
     """The band that is not resolved, or where it would be, and lines of what means something."""
     if chart.least > 0 and log(chart.least) > y.low:
         top = y(chart.least)
         d = f"M{x.start:.1f} {top:.1f}H{x.end:.1f}V{y.start:.1f}H{x.start:.1f}Z"
         yield area(d, 'fill-opacity="0.09"')
-        text = f"under {number_text(chart.least)}: not resolved by the reference"
+        text = words.translate(f"under {number_text(chart.least)}: not resolved by the reference")
         at = (top + y.start) / 2 + 4 if y.start - top >= 16 else top - 5
         yield label(x.end - 6, at, text, f'text-anchor="end" {FINE} {HALO}')
     elif chart.least > 0:
-        text = f"not resolved: under {number_text(chart.least)}, below this scale"
+        text = words.translate(f"not resolved: under {number_text(chart.least)}, below this scale")
         place = _roomiest(chart, x, y, text, (y.start - 5, y.end + 12))
         yield label(*place, text, f'text-anchor="middle" {FINE} {HALO}')
     for level in chart.levels:
@@ -303,14 +328,16 @@ def _place(point: ChartPoint, x: Scale, y: Scale) -> tuple[float, float]:
     return x(point.x), y.end - 6 if point.y is None else y(point.y)
 
 
-def _grid(x: Scale, y: Scale, titles: tuple[str, str]) -> tuple[list[str], list[str]]:
+def _grid(
+    x: Scale, y: Scale, titles: tuple[str, str], words: Strings
+) -> tuple[list[str], list[str]]:
     lines = [f"M{x.start:.1f} {at:.1f}H{x.end:.1f}" for at in _decades(y)]
     texts: list[str] = []
     for at, text in _ticks_y(y):
-        texts.append(label(x.start - 7, at + 4, text, f'text-anchor="end" {FINE}'))
+        texts.append(label(x.start - 7, at + 4, words.translate(text), f'text-anchor="end" {FINE}'))
         lines.append(f"M{x.start:.1f} {at:.1f}h-4")
     for most in (9, 7, 5, 4, 3, 2):  # as many as fit without their texts touching
-        x_ticks = x.ticks(most)
+        x_ticks = [(at, words.translate(text)) for at, text in x.ticks(most)]
         ends = [(at, text_width(text, TICK_SIZE) / 2) for at, text in x_ticks]
         if all(b - a >= w + v + 8 for (a, w), (b, v) in pairwise(ends)):
             break

@@ -131,9 +131,11 @@ def draw_bench(page: PageContext, block: Bench) -> Markup:
     places = [b.span.start for b in find_blocks(page.document, Bench)]
     number = places.index(block.span.start) + 1
     report = view.scenario.report if view.scenario and "plot" in block.shows else None
-    drawings = plots(f"_bench-{number}", report) if report else ()
+    drawings = plots(page.words, f"_bench-{number}", report) if report else ()
     engines = view.engines
-    engine_drawings = plots(f"_bench-engines-{number}", engines.scenario) if engines else ()
+    engine_drawings = (
+        plots(page.words, f"_bench-engines-{number}", engines.scenario) if engines else ()
+    )
     return page.template(
         "bench/bench.html", bench=view, plots=drawings, engine_plots=engine_drawings
     )
@@ -147,7 +149,8 @@ def bench_markdown(writer: MarkdownWriter, block: Bench) -> str:
     report = None if view.scenario is None else view.scenario.report
     if isinstance(report, ScenarioReport) and "plot" in block.shows:
         # The table of a sweep holds all that its plot shows.
-        texts = (f"{chart.title}. {chart.text}" for chart in report.charts)
+        translate = writer.page.words.translate
+        texts = (f"{translate(c.title)}. {translate(c.text)}" for c in report.charts)
         rest = [*(guard_lines(escape_marks(text)) for text in texts), *rest]
     return "\n\n".join((head, *rest))
 
@@ -242,7 +245,9 @@ def draw_measurements(renderer: Renderer, view: MeasurementsView) -> Markup:
     """Draw the part of the page."""
 
     def draw(kind: str, reports: Iterable[Any]) -> list[Any]:
-        return [plots(f"_{kind}-{n}", report) for n, report in enumerate(reports, 1)]
+        return [
+            plots(renderer.words, f"_{kind}-{n}", report) for n, report in enumerate(reports, 1)
+        ]
 
     return renderer.render(
         "bench/measurements.html",

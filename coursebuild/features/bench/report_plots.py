@@ -20,6 +20,7 @@ from coursebuild.core.model.measurements import (
     SweepReport,
     SweepRow,
 )
+from coursebuild.core.pages.renderer import Strings
 from coursebuild.features.bench.chart import (
     FINE,
     MARK,
@@ -41,6 +42,7 @@ from coursebuild.features.bench.chart import (
     symbol,
     symbols,
 )
+from coursebuild.features.bench.grids import whole_number
 from coursebuild.features.bench.shown_errors import (
     FIGURES,
     cell,
@@ -50,10 +52,12 @@ from coursebuild.features.bench.shown_errors import (
 )
 
 
-def plot_svgs(report: ScenarioReport, *, name: str, narrow: bool = False) -> tuple[str, ...]:
+def plot_svgs(
+    report: ScenarioReport, words: Strings, *, name: str, narrow: bool = False
+) -> tuple[str, ...]:
     """The charts of a report as `svg` elements, with a `name` that is unique on the page."""
     size = NARROW_SIZE if narrow else WIDE_SIZE
-    return tuple(filter(None, (chart_svg(chart, name, size) for chart in report.charts)))
+    return tuple(filter(None, (chart_svg(chart, name, size, words) for chart in report.charts)))
 
 
 _SPREAD = 20.0
@@ -64,7 +68,7 @@ _GAP = 18.0
 """Between two scales."""
 
 
-def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
+def sweep_svg(sweep: SweepReport, words: Strings, *, name: str, narrow: bool = False) -> str:
     """The plot as an `svg` element; empty where nothing was measured."""
     figures = sweep.show[:_MAX_FIGURES]
     width, _ = NARROW_SIZE if narrow else WIDE_SIZE
@@ -89,14 +93,16 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
         pad = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
         scale = Scale(start, start + scale_width, low - pad, high + pad, is_log)
         names = left if n % column_count == 0 else 0.0
-        bottom = _panel(parts, sweep, figure, scale, top, names)
+        bottom = _panel(parts, sweep, figure, scale, top, names, words)
         top = bottom if narrow else top
     if any(row.own for row in sweep.rows):
-        key_svg, bottom = key([Entry("own", "as the model is")], 6.0, bottom + 20, width)
+        own_entry = Entry("own", words.translate("as the model is"))
+        key_svg, bottom = key([own_entry], 6.0, bottom + 20, width)
         parts.append(key_svg)
-    title = f"{sweep.title}: {', '.join(FIGURES[figure] for figure in figures)}"
+    titles = {figure: words.translate(FIGURES[figure]) for figure in figures}
+    title = f"{sweep.title}: {', '.join(titles.values())}"
     cells = [
-        (row, [f"{FIGURES[figure]} {cell(row, figure) or row.status}" for figure in figures])
+        (row, [f"{titles[f]} {words.translate(cell(row, f) or row.status)}" for f in figures])
         for row in sweep.rows
     ]
     text = " ".join(f"{row.parameter} {row.value}: {', '.join(texts)}." for row, texts in cells)
@@ -104,12 +110,18 @@ def sweep_svg(sweep: SweepReport, *, name: str, narrow: bool = False) -> str:
 
 
 def _panel(
-    parts: list[str], sweep: SweepReport, figure: str, scale: Scale, top: float, names: float
+    parts: list[str],
+    sweep: SweepReport,
+    figure: str,
+    scale: Scale,
+    top: float,
+    names: float,
+    words: Strings,
 ) -> float:
     """Add one figure of all rows, with their names where there is room; return its lower end."""
     y = top + 34
     ticks = scale.ticks(max(2, int((scale.end - scale.start) / 56)))
-    title = shorten_to_width(FIGURES[figure], scale.end - scale.start + 10, SIZE)
+    title = shorten_to_width(words.translate(FIGURES[figure]), scale.end - scale.start + 10, SIZE)
     parts.append(label(scale.start, top + 14, title))
     groups = [list(rows) for _, rows in groupby(sweep.rows, key=lambda row: row.parameter)]
     row_parts: list[str] = []
@@ -117,17 +129,24 @@ def _panel(
         if names:
             head = shorten_to_width(rows[0].parameter, names - 8, TICK_SIZE)
             row_parts.append(label(2, y + 4, head, f'{FINE} font-weight="600"'))
-        row_parts += _group(rows, figure, scale, y + ROW, number, names)
+        row_parts += _group(rows, figure, scale, y + ROW, number, names, words)
         y += ROW * (len(rows) + 1) + 4
     lines = [f"M{x:.1f} {top + 22:.1f}V{y - 10:.1f}" for x, _ in ticks]
     parts.append(path("".join(lines), 'stroke="currentColor" stroke-opacity="0.16"'))
     parts += row_parts
-    parts += [label(x, y + 4, text, f'text-anchor="middle" {FINE}') for x, text in ticks]
+    look = f'text-anchor="middle" {FINE}'
+    parts += [label(x, y + 4, words.translate(text), look) for x, text in ticks]
     return y + 12
 
 
 def _group(
-    rows: Sequence[SweepRow], figure: str, scale: Scale, top: float, number: int, names: float
+    rows: Sequence[SweepRow],
+    figure: str,
+    scale: Scale,
+    top: float,
+    number: int,
+    names: float,
+    words: Strings,
 ) -> Iterator[str]:
     places = [(figure_interval(row, figure), top + ROW * n) for n, row in enumerate(rows)]
     for (start, y), (end, end_y) in pairwise(places):
@@ -138,17 +157,18 @@ def _group(
         if names:
             yield label(names - 8, y + 4, row.value, f'text-anchor="end" {FINE}')
         if interval is None:
-            text = "" if row.status == "ok" else row.status
+            text = "" if row.status == "ok" else words.translate(row.status)
             yield label(scale.start, y + 4, text, FINE)
             continue
-        x, title = scale(interval.value), f"{row.parameter} {row.value}: {cell(row, figure)}"
+        x = scale(interval.value)
+        title = f"{row.parameter} {row.value}: {words.translate(cell(row, figure))}"
         yield path(bar(scale(interval.low), scale(interval.high), y), f'stroke="{colour(number)}"')
         yield symbols(number, [symbol(number, x, y, MARK, full=True, title=title)])
         if row.own:
             yield ring(x, y, 7)
 
 
-def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> str:
+def engine_svg(report: EngineScenario, words: Strings, *, name: str, narrow: bool = False) -> str:
     """The time of a step by the number of worlds; empty where nothing was timed."""
     lines = []
     for number, row in enumerate(report.rows):
@@ -156,14 +176,16 @@ def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> st
             ChartPoint(
                 float(cost.worlds),
                 cost.seconds.value * 1e6,
-                f"{row_name(row)}, {cost.worlds:,} worlds: {seconds_text(cost.seconds.value, 3)}",
+                f"{row_name(row)}, {whole_number(cost.worlds)} worlds: "
+                f"{seconds_text(cost.seconds.value, 3)}",
             )
             for cost in row.costs
             if cost.seconds is not None
         )
         lines += [ChartLine(row_name(row), number, points)] if points else []
     text = " ".join(
-        f"{line.name}: {', '.join(point.title.rsplit(', ', 1)[1] for point in line.points)}."
+        f"{words.translate(line.name)}: "
+        f"{', '.join(words.translate(point.title.rsplit(', ', 1)[1]) for point in line.points)}."
         for line in lines
     )
     chart = Chart(
@@ -173,4 +195,4 @@ def engine_svg(report: EngineScenario, *, name: str, narrow: bool = False) -> st
         lines=tuple(lines),
         marks=(ChartMark("note", "lowest of at least 8 rounds"),),
     )
-    return chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE)
+    return chart_svg(chart, name, NARROW_SIZE if narrow else WIDE_SIZE, words)

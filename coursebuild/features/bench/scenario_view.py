@@ -36,7 +36,6 @@ from coursebuild.features.bench.shown_errors import (
     seconds_text,
     setting_text,
     solving_parts,
-    status_text,
 )
 
 _FEWEST_STEPS = 20
@@ -80,18 +79,19 @@ def scenario_view(
 ) -> ScenarioView:
     """Make the view of a scenario or a sweep; `anchor` is its id on the page, if it has one."""
     if isinstance(report, SweepReport):
+        names = {key: words.translate(name) for key, name in FIGURES.items()}
         columns = [
             (words("measured.parameter"), [row.parameter for row in report.rows]),
             (words("measured.value"), [row.value for row in report.rows]),
-            *((name, [cell(row, key) for row in report.rows]) for key, name in FIGURES.items()),
+            *((name, [cell(row, key) for row in report.rows]) for key, name in names.items()),
         ]
-        minor = tuple(name for key, name in FIGURES.items() if key not in report.show)
+        minor = tuple(name for key, name in names.items() if key not in report.show)
         own_rows = tuple(n for n, row in enumerate(report.rows) if row.own)
-        notes = lost_runs((f"{row.parameter} {row.value}", row) for row in report.rows)
+        notes = lost_runs(words, ((f"{row.parameter} {row.value}", row) for row in report.rows))
         table = grids.grid(report.title, columns, minor=minor, highlights=own_rows)
         return ScenarioView(anchor, report.title, table, tuple(notes), report)
-    notes = lost_runs((row.name, row) for row in report.rows)
-    softened = [row.name for row in report.rows if row.refsafe]
+    notes = lost_runs(words, ((row.name, row) for row in report.rows))
+    softened = [words.translate(row.name) for row in report.rows if row.refsafe]
     if softened:
         notes.append(words("measured.refsafe", settings="; ".join(softened)))
     rows = []
@@ -105,7 +105,7 @@ def scenario_view(
         anchor=anchor,
         title=report.title or report.name,
         description=tuple(_describe(words, report)),
-        verdict=grids.sentence(report.verdict.text),
+        verdict=grids.sentence(words.translate(report.verdict.text)),
         settings=_settings_table(words, report),
         notes=tuple(notes),
         orders=orders_table(words, words("measured.orders"), report.orders),
@@ -132,7 +132,7 @@ def _describe(words: Strings, report: ScenarioReport) -> list[str]:
         sentences.append(words("measured.hold", time=words.decimals(seconds_text(report.hold))))
     parts = [] if report.own_setting is None else solving_parts(report.own_setting)
     if parts:
-        sentences.append(words("measured.usual", setting=", ".join(parts)))
+        sentences.append(words("measured.usual", setting=words.translate(", ".join(parts))))
     reference, floor = f"measured.reference_{report.reference}", grids.power(report.floor, 1)
     sentences.append(grids.phrase(words, reference, source=report.source, floor=floor))
     if report.second:
@@ -152,14 +152,14 @@ def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
         sizes = (value[0] if isinstance(value, tuple) else value for value in values)
         errors: list[str] = [grids.bounded(size, quantity.least) for size in sizes]
         key = _QUANTITIES.get(quantity.name)
-        return quantity.label if key is None else words(key), errors
+        return words.translate(quantity.label) if key is None else words(key), errors
 
     names = ("remark", "realtime", "seconds", "evaluations", "iterations")
     remarks, speed, time, evaluations, iterations = (words(f"measured.{name}") for name in names)
     columns: list[tuple[str, list[str]]] = [
         (
             words("measured.setting"),
-            [row.name for row in rows],
+            [words.translate(row.name) for row in rows],
         ),
         (words("measured.cost"), ["" if r.cost is None else interval_text(r.cost) for r in rows]),
         (speed, [grids.factor(row.realtime) for row in rows]),
@@ -189,7 +189,7 @@ def _settings_table(words: Strings, report: ScenarioReport) -> grids.Grid:
 def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> str:
     parts = [words("measured.own")] if row.own else []
     if row.status != "ok":
-        parts.append(status_text(row.status))
+        parts.append(words.translate(row.status))
     if row.refsafe:
         parts.append("refsafe")
     if row.lucky:
@@ -197,17 +197,18 @@ def _remark(words: Strings, report: ScenarioReport, row: WorkPrecisionRow) -> st
     elif row.front:
         parts.append(words("measured.front"))
     elif row.dominated_by is not None:
-        parts.append(words("measured.better", setting=report.rows[row.dominated_by].name))
+        name = report.rows[row.dominated_by].name
+        parts.append(words("measured.better", setting=words.translate(name)))
     return "; ".join(parts)
 
 
-def lost_runs(runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
+def lost_runs(words: Strings, runs: Iterable[tuple[str, MeasuredRun | SweepRow]]) -> list[str]:
     """Say why runs were lost; runs with the same reasons stand together."""
     names_by_reasons: dict[tuple[str, ...], list[str]] = {}
     for name, run in runs:
         if run.status != "ok":
-            reasons = (status_text(run.status), *run.reasons)
-            names_by_reasons.setdefault(reasons, []).append(name)
+            reasons = tuple(map(words.translate, (run.status, *run.reasons)))
+            names_by_reasons.setdefault(reasons, []).append(words.translate(name))
     groups = names_by_reasons.items()
     return [f"{'; '.join(names)}: {'; '.join(reasons)}." for reasons, names in groups]
 
@@ -331,7 +332,7 @@ def engine_view(words: Strings, scenario: EngineScenario, report: EngineReport) 
     """Make the view of a scenario in other engines."""
     title = scenario.title or scenario.name
     description = [
-        words("measured.usual", setting=setting_text(scenario.setting)),
+        words("measured.usual", setting=words.translate(setting_text(scenario.setting))),
         words("measured.duration", time=words.decimals(seconds_text(scenario.duration))),
     ]
     if scenario.horizon < scenario.duration:
@@ -352,7 +353,8 @@ def engine_view(words: Strings, scenario: EngineScenario, report: EngineReport) 
         description=tuple(description),
         table=_engine_table(words, scenario, words("measured.engines_of", title=title)),
         notes=tuple(
-            f"{row_name(row)}, {words('measured.worlds', n=cost.worlds)}: {cost.remark}."
+            f"{words.translate(row_name(row))}, "
+            f"{words('measured.worlds', n=cost.worlds)}: {cost.remark}."
             for row in scenario.rows
             for cost in row.costs
             if cost.remark
@@ -378,13 +380,13 @@ def _engine_table(words: Strings, scenario: EngineScenario, label: str) -> grids
         if row.status == "ok":
             return ""
         if row.status == "diverged":
-            return f"{status_text(row.status)}: {row.message}"
+            return f"{words.translate(row.status)}: {row.message}"
         key = "unsupported" if row.status == "unsupported" else "failed"
         return words(f"measured.{key}", reason=row.message)
 
     counts = sorted({cost.worlds for row in rows for cost in row.costs})
     columns: list[tuple[str, list[str]]] = [
-        (words("measured.engine"), [row_name(row) for row in rows]),
+        (words("measured.engine"), [words.translate(row_name(row)) for row in rows]),
         (words("measured.position"), errors("position", place)),
         (words("measured.attitude"), errors("attitude", place)),
         (words("measured.velocity"), errors("velocity", speed)),
@@ -410,7 +412,7 @@ def _cost_text(row: EngineRow, worlds: int) -> str:
 
 
 def plots(
-    name: str, report: ScenarioReport | SweepReport | EngineScenario
+    words: Strings, name: str, report: ScenarioReport | SweepReport | EngineScenario
 ) -> tuple[tuple[Markup, ...], ...]:
     """Draw the plots, each for wide and for narrow screens; `name` is unique on the page."""
     from coursebuild.features.bench import report_plots  # late: few pages need it
@@ -418,11 +420,11 @@ def plots(
     def draw(kind: str) -> tuple[str, ...]:
         key, narrow = f"{name}-{kind}", kind == "narrow"
         if isinstance(report, ScenarioReport):
-            return report_plots.plot_svgs(report, name=key, narrow=narrow)
+            return report_plots.plot_svgs(report, words, name=key, narrow=narrow)
         if isinstance(report, SweepReport):
-            svg = report_plots.sweep_svg(report, name=key, narrow=narrow)
+            svg = report_plots.sweep_svg(report, words, name=key, narrow=narrow)
         else:
-            svg = report_plots.engine_svg(report, name=key, narrow=narrow)
+            svg = report_plots.engine_svg(report, words, name=key, narrow=narrow)
         return (svg,) if svg else ()
 
     pairs = zip(draw("wide"), draw("narrow"), strict=True)

@@ -47,11 +47,6 @@ def solving_parts(setting: MeasuredSetting) -> list[str]:
     return parts + [f"{name} {value}" for name, value in setting.options]
 
 
-def status_text(status: str) -> str:
-    """How a run went, in words."""
-    return "grew" if status == "slow-growth" else status
-
-
 FIGURES = {
     "change": "change (1: just visible)",
     "parted": "change seen after (s)",

@@ -200,7 +200,7 @@ def case_view(words: Strings, report: CaseReport) -> CaseView:
     tables = (boundaries, _figures(words, report), orders)
     name = urls.encode(report.name)
     drawings = [
-        Markup(chart_svg(chart, f"{name}-{number}", PAIR_SIZE))
+        Markup(chart_svg(chart, f"{name}-{number}", PAIR_SIZE, words))
         for number, chart in enumerate(report.charts, 1)
     ]
     return CaseView(
@@ -270,7 +270,7 @@ def _notes(words: Strings, report: CaseReport) -> list[str]:
         times = words.decimals(", ".join(map(seconds_text, softened_steps)))
         notes.append(words("measured.refsafe", settings=times))
     runs = ((f"{run.integrator} at {seconds_text(run.timestep)}", run) for run in report.errors)
-    return [*notes, *scenario_view.lost_runs(runs)]
+    return [*notes, *scenario_view.lost_runs(words, runs)]
 
 
 KIND = PageKind(

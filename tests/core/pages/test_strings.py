@@ -123,6 +123,7 @@ def test_every_text_that_is_asked_for_exists_and_every_one_is_used(assets: Asset
         "words.",
     )
     run_time_prefixes += ("lab.live.", "preview.", "measured.reference_", "numerics.case_")
+    run_time_prefixes += ("report.",)
     text = "".join(text for path, text in assets.templates if path.endswith(".html"))
     for folder in ("core/pages", "features"):
         modules = sorted((ROOT / "coursebuild" / folder).rglob("*.py"))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
+from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
 
 from coursebuild.core.model.results import Reports
+from coursebuild.core.pages.materials import strings_for
 from coursebuild.features.bench.grids import bounded, factor, percent, power, sentence, size
 from mjbench.reports.model_report import StepCost
 from samples.reports import interval
@@ -16,6 +19,8 @@ from support.bench_reports import swing
 from support.fixture_cases import fixture_tables
 from support.model_reports import box, case, diet, reports, row, run, scenario, scene
 from support.rendered_course import MAP, Make
+
+ROOT = Path(__file__).parents[3]
 
 
 def test_numbers_and_sentences_as_text() -> None:
@@ -78,14 +83,33 @@ def test_a_scenario_has_its_plots_tables_and_figures_as_a_file(site: dict[str, s
     assert "MuJoCo 3.14.0, Python 3.11.7, NumPy 2.3.0; Linux x86_64, A Processor @ 2 GHz." in words
 
 
-def test_what_was_measured_has_the_decimal_sign_of_the_language(make: Make) -> None:
+def test_what_was_measured_is_told_in_the_language_of_the_page(make: Make) -> None:
     course = MAP.replace('language = "en"', 'language = "de"')
     german = make("## A\n\nText.\n", course=course)
     brief = replace(reports().scenes["box"], scenarios=(scenario(swing().rows, duration=2.5),))
     files = german.site(reports=Reports({"box": brief}))
-    words = text(files["models/box.html"].decode())
+    page = files["models/box.html"].decode()
+    words = text(page)
     assert "Das Szenario dauert 2,5 s." in words
-    assert re.search(r"RK4 at 20 ms 0,39 ", words)
+    assert re.search(r"RK4 mit 20 ms 0,39 ", words)
+    labels = re.findall(r"<(?:text|title|desc)\b[^>]*>([^<]+)", page)
+    assert "Kosten, relativ zur Einstellung der Szene" in labels
+    english = re.compile(r"\b(the|is|of|at|than|with|errors?|cost|steps|better)\b")
+    assert [t for t in labels if english.search(t)] == []
+
+
+def test_every_text_of_the_reports_has_a_translation(make: Make) -> None:
+    english, german = (strings_for(make.assets.templates, name).translate for name in ("en", "de"))
+    for report_text, expected in fixture_tables("measured")["german"]:
+        assert german(report_text) == expected
+        assert english(report_text) == report_text
+    left = re.compile(r"\b(the|is|of|at|than|takes|errs|which|it)\b")
+    for path in sorted((ROOT / "content/reports").glob("*.bench.json")):
+        for report in json.loads(path.read_bytes())["scene"]["scenarios"]:
+            texts = [report["verdict"]["text"]]
+            for chart in report["charts"]:
+                texts += chart["axes"] + [m["text"] for m in chart["levels"] + chart["marks"]]
+            assert [t for t in map(german, texts) if left.search(t)] == [], path.name
 
 
 def test_where_the_duration_ended_the_search_for_stable_timesteps(make: Make) -> None:

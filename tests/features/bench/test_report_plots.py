@@ -16,13 +16,14 @@ from coursebuild.core.model.measurements import Interval, ScenarioReport, SweepR
 from coursebuild.features.bench.chart import line_look, outline
 from coursebuild.features.bench.report_plots import plot_svgs, sweep_svg
 from support.bench_reports import diverged_row, row, scenario, swing
+from support.plain_html import WORDS
 
 PLACE = re.compile(r"(-?\d+\.?\d*) (-?\d+\.?\d*)")
 
 
 def parse_plot(report: ScenarioReport, number: int = 0, **options: Any) -> ElementTree.Element:
     """A plot: well-formed, everything inside of it, and no two texts over each other."""
-    svg = plot_svgs(report, name="p", **options)[number]
+    svg = plot_svgs(report, WORDS, name="p", **options)[number]
     root = ElementTree.fromstring(svg)
     _, _, width, height = (float(x) for x in root.attrib["viewBox"].split())
     boxes = []
@@ -218,7 +219,7 @@ def test_any_report_is_drawn(rows: Any, floor: float, narrow: bool) -> None:
         row(name, h, position=(e, e), velocity=None, cost=cost, status=status, own=n == 0)
         for n, (name, h, e, cost, status) in enumerate(rows)
     ]
-    for svg in plot_svgs(scenario(report_rows, floor=floor), name="p", narrow=narrow):
+    for svg in plot_svgs(scenario(report_rows, floor=floor), WORDS, name="p", narrow=narrow):
         assert len(titles(ElementTree.fromstring(svg))) == len(report_rows)
 
 
@@ -235,13 +236,13 @@ ROWS = (
 
 
 def test_a_sweep_without_figures_has_no_plot() -> None:
-    assert sweep_svg(table(), name="p") == ""
+    assert sweep_svg(table(), WORDS, name="p") == ""
 
 
 @pytest.mark.parametrize("narrow", [False, True])
 def test_every_value_is_a_dot_in_the_plot(narrow: bool) -> None:
     report = table(*ROWS, show=("penetration", "cost"))
-    root = ElementTree.fromstring(sweep_svg(report, name="p", narrow=narrow))
+    root = ElementTree.fromstring(sweep_svg(report, WORDS, name="p", narrow=narrow))
     names = [element.text for path in root.iter("path") for element in path.iter("title")]
     assert names == [
         "geom.solref[0] 0.01: 0.0001",
@@ -257,6 +258,6 @@ def test_every_value_is_a_dot_in_the_plot(narrow: bool) -> None:
 def test_in_chaos_no_size_of_a_change_is_drawn() -> None:
     row = replace(ROWS[0], parted=2.0)
     assert "1: just visible" in sweep_svg(
-        table(replace(row, change=3.0), show=("change",)), name="s"
+        table(replace(row, change=3.0), show=("change",)), WORDS, name="s"
     )
-    assert "1: just visible" not in sweep_svg(table(row, show=("parted",)), name="s")
+    assert "1: just visible" not in sweep_svg(table(row, show=("parted",)), WORDS, name="s")
