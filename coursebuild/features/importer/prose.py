@@ -369,7 +369,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if any(key.partition("-")[0] in _CROSS_KINDS for key in keys):
                 return _rewrite_line(whole[1:-1], context)
             if keys and context.are_sources(keys):
-                return re.sub(",(?=[ ]*@)", ";", whole.replace("-@", "@"))
+                return re.sub(rf"(@{_KEY}),(?=[ ]*@)", r"\1;", whole.replace("-@", "@"))
             message = f"`{whole}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave("citation", message)
             return f"(<{keys[0]}>)" if whole.startswith("[@http") else f"`{whole}`"
