@@ -18,6 +18,8 @@ from urllib.parse import unquote, urlsplit
 from msgspec import Struct
 
 from coursebuild.api import Edit, Source, Span, model, regex
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.run.typesetting import MathEngine
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.features.importer.displays import DEFINITION
@@ -246,26 +248,34 @@ def _break_mentions(document: model.Document) -> Iterator[Edit]:
 def _find_common_macros(documents: Iterable[model.Document]) -> dict[str, str]:
     """Return what macros stand for by which all texts mean the same, if any formula uses them.
 
-    One that a text renews means something else elsewhere.
+    One that a text renews means something else elsewhere, and so does a command that has a meaning,
+    in a text that uses it and does not define it.
     """
     bodies: dict[str, set[str]] = defaultdict(set)
-    used_names: set[str] = set()
-    for tex in (f.tex.text for document in documents for _, f in model.find_formulas(document)):
-        used_names |= {*_COMMAND.findall(DEFINITION.sub(lambda match: match["body"], tex))}
-        for match in DEFINITION.finditer(tex):
+    used_names, strange_names = set[str](), set[str]()
+    for document in documents:
+        texts = [formula.tex.text for _, formula in model.find_formulas(document)]
+        matches = [match for tex in texts for match in DEFINITION.finditer(tex)]
+        for match in matches:
             body, count = " ".join(match["body"].split()), match["count"] or 0
             if match["kind"] == "DeclareMathOperator":
                 body = f"\\operatorname{match['star']}{{{body}}}"
             is_whole = match["kind"] != "renewcommand" and f"#{count}" in f"#0{body}"
             bodies[match["name"] or match["own"]] |= {body, body if is_whole else ""}
-    names = [name for name, texts in bodies.items() if len(texts) == 1 and name in used_names]
-    macros = {name: min(bodies[name]) for name in names}
-    while other_names := bodies.keys() - macros.keys():
-        with_others = [n for n, b in macros.items() if other_names & {*_COMMAND.findall(b)}]
-        if not with_others:
-            break
-        macros = {name: body for name, body in macros.items() if name not in with_others}
-    return macros
+        names = {n for tex in texts for n in _COMMAND.findall(DEFINITION.sub(r"\g<body> ", tex))}
+        strange_names |= names - {match["name"] or match["own"] for match in matches}
+        used_names |= names
+    names = {name for name in bodies if len(bodies[name]) == 1 and name in used_names}
+    shared_names = sorted(names & strange_names)
+    formulas = [Formula(rf"\{name}{{x}}{{x}}", display=False) for name in shared_names]
+    for name, result in zip(shared_names, MathEngine().typeset(formulas), strict=True):
+        if not (isinstance(result, MathError) and "unknown command" in result.message):
+            names.remove(name)
+    while others := {
+        n for n in names if {*_COMMAND.findall(min(bodies[n]))} & bodies.keys() - names
+    }:
+        names -= others
+    return {name: min(bodies[name]) for name in bodies if name in names}
 
 
 def _carry_macros(document: model.Document, common: Mapping[str, str]) -> Iterator[Edit]:
