@@ -28,7 +28,6 @@ from coursebuild.features.importer.source_files import find_group, title_of_file
 
 _GONE = regex(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
 _REFERENCE = regex(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
-_COMMAND = regex(r"\\([A-Za-z]+)")
 
 
 class _Text(Struct, frozen=True):
@@ -262,20 +261,22 @@ def _find_common_macros(documents: Iterable[model.Document]) -> dict[str, str]:
                 body = f"\\operatorname{match['star']}{{{body}}}"
             is_whole = match["kind"] != "renewcommand" and f"#{count}" in f"#0{body}"
             bodies[match["name"] or match["own"]] |= {body, body if is_whole else ""}
-        names = {n for tex in texts for n in _COMMAND.findall(DEFINITION.sub(r"\g<body> ", tex))}
-        strange_names |= names - {match["name"] or match["own"] for match in matches}
-        used_names |= names
+        commands = _commands(DEFINITION.sub(r"\g<body> ", " ".join(texts)))
+        strange_names |= commands - {match["name"] or match["own"] for match in matches}
+        used_names |= commands
     names = {name for name in bodies if len(bodies[name]) == 1 and name in used_names}
     shared_names = sorted(names & strange_names)
     formulas = [Formula(rf"\{name}{{x}}{{x}}", display=False) for name in shared_names]
     for name, result in zip(shared_names, MathEngine().typeset(formulas), strict=True):
         if not (isinstance(result, MathError) and "unknown command" in result.message):
             names.remove(name)
-    while others := {
-        n for n in names if {*_COMMAND.findall(min(bodies[n]))} & bodies.keys() - names
-    }:
-        names -= others
+    while carried_names := {n for n in names if _commands(min(bodies[n])) & bodies.keys() - names}:
+        names -= carried_names
     return {name: min(bodies[name]) for name in bodies if name in names}
+
+
+def _commands(tex: str) -> set[str]:
+    return {*re.findall(r"\\([A-Za-z]+)", tex)}
 
 
 def _carry_macros(document: model.Document, common: Mapping[str, str]) -> Iterator[Edit]:
@@ -285,7 +286,7 @@ def _carry_macros(document: model.Document, common: Mapping[str, str]) -> Iterat
         tex, definitions = formula.tex.text, ""
         matches = {match["name"] or match["own"]: match for match in DEFINITION.finditer(tex)}
         for name, definition in reversed(macros.items()):
-            if name not in matches and name in _COMMAND.findall(tex + definitions):
+            if name not in matches and name in _commands(tex + definitions):
                 definitions = definition + definitions
         span, text = formula.tex.span(), document.source.text
         if matches and not DEFINITION.sub("", tex).strip():  # they stand in each formula below
