@@ -353,7 +353,11 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 return whole
             if context.path.endswith(".ipynb") and match.string.lstrip().startswith("|"):
                 formula = re.sub(r"(?<!\\)\|", r"\\vert ", formula)  # no bar there ends a cell
-            return _TIGHT.sub(lambda m: m[1].strip() and f"${m[1].strip()}$", formula)
+            inner = formula[1:-1]
+            if formula.startswith("$$") or inner == inner.strip():
+                return formula
+            inner = _BLANK_END.sub("", inner).strip()  # blanks at the ends, which some tools allow
+            return inner and f"${inner}$"
         case "code":
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)
@@ -443,7 +447,6 @@ _STATEMENTS = regex(r"\s*(?:\{%[^%\n]*%\}\s*)+")
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = regex(rf"(?<![\w@`])@({_KEY})")
-_TIGHT = regex(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
-"""A formula with blanks at its ends, which some tools allow."""
+_BLANK_END = regex(r"(?:\\[ ,;])*\s*\Z")
 _WORD = regex(r"(?s)\A(?!.*\\[A-Za-z]).*(?<![A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
 """A word outside of braces and no command, as of a sentence between two prices."""
