@@ -42,7 +42,7 @@ _ESCAPED = regex(
     re.DOTALL,
 )
 """A formula whose brackets have two backslashes, one of which is Markdown's; or code."""
-_LABEL = regex(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
+LABEL = regex(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
 """A label of LaTeX, or of mdBook's preprocessor `numeq`."""
 _EMPTY = regex(r"[ \t]*\n?[ \t]*")
 _MARGIN = regex(r"[ \t]*>[ \t>]*|[ \t]+\Z")
@@ -105,7 +105,8 @@ def _write_doxygen(match: re.Match[str]) -> str:
 
 
 def display_formula(tex: str, label: str) -> str:
-    """Return a displayed formula in Markdown."""
+    """Return a displayed formula in Markdown, whose own label may stand in its TeX."""
+    label, tex = label or find_group(LABEL, tex), LABEL.sub("", tex)
     return f"$$\n{_align(tex).strip()}\n$$" + (f" {{#eq:{label_anchor(label)}}}" if label else "")
 
 
@@ -125,8 +126,8 @@ def _drop_empty(match: re.Match[str]) -> str:
 def _label_formula(match: re.Match[str]) -> str:
     if match["tex"] is None:
         return match[0]
-    label = match["myst"] or match["quarto"] or find_group(_LABEL, match["tex"])
-    tex = _LABEL.sub("", match["tex"])
+    label = match["myst"] or match["quarto"] or find_group(LABEL, match["tex"])
+    tex = LABEL.sub("", match["tex"])
     tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
     tex = _align(tex)
     opening, closing = "", match["behind"] or ""

@@ -354,8 +354,10 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if context.path.endswith(".ipynb") and match.string.lstrip().startswith("|"):
                 formula = re.sub(r"(?<!\\)\|", r"\\vert ", formula)  # no bar there ends a cell
             inner = formula[1:-1]
-            if formula.startswith("$$") or inner == inner.strip():
+            if formula.startswith("$$"):
                 return formula
+            if inner == inner.strip():
+                return convert_role("math", inner, context)
             inner = _BLANK_END.sub("", inner).strip()  # blanks at the ends, which some tools allow
             return inner and f"${inner}$"
         case "code":

@@ -51,7 +51,8 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
     words, target = (parts["words"], parts["target"]) if parts else ("", body)
     match name:
         case "math":
-            return f"${body}$"
+            label = find_group(r"\A\\(?:eq)?ref\{([^{}]+)\}\Z", body)
+            return convert_role("eq", label, context) if label else f"${body}$"
         case "eq":
             return write_link(words, context.resolve_formula(target))
         case "doc":
