@@ -354,13 +354,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 return whole
             if context.path.endswith(".ipynb") and match.string.lstrip().startswith("|"):
                 formula = re.sub(r"(?<!\\)\|", r"\\vert ", formula)  # no bar there ends a cell
-            inner = formula[1:-1]
-            if formula.startswith("$$"):
-                return formula
-            if inner == inner.strip():
-                return convert_role("math", inner, context)
-            inner = _BLANK_END.sub("", inner).strip()  # blanks at the ends, which some tools allow
-            return inner and f"${inner}$"
+            is_shown = formula.startswith("$$")
+            return formula if is_shown else convert_role("math", formula[1:-1], context)
         case "code":
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)
@@ -450,6 +445,5 @@ _STATEMENTS = regex(r"\s*(?:\{%[^%\n]*%\}\s*)+")
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = regex(rf"(?<![\w@`])@({_KEY})")
-_BLANK_END = regex(r"(?:\\[ ,;])*\s*\Z")
 _WORD = regex(r"(?s)\A(?!.*\\[A-Za-z]).*(?<![A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
 """A word outside of braces and no command, as of a sentence between two prices."""

@@ -51,8 +51,10 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
     words, target = (parts["words"], parts["target"]) if parts else ("", body)
     match name:
         case "math":
+            if body != body.strip():  # blanks at its ends, which some tools allow
+                body = re.sub(r"(?:\\[ ,;])*\s*\Z", "", body).strip()
             label = find_group(r"\A\\(?:eq)?ref\{([^{}]+)\}\Z", body)
-            return convert_role("eq", label, context) if label else f"${body}$"
+            return convert_role("eq", label, context) if label else body and f"${body}$"
         case "eq":
             return write_link(words, context.resolve_formula(target))
         case "doc":
