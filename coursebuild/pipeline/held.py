@@ -55,7 +55,10 @@ class HeldDocuments:
         self._store, self._addresses = store, addresses
         self._outputs, self._other_runs = outputs, other_runs
         self._course_key = fingerprint(
-            (course.comparison, course.filters, course.callouts, course.words, course.language)
+            (
+                (course.comparison, course.filters, course.callouts),
+                (course.words, course.language, course.words_of(None).macros),
+            )
         )
         self._known_addresses = self._by_document()
         self._keys: dict[str, str] = {}

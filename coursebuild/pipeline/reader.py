@@ -20,9 +20,13 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Self, TypeAlias, TypeVar
 
 from msgspec import Struct
-from msgspec.structs import replace
+from msgspec.structs import astuple, replace
 
-from coursebuild.core.checks.formulas import check_formulas, document_formulas
+from coursebuild.core.checks.formulas import (
+    check_formulas,
+    check_macros,
+    document_formulas,
+)
 from coursebuild.core.checks.lessons import check_course
 from coursebuild.core.engine.page_pool import Workers, can_fork
 from coursebuild.core.engine.store import Store, value_reader
@@ -161,7 +165,17 @@ class Reader:
 
     def read_map(self, source: Source) -> Parsed[Course | None]:
         """Return the course that a map describes, and what is wrong in it."""
-        return self._get_or_parse(_MAPS, Course, source, parse_course_map)
+
+        def typeset(formula: Formula) -> str | MathError:
+            with self._lock:
+                return self._typeset(source.path, [formula])[formula]
+
+        def parse(source: Source) -> Parsed[Course | None]:
+            course, diagnostics = astuple(parse_course_map(source))
+            macros = course.macros if course is not None else {}
+            return Parsed(course, (*diagnostics, *check_macros(macros, typeset)))
+
+        return self._get_or_parse(_MAPS, Course, source, parse)
 
     def read_declarations(self, source: Source) -> Parsed[Declarations | None]:
         """Return what a file beside a model declares, and what is wrong in it."""

@@ -126,6 +126,16 @@ def test_an_edit_of_the_map_draws_all_that_show_it(course: Course) -> None:
     course.extra = '[callouts.warning]\nlabel = "Careful"\npromise = "It bites."\n'
     course.save()
     assert drawn_pages(course.folder) == {lesson("1.3")}
+    course.extra += "\n[macros]\nvv = '\\mathbf{v}'\n"
+    course.edit("1.3", "Remark", "Remark $\\vv$")
+    course.save()
+    drawn_pages(course.folder)
+    course.folder.replace("content/course.toml", "{v}", "{w}")
+    assert lesson("1.3") in drawn_pages(course.folder), "a macro is part of every text"
+    assert course.folder.main("build", "--quiet").status == 0
+    stem = f"public/{lesson('1.3').removesuffix('.html')}"
+    copies = [course.folder.text(f"{stem}.{ending}") for ending in ("html", "md", "ipynb")]
+    assert all("mathbf{w}" in copy and "vv" not in copy for copy in copies)
     for old, new in (('"Tested"', '"Renamed"'), ("[course]", '[course]\nlicence = "CC0-1.0"')):
         course.folder.replace("content/course.toml", old, new)
         assert course.folder.main("build", "--quiet").status == 0  # over the old site

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import groupby
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from msgspec import Struct
+from msgspec.structs import replace
 
 from coursebuild.core.model import (
     Block,
@@ -29,6 +30,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
+from coursebuild.core.text.macros import expand_macros
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
@@ -109,15 +111,34 @@ def check_formulas(
     return tuple(diagnostics)
 
 
+_IN_MACRO = "it stands in a macro of the course, in `[macros]` of its map"
+
+
+def check_macros(
+    macros: Mapping[str, Excerpt], typeset: Callable[[Formula], str | MathError]
+) -> Iterator[Diagnostic]:
+    """Report macros with a command that there is not; one may begin what another one ends."""
+    texts = {name: body.text for name, body in macros.items()}
+    for body in macros.values():
+        plain_body = replace(body, text=re.sub("#[1-9]", " x", body.text))
+        tex = expand_macros(plain_body, texts)
+        result = typeset(Formula(tex.text, display=True))
+        if isinstance(result, MathError) and "unknown command" in result.message:
+            diagnostic = _syntax_error(tex, result)
+            if diagnostic.help != _IN_MACRO:  # else it is told where that one is defined
+                yield diagnostic
+
+
 def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
-    span = tex.span()
+    span, help = tex.span(), ""
     if error.position is not None:
         at = min(error.position, len(tex.text) - 1)
         span = tex.span(at, at + 1)
-    help: str | Fix = ""
-    if command := re.search(r"unknown command (\\([A-Za-z]+))", error.message):
+        if tex.offset(at) == tex.offset(at + 1):
+            help = _IN_MACRO
+    if not help and (command := re.search(r"unknown command (\\([A-Za-z]+))", error.message)):
         likely = nearest(command[2], SYMBOLS | _FUNCTIONS | _WITH_BRACES)
-        help = rf"a macro is defined in the formula that has it: `\newcommand{{{command[1]}}}…`"
+        help = f"a macro of the course is defined in `[macros]` of its map: `{command[2]} = '…'`"
         start = tex.text.find(command[2])
         if likely is not None and start >= 0:
             place = tex.span(start, start + len(command[2]))

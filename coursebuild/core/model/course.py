@@ -24,7 +24,7 @@ from coursebuild.core.model.inlines import NumberBinding
 from coursebuild.core.model.lesson_record import LessonRecord
 from coursebuild.core.model.scenarios import Declarations
 from coursebuild.core.text.regex import regex
-from coursebuild.core.text.source import Source, Span, key_of
+from coursebuild.core.text.source import Excerpt, Source, Span, key_of
 
 CALLOUTS: tuple[str, ...] = tuple(
     """
@@ -36,7 +36,7 @@ CALLOUTS: tuple[str, ...] = tuple(
 
 
 class Words(Struct, frozen=True):
-    """The words by which a text is read: of captions, and of mentions as in "Lesson 4.3".
+    """The words by which a text is read: of captions, of mentions as in "Lesson 4.3", of formulas.
 
     Of a text in another language they are the interface texts `words.…`, then the English ones.
     """
@@ -54,6 +54,8 @@ class Words(Struct, frozen=True):
     """The signs before the decimals of a number; the first is shown."""
     range: tuple[str, ...] = ("to",)
     """Those of them that stand for all numbers between."""
+    macros: tuple[tuple[str, str], ...] = ()
+    """The course's commands of formulas, each with what it stands for; in every language."""
 
 
 ENGLISH = Words()
@@ -325,6 +327,8 @@ class Course(Struct, frozen=True):
     """Variables of scripts, sorted."""
     runners: Mapping[str, tuple[tuple[str, ...], ...]] = {}
     """The commands that run scripts in other languages, by the kinds of their fences."""
+    macros: Mapping[str, Excerpt] = {}
+    """What the course's own commands of formulas stand for, by their names."""
     python: NamedPath | None = None
     """The interpreter of the scripts, if not the one that runs this tool."""
     strict: bool = False
@@ -373,7 +377,8 @@ class Course(Struct, frozen=True):
 
     def words_of(self, owner: Owner | None) -> Words:
         """The words by which a text is read; one that the map does not name is as the course."""
-        return self.words.get(self.language_of(owner), ENGLISH)
+        words = self.words.get(self.language_of(owner), ENGLISH)
+        return replace(words, macros=tuple((name, tex.text) for name, tex in self.macros.items()))
 
     @property
     def callout_names(self) -> frozenset[str]:

@@ -92,7 +92,7 @@ def strings_for(templates: tuple[tuple[str, str], ...], language: str) -> String
 def words_for(templates: tuple[tuple[str, str], ...], language: str) -> Words:
     """The words by which texts of a language are read: its own, and the English ones."""
     strings, words = strings_for(templates, language), {}
-    for field in Words.__struct_fields__:
+    for field in {*Words.__struct_fields__} - {"macros"}:  # which no language has
         names = strings(f"words.{field}").split("|")
         forms = (normalize(form, name) for name in names for form in ("NFC", "NFD"))
         words[field] = tuple(dict.fromkeys((*forms, *getattr(ENGLISH, field))))

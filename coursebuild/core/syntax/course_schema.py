@@ -348,6 +348,10 @@ class CourseFile(Struct, frozen=True, forbid_unknown_fields=True):
         dict[str, Text | CalloutTable],
         describe("more kinds of callouts by name, with a label or a table"),
     ] = {}
+    macros: Annotated[
+        dict[str, str],
+        describe("commands of formulas by name, with what they stand for; `#1` is an argument"),
+    ] = {}
     runners: Annotated[
         dict[str, Annotated[tuple[Command, ...], Meta(min_length=1)]],
         describe("by the kind of a fence, the commands that run scripts in another language"),

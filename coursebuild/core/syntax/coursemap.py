@@ -50,6 +50,7 @@ from coursebuild.core.text.diagnostics import (
     did_you_mean,
     sort_diagnostics,
 )
+from coursebuild.core.text.macros import COMMAND, split_argument
 from coursebuild.core.text.patterns import makes_alike, pattern_mistake
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.rules import RULES
@@ -160,6 +161,11 @@ def _build_course(
         packages=_named_paths(table, "packages", settings.packages),
         environment=tuple(sorted(verify.env.items())),
         runners=fields.runners,
+        macros={
+            name: member.value.excerpt
+            for name, member in root.object("macros").members.items()
+            if isinstance(member.value, StringNode)
+        },
         width=fields.format.width if fields.format is not None else 0,
         html=fields.security.html,
         limits=fields.limits,
@@ -341,6 +347,7 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
             message = f"{format_name(name)} cannot be set for scripts"
             help = "expected: a name of your own, as in `FAST`"
             yield diagnose("field-value", member.key.span, message, help=help)
+    yield from _check_macros(root.object("macros"))
     for name, member in root.object("callouts").members.items():
         if not _CALLOUT.fullmatch(name):
             message = f"{format_name(name)} cannot be a kind of callout"
@@ -371,6 +378,30 @@ def check_settings(root: ObjectNode, decoding: Decoding[CourseFile]) -> Iterator
         if not silence.reason.strip():
             message, help = "the silence gives no reason", 'say why: `reason = "…"`'
             yield diagnose("silence-rule", node.place("reason"), message, help=help)
+
+
+def _check_macros(table: ObjectNode) -> Iterator[Diagnostic]:
+    """Report names that no command has, braces that do not match, and macros without an end."""
+    bodies: dict[str, StringNode] = {}
+    for name, member in table.members.items():
+        if not re.fullmatch("[A-Za-z]+", name):
+            message = f"{format_name(name)} cannot be the name of a macro"
+            help = "expected: letters, without a backslash, as in `RR`"
+            yield diagnose("field-value", member.key.span, message, help=help)
+        elif isinstance(member.value, StringNode):
+            bodies[name] = member.value
+    for name, node in bodies.items():
+        whole = Source("", f"{{{node.value}}}")
+        if (split := split_argument(whole.excerpt())) is None or split[1].text:
+            message = f"the braces of the macro `\\{name}` do not match"
+            yield diagnose("field-value", node.span, message)
+    graph = {name: COMMAND.findall(node.value) for name, node in bodies.items()}
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        name = next(name for name in bodies if name in error.args[1])
+        message = f"the macro `\\{name}` stands for itself, so that it has no end"
+        yield diagnose("field-value", bodies[name].span, message)
 
 
 def comparison(node: ObjectNode, fields: VerifyTable) -> model.Comparison:

@@ -35,6 +35,7 @@ from coursebuild.core.syntax.other_tools import check_marks
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.text.diagnostics import diagnose
+from coursebuild.core.text.macros import expand_macros
 from coursebuild.core.text.numbers import find_unread
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
@@ -288,6 +289,7 @@ class _TokenReader:
         if not token.content.strip():
             self.report(diagnose("math-syntax", span, "the formula is empty"))
         tex, display = self.content.slice(*token.map), token.info == "display"
+        tex = expand_macros(tex, self.state.macros)
         if token.meta["braces"] is None:
             return model.Math(span, tex, display)
         braces, report = self.content.slice(*token.meta["braces"]), self.report

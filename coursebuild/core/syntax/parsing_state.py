@@ -30,6 +30,7 @@ class ParsingState:
         self.callouts = callouts
         self.lesson = lesson
         self.words = words
+        self.macros = dict(words.macros)
         self.has_decimal_comma = "," in words.decimal
         self.in_string = False
         """Whether what is read is in a string of a data text, such as JSON."""

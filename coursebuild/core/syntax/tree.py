@@ -37,6 +37,7 @@ from coursebuild.core.syntax.recording import (
 )
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
 from coursebuild.core.text.diagnostics import Parsed, diagnose
+from coursebuild.core.text.macros import expand_macros
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -258,7 +259,7 @@ class TextReader:
         start, end = text.text.index("$$") + 2, len(text.text)
         if token.info != "unclosed":
             end = text.text.rindex("$$")
-        tex = trim(text.slice(start, end), " \t\n")
+        tex = expand_macros(trim(text.slice(start, end), " \t\n"), self.state.macros)
         if token.info == "unclosed":
             help = "close it with `$$` on a line below, with no empty line before it"
             place, message = text.span(start - 2, start), "display math is never closed"

@@ -11,7 +11,7 @@ from coursebuild.features.importer.context import (
     label_anchor,
     to_anchor,
 )
-from coursebuild.features.importer.displays import normalize_formulas
+from coursebuild.features.importer.displays import LABEL, normalize_formulas
 
 TARGET = regex(
     r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)"
@@ -62,6 +62,7 @@ def find_anchors(text: str) -> set[str]:
     proofs = re.findall(rf"#({'|'.join(PROOF_LABELS)})-([\w-]+)", text)
     anchors |= {f"{kind}:{to_anchor(name)}" for kind, name in proofs}
     anchors |= set(re.findall(r"\{#(eq:[\w-]+)\}", normalize_formulas(text)))
+    anchors |= {f"eq:{label_anchor(label)}" for label in LABEL.findall(text)}
     for match in _LABELLED.finditer(text):
         kind = match["kind"] if match["kind"] in NUMBERED else _KINDS.get(match["kind"], "lst")
         anchor = to_anchor(match["name"])

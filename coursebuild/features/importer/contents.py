@@ -16,7 +16,7 @@ from typing import Any
 
 from coursebuild.api import UsageError
 from coursebuild.features.importer.bookdown import read_book
-from coursebuild.features.importer.displays import read_macros
+from coursebuild.features.importer.displays import find_macros, read_macros
 from coursebuild.features.importer.outlines import (
     Outline,
     find_text,
@@ -118,10 +118,21 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         language=outline.language,
         has_own_titles=True,
         substitutions=_read_substitutions(settings, files),
-        macros="".join(map(read_macros, settings)),
+        macros="".join([*map(read_macros, settings), *_read_programs(mkdocs, files)]),
         levels=tuple(levels),
         pages=tuple(pages),
     )
+
+
+def _read_programs(mkdocs: Mapping[str, Any], files: SourceFiles) -> Iterator[str]:
+    """Yield the definitions of macros in programs: settings, and scripts that MkDocs loads."""
+    scripts = value_at(mkdocs, "extra_javascript")
+    names = [name for name in scripts if isinstance(name, str)] if isinstance(scripts, list) else []
+    folder = str(value_at(mkdocs, "docs_dir") or "docs")
+    paths = (files.find(posixpath.normpath(f"{folder}/{name}")) for name in names)
+    for path in ("conf.py", files.docusaurus, *paths):
+        if path and path in files:
+            yield find_macros(files.read_text(path))
 
 
 def _read_substitutions(
@@ -169,7 +180,7 @@ def _join(first: Any, second: Any) -> Any:
 
 
 _SETTINGS = frozenset(
-    "appendices bibliography bibtex_bibfiles chapters description docs_dir metadata-files nav "
+    "appendices bibliography bibtex_bibfiles chapters description docs_dir math metadata-files nav "
     "root sidebar site_description site_name subtitle title toc".split()
 )
 """Keys of settings that are read."""

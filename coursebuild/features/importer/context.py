@@ -93,6 +93,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     """The fields of labs that coursebuild does not have, each with a value, by kind."""
     callouts: dict[str, str] = field(default_factory=dict)
     """Labels of kinds of callouts that coursebuild does not have, by kind."""
+    macros: dict[str, str] = field(default_factory=dict)
+    """Those of formulas that the texts use, by name."""
 
     prints: dict[int, list[str]] = field(default_factory=dict)
     """The lines of the lesson's script that print values for its text, by the number of parts."""

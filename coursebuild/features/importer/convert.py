@@ -101,7 +101,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
     texts_and_models = (data for path, data in out.items() if path.endswith((".md", ".xml")))
     longest = max(map(len, texts_and_models), default=0)
     out |= {path: _encode(text) for path, text in lab_files(context.labs)}
-    lines = map_lines(course, ids, context.callouts, ("src",) if packages else (), longest)
+    lines = map_lines(course, ids, context, ("src",) if packages else (), longest)
     out["content/course.toml"] = _encode("".join(f"{line}\n" for line in lines))
     out[".gitignore"] = _GITIGNORE
     copies = {"model": models, "file of the scripts": packages, "file": context.copies}
@@ -343,7 +343,6 @@ def _convert_texts(
             head = f'<a id="{to_anchor(text.label)}"></a>\n\n' if text.label else ""
             if macros:
                 head += f"$${macros}$$\n\n"
-                files.change("macros", "defined in the formulas that use them")
             new[text.link] = text.title, head + _convert_text(text, context)
         except RecursionError:
             raise UsageError(f"{text.file} is nested too deeply") from None
@@ -360,9 +359,12 @@ def _convert_texts(
         files.leave(files_of[link], message, kind)
 
     callouts = frozenset((*model.CALLOUTS, *context.callouts))
-    completed = complete_texts(
+    completed, common_macros = complete_texts(
         new, resolve_label, leave, callouts, has_mentions=not course.has_own_titles
     )
+    context.macros.update(common_macros)
+    if common_macros:
+        files.change("macro of formulas", "`[macros]` of the map", len(common_macros))
     out = {text.path: _encode(new_text) for text, new_text in zip(texts, completed, strict=True)}
     return {**out, **context.copies}, context
 

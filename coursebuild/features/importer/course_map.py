@@ -22,6 +22,7 @@ from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.bookdown import read_bookdown
+from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
 from coursebuild.features.importer.pandoc_tables import number_examples
 from coursebuild.features.importer.segments import read_segments
@@ -330,7 +331,7 @@ def _plain_text(title: str) -> str:
 def map_lines(
     course: ImportedCourse,
     ids: Mapping[str, str],
-    callouts: Mapping[str, str],
+    context: LessonContext,
     packages: tuple[str, ...],
     longest: int,
 ) -> Iterator[str]:
@@ -346,9 +347,9 @@ def map_lines(
     usual = model.Limits().text
     if longest > usual:
         yield from ("", "[limits]", f"text = {(longest // usual + 1) * usual:_}")
-    if callouts:
-        yield from ("", "[callouts]")
-        yield from (f"{toml_string(k)} = {toml_string(label)}" for k, label in callouts.items())
+    for table, values in (("callouts", context.callouts), ("macros", context.macros)):
+        if values:
+            yield from ("", f"[{table}]", *_field_lines(**values))
     for level in course.levels:
         yield from ("", "[[level]]")
         yield from _field_lines(id=level.id, title=level.title, summary=level.summary)
@@ -375,6 +376,7 @@ def _field_lines(**values: str | tuple[str, ...] | int | None) -> Iterator[str]:
         if isinstance(value, tuple) and value:
             yield f"{name} = [{', '.join(map(toml_string, value))}]"
         elif isinstance(value, str) and value:
-            yield f"{name} = {toml_string(value)}"
+            is_tex = "\\" in value and value.isprintable() and "'" not in value
+            yield f"{name} = " + (f"'{value}'" if is_tex else toml_string(value))
         elif isinstance(value, int):
             yield f"{name} = {value}"

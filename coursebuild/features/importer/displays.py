@@ -1,12 +1,12 @@
 """Formulas of other dialects: LaTeX's environments and brackets, dollars, labels, macros.
 
-Entry points: `normalize_formulas`, `read_macros`.
+Entry points: `normalize_formulas`, `read_macros`, `find_macros`.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from coursebuild.api import regex
@@ -42,7 +42,7 @@ _ESCAPED = regex(
     re.DOTALL,
 )
 """A formula whose brackets have two backslashes, one of which is Markdown's; or code."""
-_LABEL = regex(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
+LABEL = regex(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
 """A label of LaTeX, or of mdBook's preprocessor `numeq`."""
 _EMPTY = regex(r"[ \t]*\n?[ \t]*")
 _MARGIN = regex(r"[ \t]*>[ \t>]*|[ \t]+\Z")
@@ -51,14 +51,24 @@ _LEAD = regex(r"\n[ \t>]*\Z")
 """What stands before the mark that ends a formula, on a line of its own."""
 _WORDS_BEFORE = regex(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
 DEFINITION = regex(
-    r"\\(?:(?:(?:re)?newcommand|DeclareMathOperator)\*?[ ]*\{?\\?([A-Za-z]+)\}?(?:\[\d\]){0,2}"
-    r"|def[ ]*\\([A-Za-z]+)(?:#\d)*)[ ]*\{(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*\}"
+    r"\\(?:(?P<kind>(?:re)?newcommand|providecommand|DeclareMathOperator)(?P<star>\*?)[ ]*"
+    r"\{?\\?(?P<name>[A-Za-z]+)\}?(?:\[(?P<count>\d)\])?|def[ ]*\\(?P<own>[A-Za-z]+)(?:#\d)*)"
+    r"[ ]*\{(?P<body>(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}\s*"
 )
 """A macro of LaTeX; MathJax takes its name without a backslash, too."""
 _DOXYGEN = regex(rf"{_CODE}|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<tex>[^$]+?)\\f\])", re.DOTALL)
 """A formula of Doxygen; or code, in which there is none."""
-_MACROS = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
+_PLACES = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
 """Where MyST and Sphinx have macros by their names."""
+_OBJECT = regex(r"\b[Mm]acros[\"']?\s*[:=]\s*\{")
+_STRING = r"(?P<raw>[rR]?)(?P<quote>\"\"\"|'''|[\"'`])(?P<tex>(?:\\.|(?!(?P=quote)).)*?)(?P=quote)"
+_ENTRY = regex(
+    rf"(?:[\s,]|(?:#|//)[^\n]*\n)*[rR]?[\"']?\\*(?P<name>[A-Za-z]+)[\"']?\s*:\s*[\[(]?\s*{_STRING}"
+    r"(?:\s*,\s*\d\s*[\])])?",
+    re.DOTALL,
+)
+"""A macro in an object of Python or JavaScript, where its value is literal."""
+_PREAMBLE = regex(rf"\bimgmath_latex_preamble\s*=\s*{_STRING}", re.DOTALL)
 _WHOLE_ENVIRONMENT = regex(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 
 
@@ -95,7 +105,8 @@ def _write_doxygen(match: re.Match[str]) -> str:
 
 
 def display_formula(tex: str, label: str) -> str:
-    """Return a displayed formula in Markdown."""
+    """Return a displayed formula in Markdown, whose own label may stand in its TeX."""
+    label, tex = label or find_group(LABEL, tex), LABEL.sub("", tex)
     return f"$$\n{_align(tex).strip()}\n$$" + (f" {{#eq:{label_anchor(label)}}}" if label else "")
 
 
@@ -115,8 +126,8 @@ def _drop_empty(match: re.Match[str]) -> str:
 def _label_formula(match: re.Match[str]) -> str:
     if match["tex"] is None:
         return match[0]
-    label = match["myst"] or match["quarto"] or find_group(_LABEL, match["tex"])
-    tex = _LABEL.sub("", match["tex"])
+    label = match["myst"] or match["quarto"] or find_group(LABEL, match["tex"])
+    tex = LABEL.sub("", match["tex"])
     tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
     tex = _align(tex)
     opening, closing = "", match["behind"] or ""
@@ -136,17 +147,33 @@ def read_macros(settings: Mapping[str, Any]) -> str:
     header = settings.get("header-includes")
     lines = header if isinstance(header, list) else [header]
     definitions = [match[0] for line in lines for match in DEFINITION.finditer(str(line))]
-    return "".join([*definitions, *_named_macros(settings)])
-
-
-def _named_macros(settings: Mapping[str, Any]) -> Iterator[str]:
-    for path in _MACROS:
+    for path in _PLACES:
         macros = value_at(settings, *path)
         for name, value in macros.items() if isinstance(macros, dict) else ():
             tex = value.get("macro") if isinstance(value, dict) else value
             tex = str(tex[0] if isinstance(tex, list) and tex else tex)
-            count = max(map(int, re.findall(r"#(\d)", tex)), default=0)
-            arguments = "".join(f"#{number}" for number in range(1, count + 1))
-            definition = f"\\def\\{str(name).lstrip(chr(92))}{arguments}{{{tex}}}"
-            if DEFINITION.fullmatch(definition):
-                yield definition
+            definitions.append(_define(str(name).lstrip("\\"), tex))
+    return "".join(definitions)
+
+
+def find_macros(program: str) -> str:
+    """Return the definitions of the macros that a program in Python or JavaScript has as literals.
+
+    They are macros of MathJax and KaTeX in an object, or LaTeX for Sphinx.
+    """
+    preambles = "".join(match["tex"] for match in _PREAMBLE.finditer(program))
+    definitions = [match[0] for match in DEFINITION.finditer(preambles)]
+    for start in _OBJECT.finditer(program):
+        at = start.end()
+        while entry := _ENTRY.match(program, at):
+            at, tex = entry.end(), entry["tex"]
+            tex = tex if entry["raw"] else re.sub(r"\\(.)", r"\1", tex)
+            definitions.append(_define(entry["name"], tex))
+    return "".join(definitions)
+
+
+def _define(name: str, tex: str) -> str:
+    count = max(map(int, re.findall(r"#(\d)", tex)), default=0)
+    arguments = "".join(f"#{number}" for number in range(1, count + 1))
+    definition = f"\\def\\{name}{arguments}{{{tex}}}"
+    return definition if DEFINITION.fullmatch(definition) else ""

@@ -345,7 +345,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 return whole
             if context.path.endswith(".ipynb") and match.string.lstrip().startswith("|"):
                 formula = re.sub(r"(?<!\\)\|", r"\\vert ", formula)  # no bar there ends a cell
-            return _TIGHT.sub(lambda m: m[1].strip() and f"${m[1].strip()}$", formula)
+            is_shown = formula.startswith("$$")
+            return formula if is_shown else convert_role("math", formula[1:-1], context)
         case "code":
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)
@@ -361,7 +362,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if any(key.partition("-")[0] in _CROSS_KINDS for key in keys):
                 return _rewrite_line(whole[1:-1], context)
             if keys and context.are_sources(keys):
-                return re.sub(",(?=[ ]*@)", ";", whole.replace("-@", "@"))
+                return re.sub(rf"(@{_KEY}),(?=[ ]*@)", r"\1;", whole.replace("-@", "@"))
             message = f"`{whole}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave("citation", message)
             return f"(<{keys[0]}>)" if whole.startswith("[@http") else f"`{whole}`"
@@ -435,7 +436,5 @@ _STATEMENTS = regex(r"\s*(?:\{%[^%\n]*%\}\s*)+")
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = regex(rf"(?<![\w@`])@({_KEY})")
-_TIGHT = regex(r"(?<!\$)\$(?=[ ]|[^$]*[ ]\$)([^$]*?)(?:\\[ ,;])*[ ]*\$(?!\$)")
-"""A formula with blanks at its ends, which some tools allow."""
 _WORD = regex(r"(?s)\A(?!.*\\[A-Za-z]).*(?<![A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
 """A word outside of braces and no command, as of a sentence between two prices."""

@@ -9,7 +9,8 @@ formulas below it.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from textwrap import shorten
 from unicodedata import normalize
 from urllib.parse import unquote, urlsplit
@@ -17,6 +18,8 @@ from urllib.parse import unquote, urlsplit
 from msgspec import Struct
 
 from coursebuild.api import Edit, Source, Span, model, regex
+from coursebuild.core.model.results import Formula, MathError
+from coursebuild.core.run.typesetting import MathEngine
 from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.features.importer.displays import DEFINITION
@@ -25,7 +28,6 @@ from coursebuild.features.importer.source_files import find_group, title_of_file
 
 _GONE = regex(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
 _REFERENCE = regex(r"\[(.*?)\](?:\[[^\[\]]*\]|\([^()]*\))?", re.DOTALL)
-_COMMAND = regex(r"\\([A-Za-z]+)")
 
 
 class _Text(Struct, frozen=True):
@@ -46,9 +48,10 @@ def complete_texts(
     callouts: frozenset[str],
     *,
     has_mentions: bool,
-) -> Iterator[str]:
-    """Yield the new texts of lessons and pages, each by its link and with its title, completed.
+) -> tuple[list[str], dict[str, str]]:
+    """Return the new texts of lessons and pages, completed, and the macros that all may use.
 
+    The texts are given by their links, each with its title.
     `resolve_label` gives the address of an anchor for a link in a text; empty if no text sets it.
     `leave` is told of what a page cannot hold, and is changed: the link, the kind, a message.
     Without mentions, "Level 1" is about another thing than the first level.
@@ -56,12 +59,16 @@ def complete_texts(
     read = {
         link: _read(link, title, text, leave, callouts) for link, (title, text) in texts.items()
     }
+    macros = _find_common_macros(text.document for text in read.values())
+    completed_texts = []
     for link, text in read.items():
         edits = {edit.span.start: edit for edit in _edit_links(link, read, resolve_label)}
         if not has_mentions:
             edits |= {edit.span.start: edit for edit in _break_mentions(text.document)}
-        edits |= {edit.span.start: edit for edit in _carry_macros(text.document)}
-        yield _GONE.sub("", apply_edits(text.document.source.text, edits.values())).lstrip("\n")
+        edits |= {edit.span.start: edit for edit in _carry_macros(text.document, macros)}
+        new = apply_edits(text.document.source.text, edits.values())
+        completed_texts.append(_GONE.sub("", new).lstrip("\n"))
+    return completed_texts, macros
 
 
 _PASSES = 3
@@ -237,22 +244,58 @@ def _break_mentions(document: model.Document) -> Iterator[Edit]:
                 yield Edit(Span(document.source, at, at), "<!-- -->")
 
 
-def _carry_macros(document: model.Document) -> Iterator[Edit]:
-    """Define macros anew in each formula below that uses them: here they hold in one."""
+def _find_common_macros(documents: Iterable[model.Document]) -> dict[str, str]:
+    """Return what macros stand for by which all texts mean the same, if any formula uses them.
+
+    One that a text renews means something else elsewhere, and so does a command that has a meaning,
+    in a text that uses it and does not define it.
+    """
+    bodies: dict[str, set[str]] = defaultdict(set)
+    used_names, strange_names = set[str](), set[str]()
+    for document in documents:
+        texts = [formula.tex.text for _, formula in model.find_formulas(document)]
+        matches = [match for tex in texts for match in DEFINITION.finditer(tex)]
+        for match in matches:
+            body, count = " ".join(match["body"].split()), match["count"] or 0
+            if match["kind"] == "DeclareMathOperator":
+                body = f"\\operatorname{match['star']}{{{body}}}"
+            is_whole = match["kind"] != "renewcommand" and f"#{count}" in f"#0{body}"
+            bodies[match["name"] or match["own"]] |= {body, body if is_whole else ""}
+        commands = _commands(DEFINITION.sub(r"\g<body> ", " ".join(texts)))
+        strange_names |= commands - {match["name"] or match["own"] for match in matches}
+        used_names |= commands
+    names = {name for name in bodies if len(bodies[name]) == 1 and name in used_names}
+    shared_names = sorted(names & strange_names)
+    formulas = [Formula(rf"\{name}{{x}}{{x}}", display=False) for name in shared_names]
+    for name, result in zip(shared_names, MathEngine().typeset(formulas), strict=True):
+        if not (isinstance(result, MathError) and "unknown command" in result.message):
+            names.remove(name)
+    while carried_names := {n for n in names if _commands(min(bodies[n])) & bodies.keys() - names}:
+        names -= carried_names
+    return {name: min(bodies[name]) for name in bodies if name in names}
+
+
+def _commands(tex: str) -> set[str]:
+    return {*re.findall(r"\\([A-Za-z]+)", tex)}
+
+
+def _carry_macros(document: model.Document, common: Mapping[str, str]) -> Iterator[Edit]:
+    """Take common macros out, and define others anew in each formula below that uses them."""
     macros: dict[str, str] = {}
     for _, formula in model.find_formulas(document):
         tex, definitions = formula.tex.text, ""
-        own_macros = {match[1] or match[2]: match[0] for match in DEFINITION.finditer(tex)}
+        matches = {match["name"] or match["own"]: match for match in DEFINITION.finditer(tex)}
         for name, definition in reversed(macros.items()):
-            if name not in own_macros and name in _COMMAND.findall(tex + definitions):
+            if name not in matches and name in _commands(tex + definitions):
                 definitions = definition + definitions
-        if own_macros and not DEFINITION.sub("", tex).strip():
-            text = document.source.text  # definitions alone: they stand in each formula below
-            span = formula.tex.span()
+        span, text = formula.tex.span(), document.source.text
+        if matches and not DEFINITION.sub("", tex).strip():  # they stand in each formula below
             start, end = text.rfind("$", 0, span.start), text.find("$", span.end)
             start -= text[start - 1 : start] == "$"
             yield Edit(Span(document.source, start, end + 1 + (text[end + 1 : end + 2] == "$")), "")
-        elif definitions:
-            start = formula.tex.span().start
-            yield Edit(Span(document.source, start, start), definitions)
-        macros |= own_macros
+        else:
+            places = [formula.tex.span(*m.span()) for n, m in matches.items() if n in common]
+            if definitions and span.start not in [place.start for place in places]:
+                places.insert(0, Span(document.source, span.start, span.start))
+            yield from (Edit(place, "" if at else definitions) for at, place in enumerate(places))
+        macros |= {n: m[0].strip() for n, m in matches.items() if n not in common}

@@ -32,7 +32,7 @@ _OVER_LINES = regex(
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
-    r"|(?<![^\n])[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n[ \t]*[^\s<]+[ \t]*(?![^\n])"
+    r"|^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n[ \t]*[^\s\[]\S*"
     r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
     r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
     r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)",
@@ -79,7 +79,10 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
     words, target = (parts["words"], parts["target"]) if parts else ("", body)
     match name:
         case "math":
-            return f"${body}$"
+            if body != body.strip():  # blanks at its ends, which some tools allow
+                body = re.sub(r"(?:\\[ ,;])*\s*\Z", "", body).strip()
+            label = find_group(r"\A\\(?:eq)?ref\{([^{}]+)\}\Z", body)
+            return convert_role("eq", label, context) if label else body and f"${body}$"
         case "eq":
             return write_link(words, context.resolve_formula(target))
         case "doc":

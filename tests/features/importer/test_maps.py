@@ -45,12 +45,14 @@ def test_the_new_course_keeps_all_that_readers_see(tmp_path: Path, rewriting: bo
     def render(case: Case) -> str:
         files = {path: text for _, path, text in parts(case.input)}
         course = convert_files(tmp_path / str(case.line), files)
-        title = tomllib.loads(course.files["content/course.toml"].decode())["course"]["title"]
+        course_map = tomllib.loads(course.files["content/course.toml"].decode())
+        title, macros = course_map["course"]["title"], course_map.get("macros", {})
+        definitions = "".join(f"\\{name}: {tex}\n" for name, tex in macros.items())
         texts = "".join(
             f"=== {path}\n{data.decode()}"
             for path, data in sorted(course.files.items())
             if path.startswith("content/") and path.endswith((".md", ".svg", ".bib"))
         )
-        return f"{title}\n{outline(course)}{texts}"
+        return f"{title}\n{outline(course)}{definitions}{texts}"
 
     check_cases(FIXTURES / "imports/folders.md", render, rewriting=rewriting)
