@@ -64,8 +64,8 @@ def test_attempts_are_judged_watched_and_kept(page: Page) -> None:
     press(level, "Watch this run")
     expect(bar).to_have_attribute("data-state", "paused")
     expect(bar.locator(".lab-time")).to_have_text(re.compile(r"^2\.000* s$"))
-    expect(bar.locator(".lab-readouts dt").first).to_have_text("the bar stays level (°)")
-    expect(bar.locator(".lab-readouts dd").first).to_have_text("−27.366")
+    expect(level.locator(".exercise-now")).to_have_text("−27.366°")
+    expect(mass.locator(".exercise-now")).to_be_hidden()
     assert violations(page, ".exercise") == []
     until(page, HOLDS)
     start = text.input_value()
