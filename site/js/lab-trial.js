@@ -82,7 +82,7 @@ globalThis.judge = (json) => {
   let [refused, seen] = ['', {}]
   try {
     const functions = new Function(`"use strict"; return ${code}`)()
-    for (const verdict of judge(engine, config, functions, bytes, () => beats[0]++)) verdicts.push(verdict)
+    for (const verdict of judge(engine, config, functions, bytes, guard, () => beats[0]++)) verdicts.push(verdict)
     if (plays) seen = played(() => new Lab(engine, config.exercise.subject === 'model' ? config.attempt : bytes, config, attemptCode(config, functions)))
   } catch (error) {
     refused = error.message ?? String(error)
