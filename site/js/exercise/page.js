@@ -43,7 +43,7 @@ export class Exercise extends Instrument {
     this.summary = h('p', { class: 'exercise-state', role: 'status' })
     this.editor.element.append(this.summary)
     this.readouts.element.remove() // what trials see stands in their rows
-    this.readouts = { show: (values) => this.rows.forEach(({ now, trial }, i) => (now.textContent = valueText(values[i], trial))) }
+    this.readouts.show = (values) => this.rows.forEach(({ now, trial }, i) => (now.textContent = valueText(values[i], trial)))
     this.body.prepend(this.editor.element, this.board)
   }
 
