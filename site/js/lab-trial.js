@@ -50,7 +50,10 @@ globalThis.boot = () => {
   const module = new WebAssembly.Module(buffers.get('wasm'))
   buffers.delete('wasm')
   createEngine(loadMujoco, module, (text) => output.push(text)).then(
-    (instance) => (engine = instance),
+    (instance) => {
+      engine = instance
+      guard = new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
+    },
     (error) => (failure = error.message),
   )
   return ''
@@ -65,7 +68,6 @@ globalThis.trial = (json) => {
   const request = JSON.parse(json)
   const bytes = request.mjb === undefined ? new Uint8Array(buffers.get('mjb')) : /** @type {any} */ (Uint8Array).fromBase64(request.mjb)
   output.length = 0
-  guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
   const now = () => {
     beats[0]++
     return performance.now()
@@ -77,7 +79,6 @@ globalThis.trial = (json) => {
 globalThis.judge = (json) => {
   const { config, code, plays } = JSON.parse(json)
   const bytes = new Uint8Array(buffers.get('mjb'))
-  guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
   const verdicts = []
   let [refused, seen] = ['', {}]
   try {
