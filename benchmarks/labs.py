@@ -1,6 +1,6 @@
 """Labs: steps a second natively, headless and in the browser; what a page with a lab costs.
 
-Run: python benchmarks/labs.py [--rounds N] [--only speed|pages]
+Run: python benchmarks/labs.py [--rounds N] [--only speed|pages] [--robots ZIP …]
 
 1. A course with one lab for each of five models is built in a scratch folder; what its trials say
    of their speed, with all that is compiled on the way, is in `coursebuild check`.
@@ -11,6 +11,7 @@ Run: python benchmarks/labs.py [--rounds N] [--only speed|pages]
    the speeds and of the ratios within a round.
 3. A page without and with a lab: requests and bytes as sent, time from Play to the first moving
    frame on a warm cache, frame times, long tasks, and how busy the page's thread is while it runs.
+4. With `--robots`, that alone, for zips of models with their meshes, opened in the editor of a lab.
 
 All but native MuJoCo also do what a lab does besides stepping: look for divergence after each step,
 and bring the derived quantities of each eighth step up to date for a plot.
@@ -99,7 +100,7 @@ STEPS = {
 LESSON = """## {model}
 
 ```lab simlab
-{{"title": "{model}", "model": "{model}", "verify": {{"rtol": 1}},
+{{"title": "{model}", "model": "{model}", "verify": {{"seconds": 0.1}},
   "readouts": [{{"label": "time", "expr": "data.time", "digits": 2}}],
   "plots": [{{"ylabel": "height (m)", "xlabel": "time (s)", "window": 10,
              "traces": [{{"label": "z", "expr": "lib.bodyPos(1)[2]"}}]}}]}}
@@ -335,6 +336,27 @@ def run_cost(context: Any, page: Any) -> str:
           return performance.now() - began
         }}"""
     )
+    return f"Play to first moving frame {start_ms:.0f} ms (warm cache); {frame_cost(context, page)}"
+
+
+def robot_cost(browser: Any, url: str, path: Path) -> str:
+    """How the model of a zip is drawn that a reader opens in the editor of a lab."""
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    page = context.new_page()
+    page.goto(url)
+    lab = page.locator(".lab").first
+    lab.scroll_into_view_if_needed()
+    lab.get_by_role("button", name="Open in the editor").click()
+    lab.locator("input[type=file]").set_input_files(path)
+    page.wait_for_selector('.lab[data-state="playing"]', timeout=120_000)
+    page.evaluate(WATCH)
+    cost = frame_cost(context, page)
+    context.close()
+    return f"  {path.stem}: {cost}"
+
+
+def frame_cost(context: Any, page: Any) -> str:
+    """The frames of a lab that runs, in a page that is watched."""
     session = context.new_cdp_session(page)
     session.send("Performance.enable")
 
@@ -350,10 +372,11 @@ def run_cost(context: Any, page: Any) -> str:
     task_end, stamp_end = read_busy_time()
     median = statistics.median(frames)
     slow = sorted(frames)[int(0.99 * len(frames))]
+    busy = (task_end - task) / (stamp_end - stamp)
+    per_frame = 1000 * (task_end - task) / len(frames)
     return (
-        f"Play to first moving frame {start_ms:.0f} ms (warm cache); frame median"
-        f" {median:.1f} ms, 99th percentile {slow:.1f} ms; {len(long)} tasks over 50 ms in 5 s;"
-        f" page thread busy {100 * (task_end - task) / (stamp_end - stamp):.0f} %"
+        f"frame median {median:.1f} ms, 99th percentile {slow:.1f} ms; {len(long)} tasks over 50 ms"
+        f" in 5 s; page thread busy {100 * busy:.0f} %, {per_frame:.1f} ms a frame"
     )
 
 
@@ -362,6 +385,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=9, help="of each model")
     parser.add_argument("--only", choices=("speed", "pages"))
+    parser.add_argument("--robots", type=Path, nargs="+", metavar="ZIP", help="nothing but these")
     arguments = parser.parse_args()
     cores = len(os.sched_getaffinity(0))
     print(f"{platform.platform()}, {cores} cores; Python {platform.python_version()}", end="")
@@ -374,6 +398,11 @@ def main() -> None:
         with sync_playwright() as playwright, Host(folder / "public") as host:
             browser, url = Browsers(playwright)["webgl"], host.url
             print(f"Chromium {browser.version}")
+            for path in arguments.robots or ():
+                lab_page = f"{url}lessons/{PAGES['with a lab']}.html"
+                print(robot_cost(browser, lab_page, path), flush=True)
+            if arguments.robots:
+                return
             if arguments.only != "pages":
                 print("\nsteps a second, as `coursebuild check` tells them")
                 for lab in report["labs"]:

@@ -50,7 +50,10 @@ globalThis.boot = () => {
   const module = new WebAssembly.Module(buffers.get('wasm'))
   buffers.delete('wasm')
   createEngine(loadMujoco, module, (text) => output.push(text)).then(
-    (instance) => (engine = instance),
+    (instance) => {
+      engine = instance
+      guard = new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
+    },
     (error) => (failure = error.message),
   )
   return ''
@@ -65,7 +68,6 @@ globalThis.trial = (json) => {
   const request = JSON.parse(json)
   const bytes = request.mjb === undefined ? new Uint8Array(buffers.get('mjb')) : /** @type {any} */ (Uint8Array).fromBase64(request.mjb)
   output.length = 0
-  guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
   const now = () => {
     beats[0]++
     return performance.now()
@@ -77,12 +79,11 @@ globalThis.trial = (json) => {
 globalThis.judge = (json) => {
   const { config, code, plays } = JSON.parse(json)
   const bytes = new Uint8Array(buffers.get('mjb'))
-  guard ??= new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
   const verdicts = []
   let [refused, seen] = ['', {}]
   try {
     const functions = new Function(`"use strict"; return ${code}`)()
-    for (const verdict of judge(engine, config, functions, bytes, () => beats[0]++)) verdicts.push(verdict)
+    for (const verdict of judge(engine, config, functions, bytes, guard, () => beats[0]++)) verdicts.push(verdict)
     if (plays) seen = played(() => new Lab(engine, config.exercise.subject === 'model' ? config.attempt : bytes, config, attemptCode(config, functions)))
   } catch (error) {
     refused = error.message ?? String(error)

@@ -5,6 +5,7 @@
 import loadMujoco from '@mujoco/mujoco'
 import { confine } from './exercise/attempt.js'
 import { judge } from './exercise/judge.js'
+import { Guard } from './lab/trial/guard.js'
 import { Host } from './lab/worker/host.js'
 import { createLater } from './lab/worker/later.js'
 
@@ -53,9 +54,10 @@ async function judgeHere({ lab, config, module, mjb, wasm }) {
     const model = config.exercise.subject === 'model' ? null : fetchBytes(mjb)
     const [engine, code, bytes] = await Promise.all([host.start(wasm), importModule(module), model])
     confine(engine.mj)
+    const guard = new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
     tell('judging')
     let index = 0
-    for (const verdict of judge(engine, config, code, bytes)) tell('verdict', { index: index++, ...verdict })
+    for (const verdict of judge(engine, config, code, bytes, guard)) tell('verdict', { index: index++, ...verdict })
     tell('judged')
   } catch (error) {
     tell('refused', { message: error.message ?? String(error) })

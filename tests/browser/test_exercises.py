@@ -64,8 +64,8 @@ def test_attempts_are_judged_watched_and_kept(page: Page) -> None:
     press(level, "Watch this run")
     expect(bar).to_have_attribute("data-state", "paused")
     expect(bar.locator(".lab-time")).to_have_text(re.compile(r"^2\.000* s$"))
-    expect(bar.locator(".lab-readouts dt").first).to_have_text("the bar stays level (°)")
-    expect(bar.locator(".lab-readouts dd").first).to_have_text("−27.366")
+    expect(level.locator(".exercise-now")).to_have_text("−27.366°")
+    expect(mass.locator(".exercise-now")).to_be_hidden()
     assert violations(page, ".exercise") == []
     until(page, HOLDS)
     start = text.input_value()
@@ -166,7 +166,12 @@ def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None
     absent = "fetch indexedDB caches navigator XMLHttpRequest WebSocket is not defined"
     expect(verdicts(hold).last).to_contain_text(f"Error: {absent}")
     # Of another size of the model the page would die.
-    for attempt, message in (("model.nv = 1e9", "only a getter"), ('import("x")', "was seen")):
+    for attempt, message in (
+        ("model.nv = 1e9", "only a getter"),
+        ('import("x")', "was seen"),
+        ("Math.abs = Math.min = () => 0.5", "Math.abs, Math.min must stay as it was"),
+        ("Number.isFinite = () => true; data.qpos[0] = 0.5", "Number.isFinite must stay"),
+    ):
         text.fill(attempt)
         press(hold, "Check")
         expect(verdicts(hold).last).to_contain_text(message)
@@ -174,15 +179,12 @@ def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None
     press(hold, "Check")
     for verdict in verdicts(hold).all():
         expect(verdict).to_contain_text("self.postMessage is not a function")
-    text.fill("Math.sin = Array.prototype.map = null")
-    press(hold, "Check")
-    expect(hold).not_to_contain_text("Solved")
     text.fill("data.qfrc_applied[0] = 50 * (0.5 - data.qpos[0]) - 10 * data.qvel[0]")
     press(hold, "Check")
     expect(hold.get_by_text("Solved: all trials are passed.")).to_be_visible()
     press(verdicts(hold).last, "Watch this run")
     expect(hold.locator(".lab-time")).to_have_text(re.compile(r"^5\.000* s$"))
-    expect(hold.locator(".lab-readouts dd").last).to_have_text(re.compile("0.4"))
+    expect(hold.locator(".exercise-now").last).to_have_text(re.compile("0.4"))
     neighbour.scroll_into_view_if_needed()
     expect(neighbour).to_have_attribute("data-state", "playing")
 

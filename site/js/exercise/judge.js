@@ -2,7 +2,8 @@
  * Judges an attempt at an exercise, in the same way in the page's worker and in the build.
  *
  * Each trial has a simulation of its own, from the start: its button is pressed, steps are made until its time, and its expression, which
- * is the readout of the same number, is compared with its bounds.
+ * is the readout of the same number, is compared with its bounds. An attempt that changes what the trial computes with, such as `Math.abs`,
+ * fails it, and the change is undone before the next one.
  */
 
 import { Lab } from '../lab/core/lab.js'
@@ -22,16 +23,20 @@ const MOST = 200_000 // steps of a trial
  * @param {Record<string, any>} config the lab's data, with `exercise` and `attempt`
  * @param {Record<string, any>} code the lab's functions
  * @param {Uint8Array | null} bytes the model, unless the attempt is one
+ * @param {import('../lab/trial/guard.js').Guard} guard of what the judge and its trials share with the attempt
  * @param {() => void} [beat] called as it makes progress
  * @returns {Generator<Verdict>} one for each trial
  * @throws {Error} nothing can be tried
  */
-export function* judge(engine, config, code, bytes, beat = () => {}) {
+export function* judge(engine, config, code, bytes, guard, beat = () => {}) {
   const source = config.exercise.subject === 'model' ? config.attempt : bytes
   const attempt = attemptCode(config, code)
   engine.load(source).dispose() // a model that does not compile is no matter of a trial
   for (const [i, trial] of config.exercise.trials.entries()) {
-    yield tryOnce(() => new Lab(engine, source, config, attempt), attempt.readouts[i], ['readouts', i, 'expr'], trial, beat)
+    const verdict = tryOnce(() => new Lab(engine, source, config, attempt), attempt.readouts[i], ['readouts', i, 'expr'], trial, beat)
+    const changes = guard.changes()
+    guard.repair()
+    yield changes.length === 0 ? verdict : { passed: false, seen: null, failure: `${changes.join(', ')} must stay as it was` }
   }
 }
 

@@ -41,8 +41,10 @@ export class Exercise extends Instrument {
     const label = this.element.querySelector('.lab-static [role="group"]')?.getAttribute('aria-label') ?? ''
     this.board = h('ol', { class: 'exercise-trials', 'aria-label': label }, ...this.rows.map(({ element }) => element))
     this.summary = h('p', { class: 'exercise-state', role: 'status' })
-    this.editor.element.append(this.summary, this.board)
-    this.body.prepend(this.editor.element)
+    this.editor.element.append(this.summary)
+    this.readouts.element.remove() // what trials see stands in their rows
+    this.readouts.show = (values) => this.rows.forEach(({ now, trial }, i) => (now.textContent = valueText(values[i], trial)))
+    this.body.prepend(this.editor.element, this.board)
   }
 
   makeRow(trial, i) {
@@ -52,8 +54,9 @@ export class Exercise extends Instrument {
     const advice = h('p', { class: 'exercise-hint', hidden: true }, trial.hint)
     const watch = textButton(words('exercise.live.watch'), () => this.watch(i), 'lab-text')
     watch.hidden = true
-    const element = h('li', {}, h('p', {}, h('b', {}, trial.name), ' ', verdict, ' ', seen, ' ', watch), advice)
-    return { trial, element, verdict, seen, advice, watch }
+    const now = h('span', { class: 'exercise-now' }, '–') // the value in the picture
+    const element = h('li', {}, h('p', {}, h('b', {}, trial.name), ' ', verdict, ' ', seen, ' ', watch), now, advice)
+    return { trial, element, verdict, seen, advice, watch, now }
   }
 
   makeFoot() {
@@ -112,9 +115,9 @@ export class Exercise extends Instrument {
     advice.hidden = state !== 'failed' || trial.hint === ''
   }
 
-  seenText({ seen, failure }, { digits, unit }) {
+  seenText({ seen, failure }, trial) {
     if (seen === null) return this.words('exercise.live.unseen', { message: failure })
-    return this.words('exercise.live.seen', { value: withUnit(formatReadout(seen, digits).trim(), unit) })
+    return this.words('exercise.live.seen', { value: valueText(seen, trial) })
   }
 
   finish(problem, results) {
@@ -168,7 +171,7 @@ export class Exercise extends Instrument {
   watch(i) {
     const { button, t } = this.config.exercise.trials[i]
     this.load(this.checkedText)
-    ;[...this.readouts.element.children].forEach((row, n) => (row.hidden = n !== i))
+    this.rows.forEach(({ now }, n) => (now.hidden = n !== i))
     this.simulation.replay({ values: this.initial, events: button === null ? [] : [[0, button]], end: t })
     this.body.querySelector('.lab-stage').scrollIntoView({ block: 'nearest' })
   }
@@ -179,6 +182,9 @@ export class Exercise extends Instrument {
     super.dispose()
   }
 }
+
+/** A value that a trial sees. */
+const valueText = (value, { digits, unit }) => withUnit(formatReadout(value, digits).trim(), unit)
 
 /**
  * Has an attempt judged in a worker of its own, which ends with the last verdict, or when it takes too long.

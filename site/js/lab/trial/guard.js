@@ -1,5 +1,6 @@
 /**
- * Detects whether a lab has changed what all labs of a page share: JavaScript's own objects, the globals, and the engine's functions.
+ * Detects whether a lab, or an attempt at an exercise, has changed what others share: JavaScript's own objects, the globals, and the
+ * engine's functions.
  *
  *   const guard = new Guard([['globalThis', globalThis, false], ['mj', engine.mj, true]])
  *   guard.changes()  → ['Math.sin', …]     empty: nothing has changed
