@@ -122,8 +122,11 @@ def derive_seeds(
         verdict, number = report.verdict, report.verdict.better
         if number is not None and report.own_row is not None and report.own_row.status == "ok":
             setting = report.rows[number].setting
-            others = [name for name in names if name != report.name]
-            reasons = {name: _why_worse(by_name.get(name), setting) for name in others}
+            reasons = {
+                name: _why_worse(by_name.get(name), setting)
+                for name in names
+                if name != report.name
+            }
             worse = next((f"in {name} {reason}" for name, reason in reasons.items() if reason), "")
             unknown = [name for name, reason in reasons.items() if reason is None]
             claim, semicolon, remark = verdict.text.partition("; ")

@@ -192,8 +192,8 @@ def test_what_is_better_under_one_seed_and_worse_under_another_is_not_better() -
     assert "here; whether that holds in seed-2 was not measured; " in alone.verdict.text
     assert alone.verdict.better is None
     lost = masked(status="diverged", reasons=("it is not finite",))
-    other = replace(judged(lost, contact_model=CONES), name="seed-2")
-    (first, _) = derive_seeds([seeds[0], other], names)
+    lost_report = replace(judged(lost, contact_model=CONES), name="seed-2")
+    (first, _) = derive_seeds([seeds[0], lost_report], names)
     assert ", but in seed-2 it is lost; " in first.verdict.text
 
 
