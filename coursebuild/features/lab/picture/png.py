@@ -65,9 +65,8 @@ def _ends(marks: NDArray[np.bool_]) -> tuple[int, int]:
 
 def _compressed(pixels: NDArray[np.uint8], opaque: bool) -> bytes:
     rows = pixels[..., : 3 if opaque else 4].reshape(len(pixels), -1)
-    # Each row becomes its difference from the row above: PNG's filter 2.
-    differences = np.diff(rows, axis=0, prepend=np.zeros_like(rows[:1]))
-    filtered_rows = np.column_stack((np.full(len(rows), 2, np.uint8), differences))
+    # PNG's filter 0: flat colours repeat; as differences from the row above they take a third more.
+    filtered_rows = np.column_stack((np.zeros(len(rows), np.uint8), rows))
     return zlib.compress(filtered_rows.tobytes(), _LEVEL)
 
 
