@@ -24,6 +24,8 @@ test('a flat line has a scale', () => {
 test('so has a plot that waits for its first sample', () => {
   near(spanOf({}, null, null), [-1, 1])
   near(spanOf({ ymin: 0 }, null, null), [0, 1])
+  near(spanOf({ ymax: 5 }, null, null), [-0.3, 5])
+  near(spanOf({ ymin: 5 }, null, null), [5, 5.25])
   near(spanOf({ ymax: 0 }, null, null), [-1, 0])
   near(spanOf({ ymax: 0 }, 0, 0), [-1, 0])
   near(spanOf({ ymax: 0, refLines: [{ y: 0 }] }, undefined, undefined), [-1, 0])

@@ -30,7 +30,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
-from coursebuild.core.text.macros import expand_macros
+from coursebuild.core.text.macros import PARAMETER, expand_macros
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
@@ -120,7 +120,7 @@ def check_macros(
     """Report macros with a command that there is not; one may begin what another one ends."""
     texts = {name: body.text for name, body in macros.items()}
     for body in macros.values():
-        plain_body = replace(body, text=re.sub("#[1-9]", " x", body.text))
+        plain_body = replace(body, text=PARAMETER.sub(" x", body.text))
         tex = expand_macros(plain_body, texts)
         result = typeset(Formula(tex.text, display=True))
         if isinstance(result, MathError) and "unknown command" in result.message:

@@ -56,7 +56,7 @@ CATEGORIES: tuple[Category, ...] = ("zero", "one", "two", "few", "many", "other"
 
 _REPORT = "report."
 _BETWEEN_SENTENCES = regex(r"((?<=\.) | · |; | / )")
-_MEASURE = regex(r"[-\u2212]?[0-9][0-9.]*(?:[e·]\S+)?(?: ± [0-9.]+ %)?(?: [^\s.]{1,5})?")
+_MEASURE = regex(r"[-\u2212]?[0-9]+(?:\.[0-9]+)?(?:[e·]\S+)?(?: ± [0-9.]+ %)?(?: [^\s.]{1,5})?")
 _AUTHORS = ("name", "title")
 """Parts of a text of a report that an author has written."""
 

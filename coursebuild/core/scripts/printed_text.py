@@ -241,7 +241,9 @@ class PrintedText:
         if heading < 0 or self._words[heading].endswith(":"):
             return ""
         headers = [heading]
-        while headers[-1] > 0 and self._headings[headers[-1]] == headers[-1] - 1:
+        while (
+            len(headers) < 3 and headers[-1] > 0 and self._headings[headers[-1]] == headers[-1] - 1
+        ):
             headers.append(headers[-1] - 1)
         return title_above(self.lines[at].text, number, [self.lines[k].text for k in headers])
 

@@ -300,7 +300,7 @@ class ColumnTitle(Struct, frozen=True):
         unit_span = cell.span
         if at >= 0:
             unit_span = Span(cell.span.source, *title.origin(at, at + len(unit.text)))
-        words = words_of(title.text[:at] if at >= 0 else title.text) - words_of(excepted_text)
+        words = words_of(name) - words_of(excepted_text)
         if excepted_text:
             name, unit = "", NO_UNIT
         return cls(cell.span, title.text, name, words, unit, unit_span)

@@ -45,7 +45,7 @@ _MISQUOTED = regex(
 )
 _SPACES = regex(r"\s+")
 _NUMBER = regex(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
-_RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?!\d)(.*)\Z")
+_RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?!\d)((?s:.*))\Z")
 """A formula that ends with a number, and what stands behind it."""
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
@@ -137,7 +137,9 @@ def read_meaning(
     value, number, unit = values.get("value"), None, value_text(values.get("unit"))
     result = _RESULT.match(tex.text) if "out" in values and value is None else None
     if result is not None and (not result[2].strip() or read_unit(result[2])):
-        value, unit = tex.slice(*result.span(1)), plain_unit(result[2]) or unit
+        number_text = tex.slice(*result.span(1))
+        if number_text.span().text == number_text.text:  # else it stands in a macro
+            value, unit = number_text, plain_unit(result[2]) or unit
     is_number = value is not None and _NUMBER.fullmatch(value.text) is not None
     if value is not None and is_number and not {"out", "given"} <= {*values}:
         printed = values.get("out")
@@ -154,7 +156,7 @@ def read_meaning(
         if is_number:
             reason = "a value is either given or printed by a script"
         elif value is None:
-            reason = "`out` binds a value, and there is none"
+            reason = "`out` binds a number, and the formula ends with none that is written in it"
         place = braces if value is None else value
         report(diagnose("symbol-attribute", place.span(), reason, help=_VALUE_HELP))
         return None, source, None

@@ -7,24 +7,30 @@ and what computes it, the copies of a page and its notebook.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 
 _MOST = 1_000
 """How often macros are replaced in one formula."""
+_REACH = 200
+"""Characters before a macro in which a command is looked for."""
 _LONGEST = 20_000
 """Characters of a formula in which macros are replaced; a longer one is not typeset, either."""
 _DEFINED = regex(
-    r"\\(?:[egx]?def|let|(?:re)?newcommand|providecommand|DeclareMathOperator)\*?\s*\{?\s*"
+    r"\\(?:[egx]?def|let|(?:re)?newcommand|providecommand|DeclareMathOperator)(?![A-Za-z])\*?\s*\{?\s*"
     r"\\?([A-Za-z]+)"
 )
 COMMAND = regex(r"\\(?:([A-Za-z]+)|.)", re.DOTALL)
 _SIGN = regex(r"\\(?:[A-Za-z]+|.)|.", re.DOTALL)
-_PARAMETER = regex(r"#([1-9])")
-_JOINT = regex(r"\\[A-Za-z]+(?=#)|#\d(?=[A-Za-z])")
-"""After which a letter would become part of a command."""
+PARAMETER = regex(r"(?<!\\)#([1-9])")
+_COMMAND_AT_END = regex(r"\\[A-Za-z]+\Z")
+_BEFORE_ARGUMENT = regex(
+    r"(?:[_^]|\\(?:acute|bar|bm|boldsymbol|breve|check|d?dot|grave|hat|math(?:bb|bf|cal|frak|it|rm|sf|tt)"
+    r"|overline|tilde|underline|vec|widehat|widetilde)|\\[dt]?(?:binom|frac)\s*(?:\{[^{}]*\}|[^\s{}\\])?)\s*\Z"
+)
+"""What takes the next sign or group: a macro is one argument, as in MathJax."""
 
 
 def expand_macros(tex: Excerpt, macros: Mapping[str, str]) -> Excerpt:
@@ -40,26 +46,35 @@ def expand_macros(tex: Excerpt, macros: Mapping[str, str]) -> Excerpt:
         if use[1] in own_names or use[1] not in macros:
             continue
         before, rest = tex.slice(0, use.start()), tex.slice(at)
-        body, arguments = _JOINT.sub(r"\g<0> ", macros[use[1]]), [before]
-        count = max(map(int, _PARAMETER.findall(body)), default=0)
+        body, arguments = macros[use[1]], [before]
+        count = max(map(int, PARAMETER.findall(body)), default=0)
         while len(arguments) <= count and (split := split_argument(rest)):
             arguments.append(split[0])
             rest = split[1]
         if len(arguments) <= count:
             continue
-        if before.text.rstrip().endswith(("_", "^")):  # there it is one argument, as in MathJax
+        if _BEFORE_ARGUMENT.search(before.text[-_REACH:]):
             body = f"{{{body}}}"
-        elif rest.text[:1].isalpha() or before.text[-1:].isalpha():
-            body = f" {body} "
         places = ((at, tex.offset(use.start())) for at in range(len(body)))
         whole = Excerpt(tex.source, body, tuple(places) or ((0, tex.offset(at)),))
         parts, start = [before], 0
-        for parameter in _PARAMETER.finditer(body):
+        for parameter in PARAMETER.finditer(body):
             parts += whole.slice(start, parameter.start()), arguments[int(parameter[1])]
             start = parameter.end()
-        tex = Excerpt.join([*parts, whole.slice(start), rest])
+        tex = _join([*parts, whole.slice(start), rest])
         at, left = use.start(), left - 1
     return tex
+
+
+def _join(parts: Sequence[Excerpt]) -> Excerpt:
+    """Parts of a formula put together, with a blank where a letter would go on a command."""
+    whole: list[Excerpt] = []
+    for part in parts:
+        if part.text[:1].isalpha() and whole and _COMMAND_AT_END.search(whole[-1].text[-_REACH:]):
+            whole.append(Excerpt(part.source, " ", ((0, part.offset(0)),)))
+        if part.text:
+            whole.append(part)
+    return Excerpt.join(whole or parts)
 
 
 def split_argument(tex: Excerpt) -> tuple[Excerpt, Excerpt] | None:

@@ -278,9 +278,14 @@ def unit_of_header(text: str) -> UnitText:
 
 def name_of_header(text: str) -> tuple[str, int]:
     """A label or header without its unit, as `gain` of `gain / dB`; where that begins, or -1."""
-    unit = unit_of_header(text).text.replace(" ", "·")
-    at = text.replace(" ", "·").rfind(unit) if unit else -1  # `J/(kg K)`
-    return (_BEFORE_UNIT.sub("", text[:at]) if at > 0 else text), at
+    unit = read.text.replace(" ", "·") if (read := unit_of_header(text)) else ""
+    whole = text.replace(" ", "·")  # `J/(kg K)`
+    pattern = rf"(?<![^\W\d_]){re.escape(unit)}(?![^\W\d_])"
+    at = max((match.start() for match in re.finditer(pattern, whole)), default=whole.rfind(unit))
+    if not unit or at <= 0:
+        return text, at if unit else -1
+    behind = text[at + len(unit) :].lstrip(")] ")
+    return " ".join(filter(None, (_BEFORE_UNIT.sub("", text[:at]), behind))), at
 
 
 def unit_of_label(before: str) -> UnitText:

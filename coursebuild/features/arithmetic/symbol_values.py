@@ -139,7 +139,7 @@ def _source(formula: _Formula) -> str | None:
 def _value_beside(formula: _Formula) -> model.NumberBinding | None:
     """The value that a formula does not say itself."""
     value = formula.value if isinstance(formula, model.Math) else None
-    return None if value is None or formula.tex.span().contains(value.text_span) else value
+    return None if value is None or value.text_span.start < value.span.start else value
 
 
 def _read_symbols(document: model.Document) -> DocumentQuantities:

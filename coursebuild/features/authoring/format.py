@@ -171,7 +171,10 @@ class _Layout:
         if any(isinstance(inline, model.HardBreak) for inline in inlines):
             return
         unbreakable = [inline.span for inline in inlines if isinstance(inline, _UNBREAKABLE)]
-        unbreakable += [inline.tex.span() for inline in inlines if isinstance(inline, model.Math)]
+        formulas = [inline for inline in inlines if isinstance(inline, model.Math)]
+        for formula in formulas:  # one with macros has more than what it shows
+            inner = formula.tex.span()
+            unbreakable.append(inner if inner.text == formula.tex.text else formula.span)
         unbreakable += [
             inline.text_span for inline in inlines if isinstance(inline, model.NumberBinding)
         ]

@@ -168,7 +168,9 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         anchor = f"#{parts.fragment}" if parts.fragment else ""
         stem = stem_of(path)  # the first text of a folder is often called by the folder
         folder = path if stem == path else stem.removesuffix("/index")
-        own_route, bare = path.removeprefix("docs/"), without_order(stem)
+        own_route = path.removeprefix("docs/")
+        has_order = without_order(parts.path) != parts.path  # of another text, if no file has it
+        bare = stem if has_order else without_order(stem)
         names = (stem, path, f"{folder}/index", f"{folder}/README", own_route, bare)
         target = next(filter(None, map(self.targets.get, names)), None)
         if target is None and address.startswith("/"):  # the folder of a site's texts is no route

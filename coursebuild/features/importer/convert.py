@@ -7,6 +7,7 @@ import itertools
 import os
 import posixpath
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from pathlib import Path
 
@@ -316,7 +317,9 @@ def _convert_texts(
     routes = ((text.substitutions.get("slug", "").strip("/"), text.link) for text in texts)
     targets = {route: link for route, link in routes if route}
     stems = {stem_of(text.file): text.link for text in texts if text.file}
-    targets |= {without_order(stem): link for stem, link in stems.items()} | stems
+    bare_stems = Counter(map(without_order, stems))
+    bare_targets = ((without_order(stem), link) for stem, link in stems.items())
+    targets |= {stem: link for stem, link in bare_targets if bare_stems[stem] == 1} | stems
     texts = [text for text in texts if text.path]
     context = LessonContext(
         targets=targets,

@@ -52,7 +52,8 @@ _LEAD = regex(r"\n[ \t>]*\Z")
 _WORDS_BEFORE = regex(r"[ \t>]*(?>(?:(?:[-+*]|\d+[.)])(?:[ \t]+|$))?)[^\s>]")
 DEFINITION = regex(
     r"\\(?:(?P<kind>(?:re)?newcommand|providecommand|DeclareMathOperator)(?P<star>\*?)[ ]*"
-    r"\{?\\?(?P<name>[A-Za-z]+)\}?(?:\[(?P<count>\d)\])?|def[ ]*\\(?P<own>[A-Za-z]+)(?:#\d)*)"
+    r"\{?\\?(?P<name>[A-Za-z]+)\}?(?:\[(?P<count>\d)\](?P<usual>\[[^\[\]]*\])?)?|"
+    r"def[ ]*\\(?P<own>[A-Za-z]+)(?P<arguments>(?:#\d)*))"
     r"[ ]*\{(?P<body>(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}\s*"
 )
 """A macro of LaTeX; MathJax takes its name without a backslash, too."""
@@ -61,10 +62,13 @@ _DOXYGEN = regex(rf"{_CODE}|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<tex>[^$]+?)\\f
 _PLACES = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
 """Where MyST and Sphinx have macros by their names."""
 _OBJECT = regex(r"\b[Mm]acros[\"']?\s*[:=]\s*\{")
-_STRING = r"(?P<raw>[rR]?)(?P<quote>\"\"\"|'''|[\"'`])(?P<tex>(?:\\.|(?!(?P=quote)).)*?)(?P=quote)"
+_STRING = (
+    r"(?P<raw>[rR]?|String\.raw)(?P<quote>\"\"\"|'''|[\"'`])"
+    r"(?P<tex>(?:\\.|(?!(?P=quote))[^\\])*)(?P=quote)"
+)
 _ENTRY = regex(
-    rf"(?:[\s,]|(?:#|//)[^\n]*\n)*[rR]?[\"']?\\*(?P<name>[A-Za-z]+)[\"']?\s*:\s*[\[(]?\s*{_STRING}"
-    r"(?:\s*,\s*\d\s*[\])])?",
+    r"(?:[\s,]|(?:#|//)[^\n]*\n|/\*(?:(?!\*/).)*\*/)*(?:[rR](?=[\"']))?[\"']?\\*(?P<name>[A-Za-z]+)[\"']?"
+    rf"\s*:\s*[\[(]?\s*{_STRING}(?:\s*,\s*\d\s*)?[\])]?",
     re.DOTALL,
 )
 """A macro in an object of Python or JavaScript, where its value is literal."""
@@ -161,15 +165,21 @@ def find_macros(program: str) -> str:
 
     They are macros of MathJax and KaTeX in an object, or LaTeX for Sphinx.
     """
-    preambles = "".join(match["tex"] for match in _PREAMBLE.finditer(program))
+    preambles = "".join(map(_literal, _PREAMBLE.finditer(program)))
     definitions = [match[0] for match in DEFINITION.finditer(preambles)]
     for start in _OBJECT.finditer(program):
-        at = start.end()
+        at, line = start.end(), program.rfind("\n", 0, start.start()) + 1
+        if re.match(r"[ \t]*(?:#|//)", program[line : start.start()]):
+            continue
         while entry := _ENTRY.match(program, at):
-            at, tex = entry.end(), entry["tex"]
-            tex = tex if entry["raw"] else re.sub(r"\\(.)", r"\1", tex)
-            definitions.append(_define(entry["name"], tex))
+            at = entry.end()
+            definitions.append(_define(entry["name"], _literal(entry)))
     return "".join(definitions)
+
+
+def _literal(string: re.Match[str]) -> str:
+    """Return the TeX of a string; a backslash that escapes nothing is one of TeX."""
+    return string["tex"] if string["raw"] else re.sub(r"\\([\\\"'`])", r"\1", string["tex"])
 
 
 def _define(name: str, tex: str) -> str:

@@ -13,9 +13,11 @@ from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.source_files import find_group
 
 _STRING = r"(?:\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*'|`(?:\\.|[^`\\])*`)"
+_QUOTED = rf"(?<=[\s=(\[{{,:?+&|]){_STRING}"
+"""A string where one can begin: not at the apostrophe of a word."""
 _BRACES = r"\{[^{}]*\}"
 for _ in range(8):  # braces in braces; those in strings are text
-    _BRACES = rf"\{{(?>(?:(?>[^{{}}\"'`]+)|{_STRING}|[\"'`]|{_BRACES})*)\}}"
+    _BRACES = rf"\{{(?>(?:(?>[^{{}}\"'`]+)|{_QUOTED}|[\"'`]|{_BRACES})*)\}}"
 _ATTRIBUTES = rf"(?P<attributes>(?:[^<>{{}}\"'`]|\"[^\"]*\"|'[^']*'|{_BRACES})*)"
 _STATEMENT = (
     r"(?:\A\n*|(?<=\n\n))"  # in a paragraph it is text
@@ -58,9 +60,12 @@ _SENTENCE = regex(
 """An attribute of more than a word that begins as a sentence does."""
 _VALUE = regex(rf"\s[\w-]+=(?P<value>{_BRACES})")
 _DATA = regex(
-    rf"(?P<brace>[{{}}])|(?:(?P<key>[\w$-]+)[\"']?\s*:\s*)?(?P<string>{_STRING})", re.DOTALL
+    rf"(?P<brace>[{{}}])|(?:(?P<key>[\w$-]+)[\"']?\s*:\s*)?"
+    rf"(?:(?P<string>{_STRING})|(?P<number>(?<![\w$.])-?\d[\d.]*(?![\w$])))",
+    re.DOTALL,
 )
-"""What matters in a literal of JavaScript: where an object begins or ends, and its texts."""
+"""What matters in a literal of JavaScript: where an object begins or ends, and its values."""
+_ESCAPE = regex(r"\\([\"'`\\n])")
 _NAMES = ("title", "label", "name", "heading")
 _ADDRESSES = ("href", "to", "link", "url")
 _TARGET = regex(rf"[^{{}}]*?\b(?:{'|'.join(_ADDRESSES)})\s*:\s*[\"']([^\"'\n]*)[\"']")
@@ -111,7 +116,7 @@ def _write_value(value: str) -> str:
             depth += 1 if brace == "{" else -1
             items += [f"{'  ' * (depth - 1)}- "] * (brace == "{")
         elif part["key"] not in _ADDRESSES:
-            text = re.sub(r"\\(?=[\"'`\\])", "", part["string"][1:-1]).replace("\\n", " ")
+            text = part["number"] or _ESCAPE.sub(_read_escape, part["string"][1:-1])
             if part["key"] in _NAMES and items[-1].endswith("- "):
                 target = _TARGET.match(value, part.end())
                 items[-1] += f"**[{text}]({target[1]})**: " if target else f"**{text}**: "
@@ -119,6 +124,10 @@ def _write_value(value: str) -> str:
                 is_code = part["key"] and not re.search(r"`|\A\W*[A-Z][^<]*\w \w\w[^<]*\Z", text)
                 items[-1] += f"`{text}` " if is_code else f"{text} "
     return "\n".join(item.rstrip(": ") for item in items if item)
+
+
+def _read_escape(escape: re.Match[str]) -> str:
+    return " " if escape[1] == "n" else escape[1]
 
 
 def _convert_part(part: re.Match[str], context: LessonContext) -> str:

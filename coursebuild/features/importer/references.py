@@ -256,15 +256,17 @@ def _find_common_macros(documents: Iterable[model.Document]) -> dict[str, str]:
         texts = [formula.tex.text for _, formula in model.find_formulas(document)]
         matches = [match for tex in texts for match in DEFINITION.finditer(tex)]
         for match in matches:
-            body, count = " ".join(match["body"].split()), match["count"] or 0
+            body = " ".join(match["body"].split())
+            count = match["count"] or (match["arguments"] or "0")[-1]
             if match["kind"] == "DeclareMathOperator":
                 body = f"\\operatorname{match['star']}{{{body}}}"
-            is_whole = match["kind"] != "renewcommand" and f"#{count}" in f"#0{body}"
+            is_whole = f"#{count}" in f"#0{body}" and not match["usual"]
+            is_whole &= match["kind"] != "renewcommand"
             bodies[match["name"] or match["own"]] |= {body, body if is_whole else ""}
         commands = _commands(DEFINITION.sub(r"\g<body> ", " ".join(texts)))
         strange_names |= commands - {match["name"] or match["own"] for match in matches}
         used_names |= commands
-    names = {name for name in bodies if len(bodies[name]) == 1 and name in used_names}
+    names = {n for n in bodies if len(bodies[n]) == 1 and min(bodies[n]) and n in used_names}
     shared_names = sorted(names & strange_names)
     formulas = [Formula(rf"\{name}{{x}}{{x}}", display=False) for name in shared_names]
     for name, result in zip(shared_names, MathEngine().typeset(formulas), strict=True):

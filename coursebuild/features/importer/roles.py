@@ -23,16 +23,20 @@ from coursebuild.features.importer.jsx import write_component
 from coursebuild.features.importer.source_files import find_group, stem_of, title_of_file
 
 _BLOCK_START = r"[ \t]*(?:\n|[>|]|(?:[-*+]|\#+|\d+[.)])[ \t\n]|:::|```|~~~)"
+_FENCE = (
+    r"^[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)*(?P<mark>`{3,}|~{3,})[^`\n]*\n"
+    r"(?:(?![ \t>]*(?P=mark))[^\n]*\n)*[^\n]*"
+)
 _OVER_LINES = regex(
-    r"(?P<block>^[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)*(?P<mark>`{3,}|~{3,})[^`\n]*\n"
-    r"(?:(?![ \t>]*(?P=mark))[^\n]*\n)*[^\n]*)"  # what looks like one in code is none
+    rf"(?P<block>{_FENCE})"  # what looks like one in code is none
     rf"|(?<!`)(?P<ticks>`+)(?!`)(?:[^\n]|\n(?!{_BLOCK_START}))+?"
     r"(?<!`)(?P=ticks)(?!`)"
     r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
-    r"|^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n[ \t]*[^\s\[]\S*"
+    rf"|^[ ]{{0,3}}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n(?!{_BLOCK_START})[ \t]*[^\s<\[]\S*"
+    r"(?=[ \t]*(?:$|[\"'(]))"
     r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
     r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
     r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)",
@@ -322,25 +326,25 @@ def convert_tag(tag: str, context: LessonContext) -> str:
 
 
 _HTML_LINK = regex(
-    r"<a[ \t](?:[^<>]*[ \t])?href=([\"'])(?P<page>[^\"'\n:]+)\1[^<>]*>"
-    r"(?P<words>(?:(?!</?a\b)[^\n`])*)</a>",
-    re.IGNORECASE,
+    rf"{_FENCE}|<!--(?:(?!-->).)*-->|(?<!`)(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`)"
+    r"|<a(?![^<>]*\s(?:id|name)=)[ \t](?:[^<>]*[ \t])?href=(?P<quote>[\"'])(?P<page>[^\"'\s:]+)"
+    r"(?P=quote)[^<>]*>(?P<words>(?:(?!</?a\b)[^\n`\[\]])*)</a>",
+    re.IGNORECASE | re.MULTILINE | re.DOTALL,
 )
-_IN_HTML = regex(
-    r"(?:\A|\n[ \t]*\n)\s*<(?!/?(?:a|b|code|em|i|img|span|strong)\b)(?:[^\n]|\n(?!\s*\n))*\Z"
-)
-"""A paragraph that begins with an element around blocks, in which Markdown is not read."""
+"""A link of HTML that has no anchor; or code or a comment, in which there is none."""
+_HTML_BLOCK = regex(r"\s*<(?!/?(?:a|b|code|em|i|img|span|strong)\b)")
+"""How a paragraph begins in which Markdown is not read."""
 
 
 def rewrite_html_links(text: str, context: LessonContext) -> str:
     """Return prose whose links to texts are in Markdown: in HTML they have no address."""
 
     def rewrite(link: re.Match[str]) -> str:
-        before = text[: link.start()]
-        is_text = stem_of(context.resolve_path(urlsplit(link["page"]).path)) in context.targets
-        if not is_text or _IN_HTML.search(before) or before.rpartition("\n\n")[2].count("`") % 2:
+        page = link["page"]
+        is_text = page and stem_of(context.resolve_path(urlsplit(page).path)) in context.targets
+        if not is_text or _HTML_BLOCK.match(re.split(r"\n[ \t]*\n", text[: link.start()])[-1]):
             return link[0]
-        return f"[{link['words']}]({link['page']})"
+        return f"[{link['words']}]({page})"
 
     return _HTML_LINK.sub(rewrite, text)
 

@@ -180,9 +180,10 @@ _HINT = regex(
 """A callout of GitBook."""
 _ALERT = regex(
     r"^(?P<fence>`{3,}|~{3,})[^\n]*\n.*?^(?P=fence)|^<(?:div\b[^<>]*\bclass=[\"'][^\"'<>]*\balert-"
-    r"(?!block\b)(?P<kind>\w+)|(?P<name>note|tip|info|important|warning|caution|danger)\b"
-    r"(?:[^<>]*\btype=[\"'](?P<type>\w+))?)[^<>]*(?<!/)>"
-    r"(?P<text>(?:(?!<div\b).)*?)</(?(name)(?P=name)|div)>[ \t]*$",
+    r"(?!block\b)(?P<kind>\w+)[^<>]*|(?P<name>note|tip|info|important|warning|caution|danger)\b"
+    r"(?:[ \t]+type=[\"'](?P<type>\w+)[\"'])?[ \t]*)>"
+    r"(?P<text>(?:^(?P<inner>`{3,}|~{3,}).*?^(?P=inner)|(?!<div\b|<(?P=name)\b|^[`~]{3}).)*?)"
+    r"</(?(name)(?P=name)|div)>[ \t]*$",
     re.MULTILINE | re.DOTALL | re.IGNORECASE,
 )
 """A callout of Jupyter, as its style sheet has it, or a component; or code, in which is none."""

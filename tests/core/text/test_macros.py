@@ -15,6 +15,9 @@ MACROS = {
     "bold": r"\mathbf#1",
     "twice": r"\id{\id{#1}#1}",
     "none": "",
+    "num": r"\#1",
+    "both": "#1#2",
+    "defeq": ":=",
     "loop": r"\loop\loop",
 }
 
@@ -25,10 +28,15 @@ MACROS = {
         (r"x \in \RR^3", r"x \in \mathbb{R}^3"),
         (r"\norm{a + \norm b} \RRR", r"\left\lVert a + \left\lVert b\right\rVert\right\rVert \RRR"),
         (r"\of f{\{x\}} \of\alpha x", r"f(\{x\}) \alpha(x)"),
-        (r"\bold{x}\id{\alpha}x\beta\id{y}", r"\mathbf x \alpha x\beta y "),
+        (r"\bold{x}\id{\alpha}x\beta\id{y}", r"\mathbf x\alpha x\beta y"),
+        (
+            r"\dot\RR \frac1\RR \cdot\RR \num",
+            r"\dot{\mathbb{R}} \frac1{\mathbb{R}} \cdot\mathbb{R} \#1",
+        ),
+        (r"\both{\alpha}{b} \RR\defeq\RR", r"\alpha b \mathbb{R}:=\mathbb{R}"),
         (r"\twice{\RR}", r"\mathbb{R}\mathbb{R}"),
         (r"x_\RR^ \norm{x}", r"x_{\mathbb{R}}^ {\left\lVert x\right\rVert}"),
-        (r"a\none b \\RR", r"a   b \\RR"),
+        (r"a\none b \\RR", r"a b \\RR"),
         (r"\def\RR{R}\newcommand{\id}{i} \RR\id", r"\def\RR{R}\newcommand{\id}{i} \RR\id"),
         (r"\frac{\norm}{\of a}", r"\frac{\norm}{\of a}"),
     ],

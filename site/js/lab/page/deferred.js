@@ -31,10 +31,10 @@ export class DeferredPicture {
     this.view = view
   }
 
-  /** Whether the picture is drawn. */
+  /** Whether the picture is drawn, or never will be: a context that is lost has no fence. */
   get isFinished() {
     const gl = this.renderer.getContext()
-    return gl.clientWaitSync(this.fence, 0, 0) !== gl.TIMEOUT_EXPIRED
+    return this.fence === null || gl.clientWaitSync(this.fence, 0, 0) !== gl.TIMEOUT_EXPIRED
   }
 
   /** Copy the picture to the canvas, which is of its size. */

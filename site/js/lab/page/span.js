@@ -14,6 +14,7 @@ const LEAST = 1e-9
  */
 export function spanOf({ ymin, ymax, refLines = [] }, low, high) {
   const marks = refLines.map(({ y }) => y)
+  if (marks.length === 0 && low == null) marks.push(0) // where a plot waits for its first sample
   const bottom = ymin ?? Math.min(low ?? Infinity, ...marks)
   const top = ymax ?? Math.max(high ?? -Infinity, ...marks)
   const seen = ymin === bottom && ymax === top ? 0 : SEEN * Math.abs(top + bottom)

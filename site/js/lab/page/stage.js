@@ -126,7 +126,7 @@ export class Stage {
     const { deferred, holder } = this
     this.plan()
     if (!deferred.isFinished) return
-    if (deferred.view !== holder) deferred.drop()
+    if (deferred.view !== holder || holder.width === 0 || holder.height === 0) deferred.drop()
     else {
       this.fit(holder)
       deferred.copy()
