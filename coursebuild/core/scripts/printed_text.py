@@ -237,15 +237,13 @@ class PrintedText:
         """The title of the column that a number stands in; empty where there is none."""
         if (title := self.lines[at].title(number)) is not None:
             return title.text
-        heading = self._headings[at]
+        first = heading = self._headings[at]
         if heading < 0 or self._words[heading].endswith(":"):
             return ""
-        headers = [heading]
-        while (
-            len(headers) < 3 and headers[-1] > 0 and self._headings[headers[-1]] == headers[-1] - 1
-        ):
-            headers.append(headers[-1] - 1)
-        return title_above(self.lines[at].text, number, [self.lines[k].text for k in headers])
+        while first > max(0, heading - 2) and self._headings[first] == first - 1:
+            first -= 1
+        headers = [line.text for line in self.lines[first : heading + 1]]
+        return title_above(self.lines[at].text, number, headers[::-1])
 
     def unit(self, at: int, number: Number) -> UnitText:
         """The unit that is printed with a number."""

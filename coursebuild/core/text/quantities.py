@@ -284,8 +284,8 @@ def name_of_header(text: str) -> tuple[str, int]:
     at = max((match.start() for match in re.finditer(pattern, whole)), default=whole.rfind(unit))
     if not unit or at <= 0:
         return text, at if unit else -1
-    behind = text[at + len(unit) :].lstrip(")] ")
-    return " ".join(filter(None, (_BEFORE_UNIT.sub("", text[:at]), behind))), at
+    words_behind = text[at + len(unit) :].lstrip(")] ")
+    return " ".join(filter(None, (_BEFORE_UNIT.sub("", text[:at]), words_behind))), at
 
 
 def unit_of_label(before: str) -> UnitText:
