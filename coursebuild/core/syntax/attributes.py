@@ -45,7 +45,8 @@ _MISQUOTED = regex(
 )
 _SPACES = regex(r"\s+")
 _NUMBER = regex(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
-_RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?!\d)((?s:.*))\Z")
+_RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?![,\d])((?s:.*))\Z")
+_WITH_COMMA = regex(_RESULT.pattern.replace(r"\.", ","))
 """A formula that ends with a number, and what stands behind it."""
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
@@ -122,11 +123,12 @@ def read_term(braces: Excerpt, report: Callable[[Diagnostic], None]) -> str | No
 
 
 def read_meaning(
-    braces: Excerpt, tex: Excerpt, report: Callable[[Diagnostic], None]
+    braces: Excerpt, tex: Excerpt, report: Callable[[Diagnostic], None], *, comma: bool = False
 ) -> tuple[Meaning | None, str | None, NumberBinding | None]:
     """The meaning of a symbol, the source of given numbers, and its value, if they are there.
 
-    `out` alone is of the value that stands in the formula.
+    `out` alone is of the value that stands in the formula, with a comma before its decimals where
+    the language of the text has one.
     """
     keys = ("symbol", "unit", "value", "given", "out")
     values = read_pairs(braces, keys, "symbol-attribute", _SYMBOL_HELP)
@@ -135,12 +137,14 @@ def read_meaning(
         return None, None, None
     source = value_text(values["given"]) if "given" in values else None
     value, number, unit = values.get("value"), None, value_text(values.get("unit"))
-    result = _RESULT.match(tex.text) if "out" in values and value is None else None
+    result = None
+    if "out" in values and value is None:
+        result = _RESULT.match(tex.text) or (_WITH_COMMA.match(tex.text) if comma else None)
     if result is not None and (not result[2].strip() or read_unit(result[2])):
         number_text = tex.slice(*result.span(1))
         if number_text.span().text == number_text.text:  # else it stands in a macro
             value, unit = number_text, plain_unit(result[2]) or unit
-    is_number = value is not None and _NUMBER.fullmatch(value.text) is not None
+    is_number = value is not None and (result or _NUMBER.fullmatch(value.text)) is not None
     if value is not None and is_number and not {"out", "given"} <= {*values}:
         printed = values.get("out")
         origin_text = value_text(printed)
@@ -148,7 +152,7 @@ def read_meaning(
         script, words = (None, origin_text) if is_quoted else (origin_text or None, "")
         origin = None if "out" in values else source or ""
         number = NumberBinding(
-            braces.span(), value.text, value.span(), script, origin, unit, words=words
+            braces.span(), value.text, value.span(), script, origin, unit, comma, words
         )
     elif value is not None or "out" in values:
         text = "" if value is None else value.text

@@ -294,7 +294,9 @@ class _TokenReader:
             return model.Math(span, tex, display)
         braces, report = self.content.slice(*token.meta["braces"]), self.report
         if not display:
-            return model.Math(span, tex, display, None, *read_meaning(braces, tex, report))
+            comma = self.state.has_decimal_comma
+            meaning = read_meaning(braces, tex, report, comma=comma)
+            return model.Math(span, tex, display, None, *meaning)
         label = self.state.take_label(braces, "eq")
         return model.Math(span, tex, display, label)
 
