@@ -126,7 +126,8 @@ def test_no_page_names_anything_to_fetch_elsewhere(sites: Mapping[str, Site], na
 
 LAB_IS_THERE = """n => {
   const lab = document.querySelectorAll('main [data-lab][data-config]')[n]
-  return lab.querySelector('.lab-live') !== null
+  const plays = lab.querySelector('.lab-transport') !== null
+  return lab.querySelector('.lab-live') !== null && (!plays || lab.dataset.state !== undefined)
 }"""
 LAB_HAS_STARTED = """n => {
   const lab = document.querySelectorAll('main [data-lab][data-config]')[n]
