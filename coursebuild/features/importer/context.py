@@ -207,7 +207,12 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
-        return self.path.endswith((".qmd", ".Rmd")) or bool(self.files.mkdocs)
+        return self.is_pandoc or bool(self.files.mkdocs)
+
+    @property
+    def is_pandoc(self) -> bool:
+        """Whether Pandoc reads it."""
+        return self.path.endswith((".qmd", ".Rmd"))
 
     def resolve_picture(self, source: str) -> str:
         """Return the new address of a picture or file; empty where none here has it."""

@@ -36,12 +36,8 @@ _PART = regex(
     rf"{_ATTRIBUTES}>",
     re.MULTILINE | re.DOTALL,
 )
-_INDENT = regex(
-    r"(?P<kept>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`)|</?[A-Z][^<>]*>)"
-    r"|(?<=\n\n)[ ]{4,}(?![ ]*[-*+`\d])",
-    re.DOTALL,
-)
-"""The indentation of what a component holds; code and tags are passed over."""
+COMPONENT = regex(r"[ \t]*<(?P<end>/?)(?P<name>[A-Z][\w.]*)(?:\s[^<>]*)?(?<!/)>[ \t]*")
+"""A line of nothing but where a component begins or ends."""
 _WORDS = regex(
     rf"<(?P<name>[A-Z]\w*){_ATTRIBUTES}>"
     r"\s*(?P<words>[^\s<>{}](?:[^<>{}\n]|\n(?!\n))*?)\s*</(?P=name)>"
@@ -50,7 +46,7 @@ _WORDS = regex(
 _COMPUTED = regex(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
 _LABELS = [
     regex(rf"\s(?:{names})=(?:\"([^\"]*)\"|'([^']*)')")
-    for names in ("label|title|caption|heading", "value|alt", "href|to|link")
+    for names in ("label|title|caption|heading|children", "value|alt", "href|to|link")
 ]
 _SENTENCE = regex(
     r"\s(?!class|style)\w+=([\"'])(?=[^\W\d_a-z])"
@@ -73,9 +69,32 @@ _ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.defau
 """The address of a picture where it is computed."""
 
 
+def dedent_components(text: str) -> str:
+    """Return a text in which what components hold stands no further right than their tags.
+
+    Indentation makes no code in MDX.
+    """
+    lines, holders, fence = list[str](), [("", 0)], ""
+    opening: tuple[str, int] | None = None
+    for line in text.split("\n"):
+        words = line.lstrip(" \t")
+        margin = len(line) - len(words)
+        tag = None if fence else COMPONENT.fullmatch(line)
+        if opening and words:
+            holders.append((opening[0], holders[-1][1] + max(margin - opening[1], 0)))
+            opening = None
+        if tag and tag["end"] and tag["name"] == holders[-1][0]:
+            holders.pop()
+        lines.append(line[min(margin, holders[-1][1]) :])
+        if edge := re.match("`{3,}|~{3,}", words):
+            fence = fence * (not words.startswith(fence)) if fence else edge[0]
+        elif tag and not tag["end"]:
+            opening = tag["name"], margin
+    return "\n".join(lines)
+
+
 def without_jsx(text: str, context: LessonContext) -> str:
     """Return prose without JavaScript."""
-    text = _INDENT.sub(lambda match: match["kept"] or "", text)
     text = _WORDS.sub(_write_linked_words, text)
     return _PART.sub(lambda part: _convert_part(part, context), text)
 
