@@ -71,7 +71,7 @@ _WITH_LABELS = frozenset(
 )
 """What bears its label itself."""
 _FRAMES = frozenset(
-    "div compound acks container grid grid-item tab-set tab-set-code "
+    "div compound acks container grid grid-item tabs tab-set tab-set-code "
     "card-carousel centered hlist rst-class table-of".split()
 )
 """What only places what it holds."""
@@ -166,7 +166,7 @@ def _write(directive: Directive, context: LessonContext) -> str:
             return convert_role(name, argument.strip().removeprefix("#"), context)
         case "rubric" | "centered":
             return f"**{rewrite_prose(argument, context)}**\n\n{directive.nested(text)}"
-        case "tab-item" | "tabbed" | "grid-item-card" | "card":
+        case "tab" | "tab-item" | "tabbed" | "grid-item-card" | "card":
             return _write_card(directive, context)
         case "iframe" | "youtube" | "video" | "button-link" | "button-ref":
             address = argument.strip()
@@ -284,7 +284,7 @@ def _write_card(directive: Directive, context: LessonContext) -> str:
         address = address or context.resolve_link(f"{link}.md" if is_text else link)
         if "](" not in title:
             title = write_link(title or words_of_link(address, link), address)
-    inside = (directive.nested(part).strip() for part in parts)
+    inside = (directive.nested(part).strip("\n") for part in parts)
     return "\n\n".join(part for part in (f"**{title}**" if title else "", *inside) if part)
 
 

@@ -166,9 +166,11 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
     if name[0].isupper():
         words = "" if part["end"] else write_component(name, attributes, context)
         before, after = part.string[: part.start()], part.string[part.end() :]
+        if before.endswith(">") and after.startswith("</a>"):  # an icon that is a link
+            words = words or find_group(r"\sicon=[\"']([^\"']+)", attributes)
         is_first = not before.rpartition("\n")[2].strip()
-        gap = "\n\n" if words and is_first and after[:1] not in ("\n", "") else ""
-        return words + gap
+        lines = len(after) - len(after.lstrip("\n"))
+        return words + "\n" * (2 - lines if words and is_first and after[lines:] else 0)
 
     def write_attribute(computed: re.Match[str]) -> str:
         address = _ADDRESS.search(computed[0])

@@ -130,7 +130,6 @@ _COMMENT_AS_HEADING = regex(
     r"^(#{1,6}[ \t]+)?<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$(?(1)|(?=\n+:[ \t]))", re.MULTILINE
 )
 """Or as a term whose meaning is below it."""
-_HELD_COMMENT = regex(r"^((?:[^`\n]|`[^`\n]*`)*?)[ ]\((<!--(?:(?!-->)[^\n])*-->)\)", re.MULTILINE)
 _CONTENTS = regex(
     r'<div class="toc">.*?</div>|^(?:\[TOC\]|\[\[_?TOC_?\]\])[ \t]*$', re.DOTALL | re.M
 )
@@ -254,7 +253,6 @@ _BLOCKS: Rules = (
     (_QUOTED_TITLE, r"\g<0>#", "heading in a quotation", "a level lower"),
     (_COMMENT_AS_HEADING, r"\1`\2`", "comment", "words of a heading or term that has no others"),
     (_COMMENT, _write_comment, "comment of MyST", "a comment of HTML"),
-    (_HELD_COMMENT, r"\1\2", "comment", "without the parentheses that hold nothing else"),
 )
 """What is changed before the lines of a text are read, and how the account calls it."""
 

@@ -39,7 +39,7 @@ _OVER_LINES = regex(
     r"(?=[ \t]*(?:$|[\"'(]))"
     r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
     r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
-    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)",
+    r"|(?<!\\)\\{1,2}[(\[](?=[^\n]*\n)(?>(?:(?!\\{1,2}[()\[\]]|\n[ \t]*\n)[\s\S])+)\\{1,2}[)\]]",
     re.MULTILINE,
 )
 """Code, a role, a note, a citation, an address or a formula that goes on in the next line."""
@@ -217,9 +217,6 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     A statement shows nothing itself, and of a call of a macro its texts are shown.
     """
     title = find_group(r"(?:title|caption)=\"([^\"]*)\"", whole)
-    number = find_group(r"\A\{\{eqref:[ ]*([^{}\s]+)[ ]*\}\}\Z", whole)
-    if number and (address := context.resolve_formula(number)):
-        return write_link("", address)
     name, *arguments = whole.strip("{}<> %").split() or [""]
     address = "".join(arguments[:1])
     if name in ("tab", "code") and title:
