@@ -7,6 +7,7 @@ is shown, and so is its label. An attribute whose value is computed has none her
 from __future__ import annotations
 
 import re
+from textwrap import shorten
 
 from coursebuild.api import marks, regex
 from coursebuild.features.importer.context import LessonContext
@@ -155,7 +156,7 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
         return part[0]
     if name is None:
         if part["statement"]:
-            message = f"`{part[0].strip().splitlines()[0]}`, which is JavaScript"
+            message = f"`{shorten(part[0], 300, placeholder='…')}`, which is JavaScript"
             context.leave("statement of JavaScript", message)
         if expression := part["expression"]:
             message = f"`{expression}`, whose value its tool shows; it is code now"
