@@ -171,6 +171,8 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
             words = words or find_group(r"\sicon=[\"']([^\"']+)", attributes)
         is_first = not before.rpartition("\n")[2].strip()
         lines = len(after) - len(after.lstrip("\n"))
+        if words and is_first and re.search(r">[ \t]*\n[ \t]*\Z", before):
+            words = f"\n\n{words}"  # else it were HTML, too
         return words + "\n" * (2 - lines if words and is_first and after[lines:] else 0)
 
     def write_attribute(computed: re.Match[str]) -> str:
