@@ -12,6 +12,7 @@ from coursebuild.features.importer.context import (
     to_anchor,
 )
 from coursebuild.features.importer.displays import LABEL, normalize_formulas
+from coursebuild.features.importer.source_files import Segment
 
 TARGET = regex(
     r"^(?P<lead>[ \t>]*(?:[-*+][ \t]+|\d+[.)][ \t]+)?)"
@@ -23,8 +24,10 @@ TARGET = regex(
 """An anchor of MyST, of `mkdocstrings`, or of a rule in the reference of Rust."""
 FIGURE = regex(
     r"(?:(?<=\n\n)|(?<=\A\n)|\A)!\[(?P<alt>[^\]\n]+)\]\((?P<source>[^()\s]+)\)"
-    r"\{#fig-(?P<label>[\w-]+)(?:[^{}\n]*?fig-alt=\"(?P<alternative>[^\"\n]*)\")?[^{}\n]*\}(?=\n|\Z)"
+    r"(?:\{#fig-(?P<label>[\w-]+)(?:[^{}\n]*?fig-alt=\"(?P<alternative>[^\"\n]*)\")?[^{}\n]*\}(?=\n|\Z)"
+    r"|(?=\n\n|\n?\Z))"
 )
+"""A picture in a paragraph of its own; Pandoc shows its words below it."""
 
 
 _LABELLED = regex(
@@ -52,8 +55,10 @@ _PLACES = (
 """What sets an anchor, by what stands before its name here."""
 
 
-def find_anchors(text: str) -> set[str]:
-    """Return the anchors that a text of any dialect sets, `eq:name` of formulas among them."""
+def find_anchors(segment: Segment) -> set[str]:
+    """Return the anchors that a part of a text sets, `eq:name` of formulas among them."""
+    is_code = segment.kind == "block" and segment.mark[0] in "`~" and segment.head[:1] != "{"
+    text = segment.head + f"\n{segment.text}" * (not is_code)
     anchors = {
         f"{prefix}{to_anchor(place['name'])}"
         for prefix, pattern in _PLACES
@@ -72,7 +77,7 @@ def find_anchors(text: str) -> set[str]:
 
 
 def write_figure(match: re.Match[str]) -> str:
-    """Return a labelled picture in a paragraph of its own, as Quarto has it, with its caption."""
+    """Return a picture in a paragraph of its own with its caption."""
     alt = match["alternative"] or match["alt"]
     return figure_of(match["source"], match["alt"], match["label"], alt)
 

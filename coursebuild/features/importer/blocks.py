@@ -33,7 +33,7 @@ from coursebuild.features.lab.model import BUILT_IN_KINDS
 _MAX_DEPTH = 20
 """Blocks that may be around another."""
 _DIRECTIVE = regex(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
-_TITLE = regex(r"\b(?:title|tab|filename|lst-cap|name)=(?:\"([^\"]*)\"|'([^']*)')")
+_TITLE = regex(r"\b(?:title|tab|filename|lst-cap|name)(?:=|:[ ])(?:\"([^\"]*)\"|'([^']*)')")
 _TAB = "tab", "a title in bold, and what it holds: pages show one tab below the other"
 _CAMERA = regex(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = regex(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
@@ -70,7 +70,7 @@ def _convert(segment: Segment, context: LessonContext) -> str:
     if segment.kind == "cell":
         return write_cell(segment, context)
     directive = _DIRECTIVE.fullmatch(segment.head)
-    if directive is not None and not context.path.endswith((".qmd", ".Rmd")):
+    if directive is not None and not context.is_pandoc:
         new = _convert_directive(directive["name"], directive["argument"], text, context)
         return "\n\n".join((new, *write_outputs(segment, context)))
     match segment.mark[0]:

@@ -171,7 +171,11 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         own_route = path.removeprefix("docs/")
         has_order = without_order(parts.path) != parts.path  # of another text, if no file has it
         bare = stem if has_order else without_order(stem)
-        names = (stem, path, f"{folder}/index", f"{folder}/README", own_route, bare)
+        names = [stem, path, f"{folder}/index", f"{folder}/README", own_route, bare]
+        if self.files.mkdocs:  # from the address of its own page, which is a folder
+            page = stem_of(self.path).removesuffix("/index")
+            below = posixpath.normpath(posixpath.join(page, parts.path))
+            names += [below, f"{below}/index"]
         target = next(filter(None, map(self.targets.get, names)), None)
         if target is None and address.startswith("/"):  # the folder of a site's texts is no route
             ends = (f"/{bare}", f"/{bare}/index")
@@ -207,7 +211,12 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     @property
     def has_marks(self) -> bool:
         """Whether its tool reads `~` and `^` as what lowers and raises, and commands of LaTeX."""
-        return self.path.endswith((".qmd", ".Rmd")) or bool(self.files.mkdocs)
+        return self.is_pandoc or bool(self.files.mkdocs)
+
+    @property
+    def is_pandoc(self) -> bool:
+        """Whether Pandoc reads it."""
+        return self.path.endswith((".qmd", ".Rmd"))
 
     def resolve_picture(self, source: str) -> str:
         """Return the new address of a picture or file; empty where none here has it."""

@@ -328,7 +328,7 @@ def _convert_texts(
             anchor: text.link
             for text in reversed(texts)
             for segment in text.segments
-            for anchor in find_anchors(f"{segment.head}\n{segment.text}")
+            for anchor in find_anchors(segment)
         }
         | {to_anchor(text.label): text.link for text in texts if text.label},
         files=files,

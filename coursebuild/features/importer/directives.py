@@ -16,10 +16,11 @@ from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.context import NUMBERED, LessonContext, label_anchor, to_anchor
 from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
+from coursebuild.features.importer.outlines import read_tree
 from coursebuild.features.importer.prose import rewrite_prose
 from coursebuild.features.importer.roles import CODE_ROLES, convert_role, words_of_link, write_link
 from coursebuild.features.importer.rst import read_rst
-from coursebuild.features.importer.source_files import TOO_MUCH, find_group
+from coursebuild.features.importer.source_files import TOO_MUCH, find_group, stem_of
 
 CALLOUTS = {
     **{name: name for name in model.CALLOUTS},
@@ -70,7 +71,7 @@ _WITH_LABELS = frozenset(
 )
 """What bears its label itself."""
 _FRAMES = frozenset(
-    "div compound acks container grid grid-item tab-set tab-set-code "
+    "div compound acks container grid grid-item tabs tab-set tab-set-code "
     "card-carousel centered hlist rst-class table-of".split()
 )
 """What only places what it holds."""
@@ -140,7 +141,7 @@ def _write(directive: Directive, context: LessonContext) -> str:
         case "list-table" | "csv-table" | "table":
             return _write_table(directive, context)
         case "glossary":
-            return _write_glossary(text, context)
+            return _write_glossary(directive)
         case "raw" if argument.strip() == "html":
             return rewrite_prose(text, context)
         case (
@@ -165,13 +166,13 @@ def _write(directive: Directive, context: LessonContext) -> str:
             return convert_role(name, argument.strip().removeprefix("#"), context)
         case "rubric" | "centered":
             return f"**{rewrite_prose(argument, context)}**\n\n{directive.nested(text)}"
-        case "tab-item" | "tabbed" | "grid-item-card" | "card":
+        case "tab" | "tab-item" | "tabbed" | "grid-item-card" | "card":
             return _write_card(directive, context)
         case "iframe" | "youtube" | "video" | "button-link" | "button-ref":
             address = argument.strip()
-            words = " ".join(text.split()) or address
             if name == "youtube":
                 address = f"https://www.youtube.com/watch?v={address}"
+            words = " ".join(text.split()) or address
             return rewrite_prose(f"[{words}]({address})", context)
         case "epigraph" | "pull-quote" | "blockquote" | "highlights":
             return marks.block_quote(directive.nested(text))
@@ -179,6 +180,8 @@ def _write(directive: Directive, context: LessonContext) -> str:
             return "\n\n".join(
                 (*(f"`{line}`" for line in argument.splitlines()), directive.nested(text))
             )
+        case "toctree" if "hidden" not in options:
+            return _write_list(directive, context)
         case _ if name in _MAPS:
             return ""
         case "eval-rst":
@@ -281,8 +284,18 @@ def _write_card(directive: Directive, context: LessonContext) -> str:
         address = address or context.resolve_link(f"{link}.md" if is_text else link)
         if "](" not in title:
             title = write_link(title or words_of_link(address, link), address)
-    inside = (directive.nested(part).strip() for part in parts)
+    inside = (directive.nested(part).strip("\n") for part in parts)
     return "\n\n".join(part for part in (f"**{title}**" if title else "", *inside) if part)
+
+
+def _write_list(directive: Directive, context: LessonContext) -> str:
+    """Return the texts of a part of the course as a list of links."""
+    caption = directive.options.get("caption", "").strip("\"'")
+    lines = [f"**{caption}**\n"] if caption else []
+    for _, title, target, paths in read_tree(directive.text, context.path, context.files):
+        lines += (f"- {write_link(title, context.targets.get(stem_of(p), ''))}" for p in paths)
+        lines += [f"- [{title}]({target})"] if "://" in target else []
+    return "\n".join(lines)
 
 
 def _write_table(directive: Directive, context: LessonContext) -> str:
@@ -314,22 +327,21 @@ def _cell(text: str, context: LessonContext) -> str:
     return rewrite_prose(" ".join(text.split()), context).replace("|", "\\|")
 
 
-def _write_glossary(text: str, context: LessonContext) -> str:
+def _write_glossary(directive: Directive) -> str:
     """Return the entries of a glossary as paragraphs that mark their terms.
 
     A meaning stands further right than its terms, or, as MyST has it, behind a colon.
     """
-    text = re.sub(r"\n(?:[ \t]*\n)*:[ \t]+((?:.+\n?)+)", _indent_meaning, text)
+    text = re.sub(r"\n(?:[ \t]*\n)*:[ \t]+((?:.+\n?)+)", _indent_meaning, directive.text)
     out, terms, marked_terms = [], list[str](), set[str]()
     for entry in re.split(r"\n(?=\S)", text.strip("\n")):
         term, _, meaning = entry.partition("\n")
         if entry.startswith("[^"):  # a footnote
-            out.append(rewrite_prose(entry.strip(), context))
+            out.append(directive.nested(entry).strip())
             continue
         terms.append(_mark_term(term.strip(), marked_terms))
         if meaning.strip():
-            words = rewrite_prose(" ".join(textwrap.dedent(meaning).split()), context)
-            out.append(f"{', '.join(terms)}: {words}")
+            out.append(f"{', '.join(terms)}: {directive.nested(textwrap.dedent(meaning)).strip()}")
             terms = []
     return "\n\n".join(out)
 

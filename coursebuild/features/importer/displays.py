@@ -42,8 +42,7 @@ _ESCAPED = regex(
     re.DOTALL,
 )
 """A formula whose brackets have two backslashes, one of which is Markdown's; or code."""
-LABEL = regex(r"(?:\\label|\{\{numeq\}\})\{([^{}]*)\}")
-"""A label of LaTeX, or of mdBook's preprocessor `numeq`."""
+LABEL = regex(r"\\label\{([^{}]*)\}")
 _EMPTY = regex(r"[ \t]*\n?[ \t]*")
 _MARGIN = regex(r"[ \t]*>[ \t>]*|[ \t]+\Z")
 """The mark of a quotation, or what a line of a list begins with."""

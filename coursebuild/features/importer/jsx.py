@@ -7,6 +7,7 @@ is shown, and so is its label. An attribute whose value is computed has none her
 from __future__ import annotations
 
 import re
+from textwrap import shorten
 
 from coursebuild.api import marks, regex
 from coursebuild.features.importer.context import LessonContext
@@ -36,12 +37,8 @@ _PART = regex(
     rf"{_ATTRIBUTES}>",
     re.MULTILINE | re.DOTALL,
 )
-_INDENT = regex(
-    r"(?P<kept>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`)|</?[A-Z][^<>]*>)"
-    r"|(?<=\n\n)[ ]{4,}(?![ ]*[-*+`\d])",
-    re.DOTALL,
-)
-"""The indentation of what a component holds; code and tags are passed over."""
+COMPONENT = regex(r"[ \t]*<(?P<end>/?)(?P<name>[A-Z][\w.]*)(?:\s[^<>]*)?(?<!/)>[ \t]*")
+"""A line of nothing but where a component begins or ends."""
 _WORDS = regex(
     rf"<(?P<name>[A-Z]\w*){_ATTRIBUTES}>"
     r"\s*(?P<words>[^\s<>{}](?:[^<>{}\n]|\n(?!\n))*?)\s*</(?P=name)>"
@@ -50,7 +47,7 @@ _WORDS = regex(
 _COMPUTED = regex(rf"\s+[\w-]+=(?:\{{(?P<number>\d+)\}}|{_BRACES})")
 _LABELS = [
     regex(rf"\s(?:{names})=(?:\"([^\"]*)\"|'([^']*)')")
-    for names in ("label|title|caption|heading", "value|alt", "href|to|link")
+    for names in ("label|title|caption|heading|children", "value|alt", "href|to|link")
 ]
 _SENTENCE = regex(
     r"\s(?!class|style)\w+=([\"'])(?=[^\W\d_a-z])"
@@ -73,9 +70,32 @@ _ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.defau
 """The address of a picture where it is computed."""
 
 
+def dedent_components(text: str) -> str:
+    """Return a text in which what components hold stands no further right than their tags.
+
+    Indentation makes no code in MDX.
+    """
+    lines, holders, fence = list[str](), [("", 0)], ""
+    opening: tuple[str, int] | None = None
+    for line in text.split("\n"):
+        words = line.lstrip(" \t")
+        margin = len(line) - len(words)
+        tag = None if fence else COMPONENT.fullmatch(line)
+        if opening and words:
+            holders.append((opening[0], holders[-1][1] + max(margin - opening[1], 0)))
+            opening = None
+        if tag and tag["end"] and tag["name"] == holders[-1][0]:
+            holders.pop()
+        lines.append(line[min(margin, holders[-1][1]) :])
+        if edge := re.match("`{3,}|~{3,}", words):
+            fence = fence * (not words.startswith(fence)) if fence else edge[0]
+        elif tag and not tag["end"]:
+            opening = tag["name"], margin
+    return "\n".join(lines)
+
+
 def without_jsx(text: str, context: LessonContext) -> str:
     """Return prose without JavaScript."""
-    text = _INDENT.sub(lambda match: match["kept"] or "", text)
     text = _WORDS.sub(_write_linked_words, text)
     return _PART.sub(lambda part: _convert_part(part, context), text)
 
@@ -136,7 +156,7 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
         return part[0]
     if name is None:
         if part["statement"]:
-            message = f"`{part[0].strip().splitlines()[0]}`, which is JavaScript"
+            message = f"`{shorten(part[0], 300, placeholder='…')}`, which is JavaScript"
             context.leave("statement of JavaScript", message)
         if expression := part["expression"]:
             message = f"`{expression}`, whose value its tool shows; it is code now"
@@ -147,9 +167,13 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
     if name[0].isupper():
         words = "" if part["end"] else write_component(name, attributes, context)
         before, after = part.string[: part.start()], part.string[part.end() :]
+        if before.endswith(">") and after.startswith("</a>"):  # an icon that is a link
+            words = words or find_group(r"\sicon=[\"']([^\"']+)", attributes)
         is_first = not before.rpartition("\n")[2].strip()
-        gap = "\n\n" if words and is_first and after[:1] not in ("\n", "") else ""
-        return words + gap
+        lines = len(after) - len(after.lstrip("\n"))
+        if words and is_first and re.search(r">[ \t]*\n[ \t]*\Z", before):
+            words = f"\n\n{words}"  # else it were HTML, too
+        return words + "\n" * (2 - lines if words and is_first and after[lines:] else 0)
 
     def write_attribute(computed: re.Match[str]) -> str:
         address = _ADDRESS.search(computed[0])

@@ -194,28 +194,35 @@ def _read_toctrees(
     path: str, files: SourceFiles, paths: set[str]
 ) -> Iterator[ImportedText | ImportedLevel]:
     """Yield what the trees of a text name, each with what its own trees name; each text once."""
-    folder = posixpath.dirname(path)
     for tree in _TOCTREE.finditer(files.read_text(path)):
         parts: list[ImportedText | ImportedLevel] = []
-        for line in re.sub(r"(?s)\A---\n.*?\n---\n", "", tree["body"]).split("\n"):
-            entry = re.fullmatch(
-                r"(?:(?P<title>.*\S)\s+<(?P<target>[^<>]+)>|(?P<name>\S.*))", line.strip()
-            )
-            if entry is None or line.lstrip().startswith((":", "#")):
-                continue
-            name = (entry["target"] or entry["name"]).lstrip("/")
-            pattern = posixpath.normpath(posixpath.join(folder, name))
-            names = [f for f in files if f.endswith(TEXTS) and fnmatchcase(stem_of(f), pattern)]
-            file = find_text(pattern, files)
-            if not (file or names) and name != "self":
-                leave_entry(path, line.strip(), files)
-            for child in [file] if file else names:
+        for line, title, target, children in read_tree(tree["body"], path, files):
+            if not children and target != "self":
+                leave_entry(path, line, files)
+            for child in children:
                 if child not in paths:
                     paths.add(child)
-                    parts.append(ImportedText(file=child, title=entry["title"] or ""))
+                    parts.append(ImportedText(file=child, title=title))
                     parts += _read_toctrees(child, files, paths)
         caption = find_group(_CAPTION, tree["body"])
         yield from make_level(caption, parts, path, files) if caption else parts
+
+
+def read_tree(
+    tree: str, path: str, files: SourceFiles
+) -> Iterator[tuple[str, str, str, Sequence[str]]]:
+    """Yield the lines of a tree with their titles, what they name, and the texts that this is."""
+    for line in re.sub(r"(?s)\A---\n.*?\n---\n", "", tree).split("\n"):
+        entry = re.fullmatch(
+            r"(?:(?P<title>.*\S)\s+<(?P<target>[^<>]+)>|(?P<name>\S.*))", line.strip()
+        )
+        if entry is None or line.lstrip().startswith((":", "#")):
+            continue
+        target = entry["target"] or entry["name"]
+        pattern = posixpath.normpath(posixpath.join(posixpath.dirname(path), target.lstrip("/")))
+        names = [f for f in files if f.endswith(TEXTS) and fnmatchcase(stem_of(f), pattern)]
+        file = find_text(pattern, files)
+        yield line.strip(), entry["title"] or "", target, [file] if file else names
 
 
 # --- Docusaurus

@@ -108,14 +108,17 @@ _FIELDS = regex(
 )
 """A paragraph of lines such as `:name: words`, a list of fields in Sphinx."""
 _ABBREVIATION = regex(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
-_EDGE = regex(r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(`{3,}|~{3,}|<!--(?!.*-->)|\$\$(?!.*\$\$))")
-"""The first or last line of code in a quotation or a list, or the first of a comment or formula."""
+_EDGE = regex(
+    r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?"
+    r"(`{3,}|~{3,}|<!--(?!.*-->)|<pre\b(?!.*</pre>)|\$\$(?!.*\$\$))"
+)
+"""The first or last line of code in a quotation or a list, or the first of what `_ENDS` has."""
 _PICTURE_LINE = regex(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)
 """A picture of HTML above words, which would be HTML as well."""
 _HOLDER = regex(r"[ \t]*<\w+\b[^<>]*\smarkdown(?:=.?(?:1|block).?)?(?:\s[^<>]*)?>[ \t]*")
 """A tag of HTML around Markdown, which would be HTML without a blank line."""
 _EMPTY_HEADING = regex(r"[ ]{0,3}#{1,6}[ \t]*$")
-_ENDS = {"<!--": "-->", "$$": "$$"}
+_ENDS = {"<!--": "-->", "<pre": "</pre>", "$$": "$$"}
 _COMMENT = regex(
     r"%%(?P<inner>[^%\n]+)%%|^%%[ \t]*\n(?P<lines>(?:(?!%%)[^\n]*\n)+)%%[ \t]*$"
     r"|^(?:%(?!%)(?P<line>[^\n]*)|\+\+\+(?:[ \t]+(?P<data>[{\[][^\n]*))?[ \t]*)$",
@@ -127,7 +130,6 @@ _COMMENT_AS_HEADING = regex(
     r"^(#{1,6}[ \t]+)?<!--[ \t]*([^\n`]+?)[ \t]*-->[ \t]*$(?(1)|(?=\n+:[ \t]))", re.MULTILINE
 )
 """Or as a term whose meaning is below it."""
-_HELD_COMMENT = regex(r"^((?:[^`\n]|`[^`\n]*`)*?)[ ]\((<!--(?:(?!-->)[^\n])*-->)\)", re.MULTILINE)
 _CONTENTS = regex(
     r'<div class="toc">.*?</div>|^(?:\[TOC\]|\[\[_?TOC_?\]\])[ \t]*$', re.DOTALL | re.M
 )
@@ -193,7 +195,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     text, count = rewrite_tables(text, leave_grid)
     change = "its rows between bars, a cell in one line; or a verse in lines that end"
     context.change("table or verse of Pandoc", change, count)
-    if context.path.endswith((".qmd", ".Rmd")):
+    if context.is_pandoc:
         text = _SETTINGS.sub("", text)
     for pattern, kind in _KEPT.items():
         account.taken[kind] += len(pattern.findall(text))
@@ -235,7 +237,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         context.line_below(line).leave("table", message)
 
     text = "\n".join(cut_rows(out, leave_cells))
-    return FIGURE.sub(write_figure, _PICTURE_LINE.sub(r"\g<0>\n", text))
+    text = _PICTURE_LINE.sub(r"\g<0>\n", text)
+    return FIGURE.sub(write_figure, text) if context.is_pandoc else text
 
 
 def _write_comment(match: re.Match[str]) -> str:
@@ -250,7 +253,6 @@ _BLOCKS: Rules = (
     (_QUOTED_TITLE, r"\g<0>#", "heading in a quotation", "a level lower"),
     (_COMMENT_AS_HEADING, r"\1`\2`", "comment", "words of a heading or term that has no others"),
     (_COMMENT, _write_comment, "comment of MyST", "a comment of HTML"),
-    (_HELD_COMMENT, r"\1\2", "comment", "without the parentheses that hold nothing else"),
 )
 """What is changed before the lines of a text are read, and how the account calls it."""
 
@@ -337,7 +339,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return f"${match['inner'].strip()}$"
         case "square":
             return f"$${match['shown_tex'].strip()}$$"
-        case "note":
+        case "note" if not context.files.mkdocs:
             return context.add_note(_rewrite_line(match["remark"], context))
         case "math":
             formula = whole.replace("&lt;", "<").replace("&gt;", ">")  # as some notebooks hold it

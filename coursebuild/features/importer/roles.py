@@ -39,7 +39,8 @@ _OVER_LINES = regex(
     r"(?=[ \t]*(?:$|[\"'(]))"
     r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
     r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
-    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)",
+    r"|(?<!\\)\\{1,2}\((?=[^\n]*\n)(?>(?:(?!\\{1,2}[()]|\n[ \t]*\n)[\s\S])+)\\{1,2}\)"
+    r"|(?<!\\)\\{2}\[(?=[^\n]*\n)(?>(?:(?!\\{2}[\[\]]|\n[ \t]*\n)[\s\S])+)\\{2}\]",
     re.MULTILINE,
 )
 """Code, a role, a note, a citation, an address or a formula that goes on in the next line."""
@@ -98,6 +99,8 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             if not address:
                 message = f"a link to `{target}`, which no text sets"
                 context.leave(f"role `{{{name}}}`", message)
+                if name == "any":  # what is left is the name of an object
+                    return convert_role("obj", body, context)
             if ":" in address.rpartition("#")[2]:  # what has a number is called by it
                 words, mark, rest = words.partition("%s")
                 return write_link("" if mark else words, address) + rest
@@ -128,7 +131,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case _ if name.rpartition(":")[2] in CODE_ROLES:
             name_of_part = re.sub(r"^(?:!|~(?:.*\.)?)", "", target)  # as Sphinx shows it
             return f"`{words or name_of_part}`"
-        case _ if name in _WORD_ROLES:
+        case _ if name in _WORD_ROLES or name.startswith("bdg"):  # a badge
             return words or body
         case _ if _ICON_ROLE.fullmatch(name):
             return ""
@@ -215,9 +218,6 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
     A statement shows nothing itself, and of a call of a macro its texts are shown.
     """
     title = find_group(r"(?:title|caption)=\"([^\"]*)\"", whole)
-    number = find_group(r"\A\{\{eqref:[ ]*([^{}\s]+)[ ]*\}\}\Z", whole)
-    if number and (address := context.resolve_formula(number)):
-        return write_link("", address)
     name, *arguments = whole.strip("{}<> %").split() or [""]
     address = "".join(arguments[:1])
     if name in ("tab", "code") and title:
@@ -254,7 +254,11 @@ def draw_emoji(name: str, context: LessonContext) -> str:
 
 
 def write_icon(icon: re.Match[str]) -> str:
-    """Return the name of an icon that is alone in a cell or link, where it says something."""
+    """Return the sign that an icon is, or its name where it is alone in a cell or link."""
+    for kind in ("sign", "mark"):
+        with contextlib.suppress(KeyError):
+            sign = unicodedata.lookup(f"{icon['sign']} {kind}")
+            return rf"\{sign} " if sign.isascii() else f"{sign} "
     before, after = icon.string[: icon.start()], icon.string[icon.end() :]
     is_alone = re.search(r"[|\[][ \t]*$", before) and re.match(r"[ \t]*[|\]]", after)
     return f"{title_of_file(icon['sign']).lower()} " if is_alone else ""
@@ -311,6 +315,8 @@ def convert_tag(tag: str, context: LessonContext) -> str:
         if re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
             continue
         address = attribute[3].removeprefix("attachment:")
+        if attribute[1].lower() == "srcset":  # the first of several: pages take one size
+            address = address.split(",")[0].split()[0]
         before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
         if new_address := context.resolve_picture(address):
             tag = before + new_address + after

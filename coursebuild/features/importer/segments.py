@@ -20,6 +20,7 @@ from msgspec.structs import replace
 from coursebuild.api import UsageError, regex
 from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.displays import read_macros
+from coursebuild.features.importer.jsx import COMPONENT, dedent_components
 from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
 _MARK = regex(r"(:{3,}|/{3,})[ \t]*(.*?)[ \t]*")
@@ -108,7 +109,8 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
             raise UsageError(f"{name} is not a notebook of format 4") from None
     else:
         metadata, size = read_front_matter(text)
-        segments = list(read_markdown(text[size:], 1 + text.count("\n", 0, size)))
+        content = dedent_components(text[size:])
+        segments = list(read_markdown(content, 1 + text.count("\n", 0, size)))
     segments = _raise_title(segments, title)
     # The first heading of level 1, and the segments without it; from the next on, all go down by 1
     titles: list[str] = []
@@ -342,6 +344,14 @@ def _parse_titled(state: StateBlock, start: int, end: int, silent: bool) -> bool
     return True
 
 
+def _parse_component(state: StateBlock, start: int, end: int, silent: bool) -> bool:
+    """Parse the line of a component's tag, below which Markdown goes on."""
+    is_tag = COMPONENT.fullmatch(_line_at(state, start)) is not None
+    if is_tag and not silent:
+        state.line = start + 1
+    return is_tag
+
+
 def _line_at(state: StateBlock, number: int) -> str:
     """Return a line without what stands before it for the blocks around; empty for code."""
     is_code = state.sCount[number] - state.blkIndent > 3
@@ -354,8 +364,10 @@ _LEAD = regex(r"[ \t]*(?:(?:[-+*]|\d+[.)])[ \t]+)*")
 """What stands before a block in a list; the mark of its item, where this begins with it."""
 _BLOCKS = ("fence", "marked", "titled")
 _PARSER = MarkdownIt("commonmark").use(footnote_plugin).disable("footnote_tail")  # in its order
-for _name, _parse in (("titled", _parse_titled), ("marked", _parse_marked)):
-    _PARSER.block.ruler.before("fence", _name, _parse, {"alt": ["paragraph", "list", "blockquote"]})
+for _parse in (_parse_titled, _parse_marked, _parse_component):
+    _PARSER.block.ruler.before(
+        "fence", _parse.__name__, _parse, {"alt": ["paragraph", "list", "blockquote"]}
+    )
 
 
 # --- notebooks
