@@ -265,6 +265,8 @@ def loop_note(model: Any, pilot: Pilot, reference: EngineStates) -> str:
             if math.isinf(largest)
             else f"up to a delay of {delay}"
             if largest
+            else "at no delay, not even its own"
+            if is_off(0.0)
             else f"at no delay longer than {loop.delay:.3g} s"
         )
     span = f"for the {scene.scenario.duration:.3g} s of the scenario"

@@ -86,7 +86,8 @@ def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -
     yield from _orders(report.orders, style)
     for line in report.figures:
         exact = "" if line.exact is None else f", in theory {line.exact:.6g} ({line.source})"
-        yield f"{line.name} under {line.integrator}: {_number(line.measured)} {line.unit}{exact}"
+        value = f"{_number(line.measured) or 'none'} {line.unit}".rstrip()
+        yield f"{line.name} under {line.integrator}: {value}{exact}"
     yield ""
     basis = f"over {seconds_text(report.duration)}, against {report.source}"
     basis += f" (known to {report.floor:.1g}, velocities to {report.velocity_floor:.1g})"
