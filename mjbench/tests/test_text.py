@@ -68,6 +68,7 @@ def test_a_hard_case_has_its_orders_limits_figures_and_runs() -> None:
     near = replace(near, position=(5e-4, 5e-4))
     text = case_text(derive_case(case(errors=(near,))))
     assert "to err by 0.001, a simulated second takes Euler 100 µs\n" in text
+    assert "E Euler\n" in text, "no run is the model's own, or lost"
 
 
 def test_a_page_needs_nothing_else_and_escapes_names() -> None:
