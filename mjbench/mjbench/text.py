@@ -87,7 +87,8 @@ def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -
     figures: dict[tuple[str, str], list[str]] = {}
     for line in report.figures:
         exact = "" if line.exact is None else f", in theory {line.exact:.6g} ({line.source})"
-        value = f"{_number(line.measured) or 'none'} {line.unit}".rstrip()
+        value = f"{_number(line.measured)} {line.unit}".strip()
+        value = "none" if line.measured is None else value
         figures.setdefault((line.name, value + exact), []).append(line.integrator)
     for (figure, words), integrators in figures.items():
         yield from style.wrap(f"{figure} under {', '.join(integrators)}: {words}")

@@ -43,7 +43,7 @@ def test_the_verdict_comes_first_then_the_table_then_the_plot() -> None:
 
 
 def test_a_report_that_is_hard_to_show_and_one_without_anything() -> None:
-    figures = (FigureLine("last", "", "RK4", None, 1.5, "as declared"),)
+    figures = (FigureLine("last", "m", "RK4", None, 1.5, "as declared"),)
     report = derive_charts(derive_scenario(replace(awkward(), figures=figures), lambda _: ()))
     text = scene_text(scene(report, quick=True), Style(100))
     assert "quick: fewer settings" in text and "velocities reached 12 times their bound" in text
