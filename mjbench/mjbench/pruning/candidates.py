@@ -105,6 +105,7 @@ KINDS = {
         "what the scene is about{1} moves in the same way without the {0}", "body", "Body"
     ),
     "contact-idle": FindingKind("contacts are searched for, and nothing touched"),
+    "contact-left": FindingKind("contacts are searched for, and without {} nothing touched"),
     "collision-idle": FindingKind(
         "contacts are searched for on the {}, and nothing touched there", "geom"
     ),
@@ -245,19 +246,15 @@ def is_forceless_tendon(model: Any, ids: Collection[int]) -> bool:
     )
 
 
-def idle_contacts(
-    text: ModelText, runs: Collection[WatchedRun], gone: Collection[int] = ()
-) -> list[Item]:
+def idle_contacts(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
     """Contact as a whole where nothing touched in these runs, else of the geoms that did not.
 
-    Geoms of an explicit pair are left alone; those that are `gone` (numbers) count as nothing.
+    Geoms of an explicit pair are left alone.
     """
-    left = (pair for pair in iterate_pairs(text.model) if set(pair).isdisjoint(gone))
-    pairs = set(islice(left, MOST_PAIRS))
+    pairs = set(islice(iterate_pairs(text.model), MOST_PAIRS))
     if text.model.nflex or not pairs:
         return []
-    touched = {pair for run in runs for pair in run.touching_pairs}
-    touching = {pair for pair in touched if set(pair).isdisjoint(gone)}
+    touching = {pair for run in runs for pair in run.touching_pairs}
     if not touching:
         disabling = set_option(text.main, "flag", "contact", "disable")
         return [Item("contact-idle", "contact", None, edits=disabling)]
@@ -275,3 +272,16 @@ def idle_contacts(
         for element, ids in text.things("geom")
         if idle.issuperset(ids)
     ]
+
+
+def contact_of_rest(text: ModelText, items: Sequence[Item]) -> list[Item]:
+    """Contact as a whole, together with items without which nothing may touch any more."""
+    can_touch = text.model.nflex or next(iterate_pairs(text.model), None)
+    if not items or not can_touch:
+        return []
+    removals = tuple(element for item in items for element in item.removals)
+    drops = tuple(drop for item in items for drop in item.drops)
+    edits = [edit for item in items for edit in item.edits]
+    edits += set_option(text.main, "flag", "contact", "disable")
+    kinds = " and ".join(dict.fromkeys(f"`{item.kind}`" for item in items))
+    return [Item("contact-left", f"what {kinds} names", None, removals, drops, tuple(edits))]

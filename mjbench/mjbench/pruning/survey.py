@@ -22,6 +22,7 @@ from mjbench.pruning.bystanders import couplings, far_bodies
 from mjbench.pruning.candidates import (
     KINDS,
     Item,
+    contact_of_rest,
     idle_contacts,
     message_of,
     unread_elements,
@@ -187,10 +188,12 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         far_items = far_bodies(text, names, scenarios, runs)
         self.groups += self._settle(self._try_by_running([far_items]))
         coupling_items = [item for item in couplings(text) if item.element not in proved]
-        removed = (element for item in self.trials.absences for element in item.removals)
-        gone = text.ids_of((node for element in removed for node in element.walk()), "geom")
-        candidates = [coupling_items, idle_contacts(text, runs, gone)]
+        candidates = [coupling_items, idle_contacts(text, runs)]
         self.groups += self._try_by_running(candidates)
+        kinds = ("far-body", "coupling-idle")
+        removed_items = [i for group in self.groups for i in group.items if i.kind in kinds]
+        if not any(group.finding.kind == "contact-idle" for group in self.groups):
+            self.groups += self._try_by_running([contact_of_rest(text, removed_items)])
         self.groups = self._confirm(self.groups)
 
     def _settle(self, groups: Sequence[PrunedGroup]) -> list[PrunedGroup]:

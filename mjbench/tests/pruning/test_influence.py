@@ -60,7 +60,7 @@ def test_what_nothing_commands_goes_with_its_contacts_while_an_arm_moves() -> No
     findings = findings_by_kind(run_survey(text, declarations=parse_declared(wave)))
     assert names(findings["far-body"]) == ["leg"]
     assert findings["far-body"].label == MEASURED_LABEL
-    assert max(findings[kind].difference for kind in ("far-body", "contact-idle")) < ALIKE
+    assert max(findings[kind].difference for kind in ("far-body", "contact-left")) < ALIKE
 
 
 def test_of_two_equalities_one_carries_a_weight() -> None:

@@ -77,10 +77,6 @@ def test_what_only_did_not_touch_is_told_and_left() -> None:
     finding = findings_by_kind(survey)["contact-idle"]
     assert finding.label == MEASURED_LABEL and not finding.fixable and not finding.is_fault
     assert fixed_text(survey) == scene(world)
-    lying = """<geom name="floor" type="plane" size="9 9 1"/><body pos="5 0 .1">
-      <joint type="slide" axis="0 0 1"/><geom name="lying" size=".1"/></body>"""
-    findings = findings_by_kind(run_survey(scene(PENDULUM + lying), lesson='"ball" "lying"'))
-    assert names(findings["collision-idle"]) == ["ball"]
 
 
 @pytest.mark.long
@@ -93,7 +89,8 @@ def test_all_of_a_field_of_rubble_goes_and_the_arm_stays() -> None:
     far = findings_by_kind(survey)["far-body"]
     assert len(names(far)) == 40 and far.label == MEASURED_LABEL and far.difference < 1e-9
     assert not far.fixable and not far.is_fault and far.doubt == ""
-    assert findings_by_kind(survey)["contact-idle"].in_rest, "the posts stand, and touch nothing"
+    posts = {f"mujoco/worldbody/geom[{number}]" for number in range(2, 62)}
+    assert set(names(findings_by_kind(survey)["collision-idle"])) >= posts
     assert fixed_text(survey).count("<freejoint/>") == 40
     survey = run_survey(field(3, 2), lesson="import mujoco\nprint(data.qpos[0])")
     assert findings_by_kind(survey)["far-body"].doubt == "examples/a.py may notice"

@@ -87,7 +87,7 @@ def test_what_a_needed_part_uses_is_needed_and_the_rest_is_tried() -> None:
     assert reasons["tip"] == "something needs it"
     findings = findings_by_kind(survey)
     assert "unused-site" not in findings and names(findings["far-body"]) == ["far"]
-    assert not findings["far-body"].in_rest
+    assert not findings["far-body"].in_rest and findings["contact-idle"].in_rest
 
 
 def test_an_asset_is_called_after_its_file() -> None:
