@@ -19,7 +19,7 @@ from msgspec import Struct
 
 from mjbench.problem import Scenario
 from mjbench.pruning.comparison import WatchedRun
-from mjbench.pruning.geom_pairs import iterate_pairs
+from mjbench.pruning.geom_pairs import hull_distance, iterate_pairs
 from mjbench.pruning.model_text import ModelText, section_of, thing_kind
 from mjbench.pruning.xml_edits import (
     Element,
@@ -110,6 +110,9 @@ KINDS = {
         "contacts are searched for on the {}, and nothing touched there", "geom"
     ),
     "coupling-idle": FindingKind("what the scene shows is the same without the {}", "coupling"),
+    "mesh-primitive": FindingKind(
+        "a simple shape can stand for the mesh of the {}", "geom", "Geom"
+    ),
 }
 """What uses other things comes before them, so that they can go with it."""
 
@@ -285,3 +288,41 @@ def contact_of_rest(text: ModelText, items: Sequence[Item]) -> list[Item]:
     edits += set_option(text.main, "flag", "contact", "disable")
     kinds = " and ".join(dict.fromkeys(f"`{item.kind}`" for item in items))
     return [Item("contact-left", f"what {kinds} names", None, removals, drops, tuple(edits))]
+
+
+_FIT = 0.05
+"""How far a shape may be off, relative to a mesh's size."""
+_SHAPES = ("sphere", "capsule", "cylinder", "box", "ellipsoid")
+
+
+def primitive_meshes(text: ModelText) -> list[Item]:
+    """Meshes that collide, each with the shape that MuJoCo fits to it best.
+
+    Its surface is off by as much as is said; whether that shows is tried by running.
+    """
+    model, items = text.model, []
+    for element, ids in text.things("geom"):
+        if element.get("type") != "mesh" or not all(
+            model.geom_contype[i] or model.geom_conaffinity[i] for i in ids
+        ):
+            continue
+        fits, body = [], element.parent
+        siblings = (
+            [child for child in body.children if child.tag in ("geom", "inertial")] if body else []
+        )
+        mass = (("mass", f"{float(model.body_mass[model.geom_bodyid[ids[0]]]):.17g}"),)
+        for shape in _SHAPES:  # with the mass that the mesh has
+            edits = set_attributes(
+                element, (("type", shape), *(mass if len(siblings) == 1 else ()))
+            )
+            try:
+                variant = text.compile(edits)
+            except ValueError:
+                continue
+            fits.append((hull_distance(model, variant, ids[0]), shape, edits))
+        if fits:
+            off, shape, edits = min(fits)
+            name = f"{display_name(element)} ({shape}, off by {off:.2g} m)"
+            if off < _FIT * min(model.geom_rbound[i] for i in ids):
+                items.append(Item("mesh-primitive", name, element, edits=edits))
+    return items

@@ -25,6 +25,7 @@ from mjbench.pruning.candidates import (
     contact_of_rest,
     idle_contacts,
     message_of,
+    primitive_meshes,
     unread_elements,
 )
 from mjbench.pruning.comparison import (
@@ -188,7 +189,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         far_items = far_bodies(text, names, scenarios, runs)
         self.groups += self._settle(self._try_by_running([far_items]))
         coupling_items = [item for item in couplings(text) if item.element not in proved]
-        candidates = [coupling_items, idle_contacts(text, runs)]
+        candidates = [coupling_items, idle_contacts(text, runs), primitive_meshes(text)]
         self.groups += self._try_by_running(candidates)
         kinds = ("far-body", "coupling-idle")
         removed_items = [i for group in self.groups for i in group.items if i.kind in kinds]
@@ -299,12 +300,15 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         """Take out of each list of items as many of a kind as change no motion."""
         groups: list[PrunedGroup] = []
         absences = {element for item in self.trials.absences for element in item.removals}
+        edits = {edit for item in self.trials.absences for edit in item.edits}
 
         def is_left(item: Item) -> bool:
             if not self._is_asked(item):
                 return False
-            element = item.element
-            return element is None or absences.isdisjoint((element, *element.ancestors()))
+            if item.element is None:
+                return True
+            is_whole = absences.isdisjoint((item.element, *item.element.ancestors()))
+            return is_whole and not (item.edits and edits.issuperset(item.edits))
 
         for items in candidates:
             for reason, similar in self._group_items(filter(is_left, items)):
@@ -314,9 +318,13 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         return groups
 
     def _try_items(self, items: Sequence[Item], reason: str) -> PrunedGroup | None:
-        """Take out as many of these items as change no motion, if that saves time."""
+        """Take out as many of these items as change no motion, if that saves time.
+
+        A shape that stands for a mesh is another scene: it may differ by less than can be seen.
+        """
         unlike: list[MotionComparison] = []
         alike: list[MotionComparison] = []  # the last is of all that is removable
+        tolerance = 1.0 if items[0].kind == "mesh-primitive" else ALIKE
         trials, absences = self.trials, self.trials.absences
         rest = trials.prune(absences) or trials.whole
 
@@ -325,7 +333,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
             result = None if trial is None else trials.compare(trial, rest)
             if result is None:
                 return False
-            is_alike = result.difference < ALIKE
+            is_alike = result.difference < tolerance
             (alike if is_alike else unlike).append(result)
             return is_alike
 

@@ -63,12 +63,24 @@ def test_what_nothing_commands_goes_with_its_contacts_while_an_arm_moves() -> No
     assert max(findings[kind].difference for kind in ("far-body", "contact-left")) < ALIKE
 
 
-def test_of_two_equalities_one_carries_a_weight() -> None:
+def test_couplings_and_shapes() -> None:
+    """Of two equalities one carries a weight."""
+    cube = " ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-1, 1))
     text = scene(
-        """<body name="lamp" pos="2 0 1"><joint name="cord" type="slide" axis="0 0 1"/>
+        """<geom type="plane" size="3 3 1"/>
+    <body name="crate" pos="0 0 .5"><freejoint/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <geom name="shell" type="mesh" mesh="cube"/>
+      <geom name="knob" size=".1" pos="0 0 .3"/></body>
+    <body name="lamp" pos="2 0 1"><joint name="cord" type="slide" axis="0 0 1"/>
       <geom size=".1"/></body>
     <body name="still" pos="4 0 2"><joint name="turn" axis="0 0 1"/><geom size=".1"/></body>""",
+        head=f'<asset><mesh name="cube" vertex="{cube}" scale=".3 .3 .3"/></asset>',
         rest="""<equality><joint name="carries" joint1="cord"/>
     <joint name="idle" joint1="turn"/></equality>""",
     )
-    assert names(findings_by_kind(run_survey(text))["coupling-idle"]) == ["idle"]
+    survey = run_survey(text, lesson='"crate"')
+    findings = findings_by_kind(survey)
+    assert names(findings["coupling-idle"]) == ["idle"]
+    shape = findings["mesh-primitive"]
+    assert names(shape)[0].startswith("shell (box, off by ")
+    assert (shape.label, shape.fixable) == (MEASURED_LABEL, False), "another shape is another scene"
