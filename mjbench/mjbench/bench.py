@@ -36,7 +36,7 @@ from mjbench.loop import Loop, LoopError, program_output
 from mjbench.machine import one_processor, this_machine
 from mjbench.problem import Array, Scenario, Setup
 from mjbench.pruning.comparison import watch
-from mjbench.pruning.geom_pairs import possible_pairs
+from mjbench.pruning.reachability import possible_pairs
 from mjbench.reports import PartFailure
 from mjbench.reports.model_report import SceneCard, SceneReport
 from mjbench.reports.scene_report import ScenarioReport, SweepReport

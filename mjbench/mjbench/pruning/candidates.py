@@ -19,8 +19,13 @@ from msgspec import Struct
 
 from mjbench.problem import Scenario
 from mjbench.pruning.comparison import WatchedRun
-from mjbench.pruning.geom_pairs import hull_distance, iterate_pairs
 from mjbench.pruning.model_text import ModelText, section_of, thing_kind
+from mjbench.pruning.reachability import (
+    Pair,
+    find_separate,
+    hull_distance,
+    iterate_pairs,
+)
 from mjbench.pruning.xml_edits import (
     Element,
     ModelEdit,
@@ -31,7 +36,7 @@ from mjbench.pruning.xml_edits import (
 from mjbench.reports.diet_report import name_list
 
 MOST_PAIRS = 100_000
-"""The most pairs of geoms that are looked at."""
+"""With so many pairs of geoms no contact is examined."""
 
 
 class FindingKind(Struct, frozen=True):
@@ -101,6 +106,18 @@ KINDS = {
     "unused-hfield": FindingKind("nothing uses the {}", "hfield", "Hfield", _UNUSED),
     "unused-model": FindingKind("nothing uses the {}", "model", proof=_UNUSED),
     "unused-default": FindingKind("no element is of the {}", "class", proof=_UNUSED),
+    "contact-off": FindingKind(
+        "contacts are searched for, and nothing can touch",
+        proof="no two geoms can meet, whatever the joints do",
+        fields="disableflags",
+    ),
+    "collision-unreachable": FindingKind(
+        "contacts are searched for on the {}, and nothing can touch there",
+        "geom",
+        proof="every geom that it could collide with is out of reach",
+        fields="geom_contype geom_conaffinity body_contype body_conaffinity"
+        " body_bvhnum body_bvhadr",
+    ),
     "far-body": FindingKind(
         "what the scene is about{1} moves in the same way without the {0}", "body", "Body"
     ),
@@ -249,29 +266,42 @@ def is_forceless_tendon(model: Any, ids: Collection[int]) -> bool:
     )
 
 
-def idle_contacts(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
-    """Contact as a whole where nothing touched in these runs, else of the geoms that did not.
+def unreachable_contacts(text: ModelText) -> list[Item]:
+    """Contact as a whole, or of single geoms, where a bound says that nothing can touch."""
+    pairs = frozenset(islice(iterate_pairs(text.model), MOST_PAIRS))
+    if len(pairs) == MOST_PAIRS:
+        return []
+    in_reach = pairs - find_separate(text.model, pairs)
+    return _without_contact(text, pairs, in_reach, "contact-off", "collision-unreachable")
 
-    Geoms of an explicit pair are left alone.
+
+def idle_contacts(text: ModelText, runs: Collection[WatchedRun]) -> list[Item]:
+    """Contact as a whole, or of single geoms, where nothing touched in these runs."""
+    pairs = frozenset(islice(iterate_pairs(text.model), MOST_PAIRS))
+    touching = frozenset(pair for run in runs for pair in run.touching_pairs)
+    return _without_contact(text, pairs, touching, "contact-idle", "collision-idle")
+
+
+_UNTOUCHABLE = (("contype", "0"), ("conaffinity", "0"))
+
+
+def _without_contact(
+    text: ModelText, pairs: Collection[Pair], touching: Collection[Pair], whole: str, part: str
+) -> list[Item]:
+    """Contact as a whole where none of the pairs touch, else of the geoms in no touching pair.
+
+    Geoms of an explicit pair are left alone. `whole` and `part` are kinds of findings.
     """
-    pairs = set(islice(iterate_pairs(text.model), MOST_PAIRS))
     if text.model.nflex or not pairs:
         return []
-    touching = {pair for run in runs for pair in run.touching_pairs}
     if not touching:
         disabling = set_option(text.main, "flag", "contact", "disable")
-        return [Item("contact-idle", "contact", None, edits=disabling)]
+        return [Item(whole, "contact", None, edits=disabling)]
     explicit = {int(g) for g in (*text.model.pair_geom1, *text.model.pair_geom2)}
     idle = {geom for pair in pairs for geom in pair} - explicit
     idle -= {geom for pair in touching for geom in pair}
-    untouchable = (("contype", "0"), ("conaffinity", "0"))
     return [
-        Item(
-            "collision-idle",
-            display_name(element),
-            element,
-            edits=set_attributes(element, untouchable),
-        )
+        Item(part, display_name(element), element, edits=set_attributes(element, _UNTOUCHABLE))
         for element, ids in text.things("geom")
         if idle.issuperset(ids)
     ]

@@ -26,6 +26,7 @@ from mjbench.pruning.candidates import (
     idle_contacts,
     message_of,
     primitive_meshes,
+    unreachable_contacts,
     unread_elements,
 )
 from mjbench.pruning.comparison import (
@@ -36,6 +37,7 @@ from mjbench.pruning.comparison import (
     watch,
 )
 from mjbench.pruning.model_text import ModelText
+from mjbench.pruning.reachability import PREMISES
 from mjbench.pruning.readers import ModelReader, difference, unrelated_fields
 from mjbench.pruning.trials import (
     PrunedGroup,
@@ -188,12 +190,14 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         scenarios = [run.scene.scenario for run in self.good_runs]
         far_items = far_bodies(text, names, scenarios, runs)
         self.groups += self._settle(self._try_by_running([far_items]))
-        coupling_items = [item for item in couplings(text) if item.element not in proved]
-        candidates = [coupling_items, idle_contacts(text, runs), primitive_meshes(text)]
+        candidates = [[item for item in couplings(text) if item.element not in proved]]
+        if not any(group.finding.kind == "contact-off" for group in self.groups):
+            candidates += [idle_contacts(text, runs), primitive_meshes(text)]
         self.groups += self._try_by_running(candidates)
         kinds = ("far-body", "coupling-idle")
         removed_items = [i for group in self.groups for i in group.items if i.kind in kinds]
-        if not any(group.finding.kind == "contact-idle" for group in self.groups):
+        contact_kinds = ("contact-off", "contact-idle")
+        if not any(group.finding.kind in contact_kinds for group in self.groups):
             self.groups += self._try_by_running([contact_of_rest(text, removed_items)])
         self.groups = self._confirm(self.groups)
 
@@ -223,6 +227,8 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
     def _prove(self) -> list[PrunedGroup]:
         self.tell("what nobody needs")
         items = unread_elements(self.text, [run.scene.scenario for run in self.good_runs])
+        if not any(reader.touches(PREMISES) for reader in self.readers):
+            items += unreachable_contacts(self.text)
         items = [item for item in items if self._is_asked(item) and self._is_unread(item)]
         unkept = [item for item in items if not self._keep_reason(item)]
         own_items = [item for item in unkept if not KINDS[item.kind].interface]

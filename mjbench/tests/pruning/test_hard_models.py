@@ -181,7 +181,7 @@ def test_composites_and_flexes_stay_as_they_are(
 </mujoco>
 """
     survey, left = whole(text)
-    assert {"far-body", "contact-idle"}.isdisjoint(findings_by_kind(survey))
+    assert {"far-body", "contact-off"}.isdisjoint(findings_by_kind(survey))
     assert '<composite prefix="r"' in left and "<flexcomp" in left and "<clock" in left
 
 

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from mjbench.reports.diet_report import INTERFACE_LABEL, MEASURED_LABEL
+from mjbench.reports.diet_report import INTERFACE_LABEL, MEASURED_LABEL, PROVED_LABEL
 from samples.surveys import (
     PENDULUM,
     field,
@@ -71,12 +71,38 @@ def test_tendons_along_which_nothing_acts() -> None:
     assert names(findings_by_kind(survey)["coupling-idle"]) == ["bound"]  # it never was at its end
 
 
+def test_contact_is_off_where_nothing_can_touch() -> None:
+    world = PENDULUM + '<geom name="far" size=".1" pos="0 0 2"/>'
+    survey = run_survey(scene(world))
+    finding = findings_by_kind(survey)["contact-off"]
+    assert finding.label == PROVED_LABEL and finding.proof.startswith("no two geoms can meet")
+    left = fixed_text(survey)
+    assert '<option><flag contact="disable"/></option>' in left
+    assert run_survey(left).edits == ()
+
+
 def test_what_only_did_not_touch_is_told_and_left() -> None:
     world = PENDULUM + '<geom name="near" size=".1" pos="0 0 1.35"/>'
     survey = run_survey(scene(world))
     finding = findings_by_kind(survey)["contact-idle"]
     assert finding.label == MEASURED_LABEL and not finding.fixable and not finding.is_fault
     assert fixed_text(survey) == scene(world)
+
+
+def test_geoms_that_can_touch_nothing_need_no_contact() -> None:
+    world = """<geom name="floor" type="plane" size="1 1 1"/>
+    <geom name="lamp" size=".1" pos="0 0 9"/>
+    <body name="swing" pos="0 0 5"><joint axis="0 1 0"/>
+      <geom name="s" size=".1" pos="1 0 0"/></body>
+    <body name="near" pos="1.5 0 .15"><joint axis="0 1 0"/>
+      <geom name="n" size=".1" pos=".2 0 0"/></body>"""
+    survey = run_survey(scene(world))
+    finding = findings_by_kind(survey)["collision-unreachable"]
+    assert names(finding) == ["lamp", "s"] and finding.label == PROVED_LABEL
+    left = fixed_text(survey)
+    assert '<geom name="lamp" size=".1" pos="0 0 9" contype="0" conaffinity="0"/>' in left
+    assert '<geom name="n" size=".1" pos=".2 0 0"/>' in left
+    assert "collision-unreachable" not in findings_by_kind(run_survey(left))
 
 
 @pytest.mark.long

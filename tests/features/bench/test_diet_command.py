@@ -199,10 +199,16 @@ def test_measured_sensor_is_read_and_unused_keyframe_is_interface(
     _, value = values(course, capsys)
     kinds_found = {finding["kind"] for finding in value["models"][0]["findings"]}
     assert "unused-keyframe" not in kinds_found, "the page of the model begins in the first one"
-    declarations.write_text('[[sweep]]\nname = "a"\nvary = { "sensor:time.cutoff" = [1] }\n')
-    (course / "models" / "swing.xml").write_text(CLEAN.replace("</mujoco>", sensor + "</mujoco>"))
-    status, value = values(course, capsys)
-    assert (status, value["models"][0]["findings"]) == (0, []), "what is varied is read"
+    sweep = '[[sweep]]\nname = "noise"\nvary = { "sensor:time.cutoff" = [1], "VARIED" = [1] }\n'
+    # A ball of this size would hit the wall that the pendulum's cannot reach.
+    wall = '<worldbody><geom size=".1" pos="2 0 1"/>'
+    text = CLEAN.replace("<worldbody>", wall).replace("</mujoco>", sensor + "</mujoco>")
+    (course / "models" / "swing.xml").write_text(text)
+    for varied, kinds in (("joint.damping", {"contact-off"}), ("geom.size[0]", set())):
+        declarations.write_text(sweep.replace("VARIED", varied))
+        status, value = values(course, capsys)
+        findings = value["models"][0]["findings"]
+        assert {finding["kind"] for finding in findings if finding["fixable"]} == kinds
 
 
 SHARED_PART = fixture_text("documents/shared_part.xml")
