@@ -168,7 +168,7 @@ def _hash_file(file: Path) -> bytes:
         return b"unreadable"
 
 
-_LATER: tuple[str, ...] = ("room", "stable_for", "search", "expected", "precision")
+_LATER: tuple[str, ...] = ("stable_for", "search", "expected", "precision")
 _LATER += ("horizon_error", "act", "push", "poses", "draw", "draws")
 _PLAIN = asdict(ScenarioTable("plain"))
 

@@ -112,7 +112,6 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     timesteps: tuple[Positive, ...] = ()
     expected: dict[Expected, float] = {}
     precision: Positive | None = None
-    room: Positive = 10.0
     horizon_error: dict[Literal["rad", "m"], Positive] = {}
     stable_for: Positive | None = None
     search: tuple[Positive, Positive] | None = None

@@ -231,8 +231,12 @@ def quantity_name(model: Any, scene: Scene) -> str:
         return ""
     if quantity.kind != "sensor":
         return f"place of the {quantity.kind} {quantity.name} [m]"
-    kind = mujoco.mjtSensor(int(model.sensor(quantity.name).type[0]))
-    unit = _UNITS.get(kind.name.removeprefix("mjSENS_"), "")
+    sensor = model.sensor(quantity.name)
+    kind = mujoco.mjtSensor(int(sensor.type[0])).name.removeprefix("mjSENS_")
+    unit = _UNITS.get(kind, "")
+    if kind in _OF_JOINTS:
+        is_slide = model.jnt_type[int(sensor.objid[0])] == mujoco.mjtJoint.mjJNT_SLIDE
+        unit = ("m" if is_slide else "rad") + _OF_JOINTS[kind]
     return f"sensor {quantity.name}" + (f" [{unit}]" if unit else "")
 
 
@@ -258,7 +262,8 @@ _UNITS = {
     "E_POTENTIAL": "J",
     "E_KINETIC": "J",
 }
-"""The units of sensors, except where the unit depends on the joint."""
+_OF_JOINTS = {"JOINTPOS": "", "JOINTVEL": "/s"}
+"""The units of sensors, and of those of a slide or a hinge what follows m or rad."""
 
 
 def quantity_values(model: Any, scene: Scene, states: EngineStates) -> Array:

@@ -119,12 +119,14 @@ def _with_errors(
             # How far apart they are later depends on the last digit of the start.
             return replace(row, parted=float(states.times[far[0]]), slip=creep)
     sizes = measure.error_sizes(motion, exact)
-    sizes["step_error"] = measure.visible_errors(model, scene, states, reference.states)
+    # Where nothing touches there is no model of contacts to tell apart.
+    visible = "step_error" if basis.pilot.contact else "seen"
+    sizes[visible] = measure.visible_errors(model, scene, states, reference.states)
     leasts = {
         "position": scene_report.FLOORS * reference.floor.position,
         "attitude": scene_report.FLOORS * reference.floor.attitude,
         "velocity": scene_report.FLOORS * reference.floor.velocity,
-        "step_error": basis.least_seen,
+        visible: basis.least_seen,
         "figure": basis.least_figure,
     }
     if measure.quantity_name(model, scene):
@@ -135,7 +137,7 @@ def _with_errors(
         for name, row in sizes.items()
         if len(row) > 1
     }
-    step_error = max(float(sizes["step_error"].max(initial=0.0)), basis.least_seen)
+    size = max(float(sizes[visible].max(initial=0.0)), basis.least_seen)
     figure = None
     if "figure" in sizes:
         ends = np.maximum([sizes["figure"].max(), sizes["figure"][-1]], basis.least_figure)
@@ -144,8 +146,8 @@ def _with_errors(
         row,
         **asdict(measure.errors(motion, exact, reference.floor)),
         figure=figure,
-        step_error=step_error,
-        seen=step_error + cone.visible_model_error,
+        step_error=size if basis.pilot.contact else None,
+        seen=size + cone.visible_model_error,
         slip=creep,
         halves=halves,
     )

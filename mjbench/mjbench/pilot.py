@@ -29,7 +29,7 @@ from mjbench.detector import (
     thickness,
     update_peaks,
 )
-from mjbench.problem import Array, Integrator, Setup
+from mjbench.problem import ROOM, Array, Integrator, Setup
 from mjbench.reports.shown_errors import seconds_text
 from mjbench.scene import Scene, SceneError
 
@@ -318,7 +318,7 @@ def nudges(model: Any, count: int, size: float) -> Array:
 
 
 def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
-    scenario, room = scene.scenario, scene.declaration.room
+    scenario = scene.scenario
     extent = float(model.stat.extent)
     fall = math.sqrt(float(np.linalg.norm(model.opt.gravity)) * extent)
     # A hinge without limits may go round the other way.
@@ -326,14 +326,14 @@ def _bounds(model: Any, scene: Scene, peaks: Peaks) -> Setup:
     round_and_round = 2 * peaks.velocity * scenario.duration if has_hinges else 0.0
     setup = Setup(
         scenario=scenario,
-        position_bound=2 * peaks.position + room * max(extent, 1.0) + round_and_round,
+        position_bound=2 * peaks.position + ROOM * max(extent, 1.0) + round_and_round,
         sunk_bound=max(1.0, DEEPER * peaks.sunk),
     )
     if driving_force(model, scenario):
-        return replace(setup, velocity_bound=room * max(peaks.velocity, fall, 1e-3))
+        return replace(setup, velocity_bound=ROOM * max(peaks.velocity, fall, 1e-3))
     rest_energy = float(model.body_mass.sum()) * max(_REST_SPEED * fall, 1e-3) ** 2
     kinetic = max(peaks.kinetic, rest_energy)
-    return replace(setup, energy_bound=peaks.energy + room * kinetic)
+    return replace(setup, energy_bound=peaks.energy + ROOM * kinetic)
 
 
 def longer_setup(model: Any, pilot: Pilot, span: float) -> Setup:

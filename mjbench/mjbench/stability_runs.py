@@ -258,13 +258,16 @@ def loop_note(model: Any, pilot: Pilot, reference: EngineStates) -> str:
     grid: list[float] = np.geomspace(scene.timestep, most, count).tolist()
     bounds = []
     for is_off in (is_lost, lambda delay: bool(trial(delay).astray)):
-        largest = bisect(is_off, grid, _RESOLUTION, math.inf)
+        is_off_already = is_off(0.0)
+        largest = 0.0 if is_off_already else bisect(is_off, grid, _RESOLUTION, math.inf)
         delay = f"{loop.delay + min(largest, most):.3g} s"
         bounds.append(
             f"at every delay tried, up to {delay}"
             if math.isinf(largest)
             else f"up to a delay of {delay}"
             if largest
+            else "at no delay, not even its own"
+            if is_off_already
             else f"at no delay longer than {loop.delay:.3g} s"
         )
     span = f"for the {scene.scenario.duration:.3g} s of the scenario"

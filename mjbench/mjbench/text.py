@@ -84,9 +84,14 @@ def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -
     yield from profile_lines(report.profile, report.profile_text, style)
     yield from _stable(report.stable, style)
     yield from _orders(report.orders, style)
+    figures: dict[tuple[str, str], list[str]] = {}
     for line in report.figures:
         exact = "" if line.exact is None else f", in theory {line.exact:.6g} ({line.source})"
-        yield f"{line.name} under {line.integrator}: {_number(line.measured)} {line.unit}{exact}"
+        value = f"{_number(line.measured)} {line.unit}".strip()
+        value = "none" if line.measured is None else value
+        figures.setdefault((line.name, value + exact), []).append(line.integrator)
+    for (figure, words), integrators in figures.items():
+        yield from style.wrap(f"{figure} under {', '.join(integrators)}: {words}")
     yield ""
     basis = f"over {seconds_text(report.duration)}, against {report.source}"
     basis += f" (known to {report.floor:.1g}, velocities to {report.velocity_floor:.1g})"

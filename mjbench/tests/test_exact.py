@@ -97,7 +97,8 @@ def test_quantities_of_theory_are_measured_by_their_formula(folder: Path) -> Non
     assert crossing.measured == pytest.approx(crossing.exact, abs=1e-6)
     euler = figures["Euler", "crossing"].measured
     assert euler is not None and 1e-5 < abs(euler - 0.5919605) < 1e-2
-    assert figures["RK4", "largest"].measured == 1.5707963267948966, "where it begins"
+    largest = figures["RK4", "largest"]
+    assert (largest.measured, largest.unit) == (1.5707963267948966, "rad"), "where it begins"
     slip = mistake(folder, toml=toml + quarter(0.6038))
     assert slip.message.startswith("the expected crossing, 0.6038, is not this scene's: it is 0.59")
     message = mistake(folder, toml=toml + "expected = { loudest = 1 }\n").message

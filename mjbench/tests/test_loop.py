@@ -9,6 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from mjbench.bench import CompiledModel, compile_subject, read_subject
 from mjbench.cli import main
@@ -156,11 +157,14 @@ def test_a_loop_that_grows_slowly_is_not_stable(model: Path, text: str, gravity:
     scenario = "keyframe = 'home'\nduration = 6\nsample = 0.12\ntimesteps = [0.02]\n"
     loop = compiled_loop(model, policy, scenario)
     pilot = run_pilot(loop.model, loop.scenarios[0])
-    note = loop_note(loop.model, pilot, simulate(pilot.setup, loop.model).states)
+    states = simulate(pilot.setup, loop.model).states
+    note = loop_note(loop.model, pilot, states)
     assert "every 0.02 s small differences do not grow up to" in note
     calm = float(re.findall(r"delay of ([0-9.]+) s", note)[0])
     late = next(n for n in range(100) if growth(0.02, n, gravity) > 1)
     assert calm == pytest.approx(0.02 * (late - 1), abs=0.021)
+    note = loop_note(loop.model, pilot, replace(states, qpos=states.qpos + 1.0))
+    assert "the motion of small steps for the 6 s of the scenario at no delay, not even its" in note
 
 
 def growth(period: float, late: int, gravity: float = 0.0) -> float:

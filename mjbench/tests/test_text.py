@@ -20,7 +20,7 @@ from mjbench.reports.diet_report import (
 )
 from mjbench.reports.model_report import BatchCost, EngineReport, EngineRow, EngineScenario
 from mjbench.reports.page import scene_page
-from mjbench.reports.scene_report import SweepReport, SweepRow, WorkPrecisionRow
+from mjbench.reports.scene_report import FigureLine, SweepReport, SweepRow, WorkPrecisionRow
 from mjbench.reports.terminal import Style
 from mjbench.text import case_text, diet_text, engines_text, scene_text
 from samples.cases import case
@@ -43,10 +43,11 @@ def test_the_verdict_comes_first_then_the_table_then_the_plot() -> None:
 
 
 def test_a_report_that_is_hard_to_show_and_one_without_anything() -> None:
-    text = scene_text(
-        scene(derive_charts(derive_scenario(awkward(), lambda _: ())), quick=True), Style(100)
-    )
+    figures = (FigureLine("last", "m", "RK4", None, 1.5, "as declared"),)
+    report = derive_charts(derive_scenario(replace(awkward(), figures=figures), lambda _: ()))
+    text = scene_text(scene(report, quick=True), Style(100))
     assert "quick: fewer settings" in text and "velocities reached 12 times their bound" in text
+    assert "last under RK4: none, in theory 1.5 (as declared)\n" in text
     empty = replace(scene(), scenarios=())
     assert "nothing in it can move, so nothing was measured" in scene_text(empty)
 
@@ -67,6 +68,7 @@ def test_a_hard_case_has_its_orders_limits_figures_and_runs() -> None:
     near = replace(near, position=(5e-4, 5e-4))
     text = case_text(derive_case(case(errors=(near,))))
     assert "to err by 0.001, a simulated second takes Euler 100 µs\n" in text
+    assert "E Euler\n" in text, "no run is the model's own, or lost"
 
 
 def test_a_page_needs_nothing_else_and_escapes_names() -> None:

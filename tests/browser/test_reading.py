@@ -52,6 +52,17 @@ OPEN_ALL = "document.querySelectorAll('details').forEach(d => d.open = true)"
 FITS = "document.documentElement.scrollWidth <= innerWidth"
 
 
+def test_hard_cases_behind_the_first_are_folded_where_they_stand_below_each_other(
+    open_page: OpenPage,
+) -> None:
+    page = open_page()
+    case = '<details class="case" open><summary>A case</summary></details>'
+    page.locator("h1").evaluate(f"node => node.insertAdjacentHTML('afterend', '{case * 3}')")
+    for width, count in ((390, 1), (1440, 3)):
+        page.set_viewport_size({"width": width, "height": 900})
+        expect(page.locator(".case[open]")).to_have_count(count)
+
+
 @pytest.mark.parametrize("name", ["nasty", "arabic"])
 def test_no_page_is_wider_than_its_window(
     sites: Mapping[str, Site], open_page: OpenPage, name: str

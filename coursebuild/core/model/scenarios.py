@@ -161,13 +161,6 @@ class ScenarioTable(Struct, frozen=True, forbid_unknown_fields=True):
     precision: Annotated[
         Positive | None, describe("by how much `NAME.exact.py` may differ from an integration")
     ] = None
-    room: Annotated[
-        Positive,
-        describe(
-            "a run is lost beyond so many times the values of small steps: of the "
-            "largest kinetic energy, added to the energy; of velocity, if something drives it"
-        ),
-    ] = 10.0
     horizon_error: Annotated[
         dict[Literal["rad", "m"], Positive],
         describe(

@@ -111,7 +111,10 @@ def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
     yield f"{'':>11}{''.join(axis)}".rstrip()
     yield f"{'':>11}{chart.axes[0]}"
     names = [f"{_LETTERS[line.number % len(_LETTERS)]} {line.name}" for line in chart.lines]
-    keys = [f"{_OWN} the model's own", f"{_LOST} lost", f"capital: {ON_FRONT}"]
+    points = [point for _, point in places]
+    keys = [f"{_OWN} the model's own"] * any(point.ringed for point in points)
+    keys += [f"{_LOST} lost"] * any(point.y is None for point in points)
+    keys += [f"capital: {ON_FRONT}"] * (not all(point.full for point in points))
     yield "  ".join([*names, *keys])
     texts = [level.text for level, at in zip(levels, heights, strict=True) if at in near]
     if texts:

@@ -18,7 +18,8 @@ export function listMove(list, entry) {
 
 /**
  * Follow the reader's scrolling, and unfold the lists where they stand beside the text. (Style sheets show them there even if they
- * are folded, but a tool that asks what can be reached believes the fold.) Returns a function that ends it.
+ * are folded, but a tool that asks what can be reached believes the fold.) On other screens hard cases behind the first of their
+ * family are folded: a page of eight would be long. Returns a function that ends it.
  */
 export function followContents(document) {
   const page = document.querySelector('.level-nav [aria-current="page"]')
@@ -27,7 +28,14 @@ export function followContents(document) {
   const pairs = links
     .map((link) => ({ link, heading: document.getElementById(decodeURIComponent(link.hash.slice(1))) }))
     .filter(({ heading }) => heading)
-  if (pairs.length === 0) return () => {}
+  const abort = new AbortController()
+  const wide = matchMedia('(width >= 75rem)')
+  const open = () => {
+    for (const fold of document.querySelectorAll('.beside details, details.case + details.case')) fold.open = wide.matches
+  }
+  open()
+  wide.addEventListener('change', open, { signal: abort.signal })
+  if (pairs.length === 0) return () => abort.abort()
   let current = null
   const mark = () => {
     // At the end of a page the last heading in sight counts, however low it stands.
@@ -40,13 +48,6 @@ export function followContents(document) {
     current = link
     keepInSight(link, links[0])
   }
-  const abort = new AbortController()
-  const wide = matchMedia('(width >= 75rem)')
-  const open = () => {
-    for (const list of document.querySelectorAll('.beside details')) list.open = wide.matches
-  }
-  open()
-  wide.addEventListener('change', open, { signal: abort.signal })
   // Browsers send one of these events for each picture at most.
   addEventListener('scroll', mark, { passive: true, signal: abort.signal })
   addEventListener('resize', mark, { signal: abort.signal })

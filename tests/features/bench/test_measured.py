@@ -248,3 +248,5 @@ def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> N
     files = pages(make, site_reports)
     assert "Hard cases A &lt;a&gt; No timestep" in text(files["numerics/case-4.html"])
     assert "Hard cases A &lt;b&gt; A &lt;b&gt; No timestep" in text(files["numerics/case-99.html"])
+    folds = [files[f"numerics/case-{n}.html"].count('<details class="case"') for n in (4, 99)]
+    assert folds == [0, 2], "one alone is never folded"
