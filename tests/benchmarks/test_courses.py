@@ -169,7 +169,7 @@ def test_mistakes_of_each_kind_end_as_they_did(rewriting: bool) -> None:
         EXPECTED.write_text(text, encoding="utf-8")
     assert text == EXPECTED.read_text(encoding="utf-8")
     kinds = {outcome.change.kind for outcome in outcomes}
-    assert {*KINDS} - kinds <= {"commands", "declarations of models"}
+    assert {*KINDS} - kinds <= {"commands", "formulas", "declarations of models"}
 
 
 def test_what_only_names_or_says_something_is_no_claim() -> None:
