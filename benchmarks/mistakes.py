@@ -22,7 +22,8 @@ compared, besides the map and models; what a change of these breaks elsewhere is
 Nothing excuses a silence: which slips could not be known either, a reader of the list decides.
 Claims are what says something that could be tried. None are a formula without a relation, as `$m$`,
 which names something and says nothing of it; commands, and what they printed, in blocks that are
-only shown; and docstrings and comments, which are words.
+only shown; and docstrings, comments and sources in words (`{given="ISO 80000-3"}`). Relations
+between letters alone, as `$F = ma$`, have a row of their own: another one may be meant as well.
 Beside the silence stand the false alarms that it was bought with: those of `corpus.py --record`.
 """
 
@@ -75,7 +76,9 @@ CLAIMS = frozenset(
         *("declarations of models", "fence not closed", "key renamed", "merge conflict"),
     )
 )
-"""Kinds of changes of what the course claims; all others are of prose and its marks."""
+"""Kinds of changes of what the course claims."""
+RELATIONS = "relations between letters"
+"""A kind of its own; all others are of prose and its marks."""
 RESULT = Path(__file__).parent / "corpus_result.json"
 """What `corpus.py --record` writes."""
 WIDTH = 300
@@ -341,7 +344,7 @@ def table(outcomes: Sequence[Outcome]) -> list[str]:
     head = f"| kind of change | tried | {' | '.join(ENDS)} | silent, % |"
     lines = [head, "| --- |" + " ---: |" * (len(ENDS) + 2)]
     claims = [outcome for outcome in outcomes if outcome.change.kind in CLAIMS]
-    prose = [outcome for outcome in outcomes if outcome.change.kind not in CLAIMS]
+    prose = [o for o in outcomes if o.change.kind not in {*CLAIMS, RELATIONS}]
     groups = [(k, [o for o in outcomes if o.change.kind == k]) for k in KINDS]
     groups += [("**claims**", claims), ("**prose**", prose), ("**all**", list(outcomes))]
     for name, group in groups:

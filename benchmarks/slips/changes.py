@@ -44,6 +44,17 @@ _INLINE = re.compile(
 _RELATION = re.compile(
     r"[=<>]|\\(?:approx|neq?|leq?|geq?|ll|gg|sim(?:eq)?|propto|equiv|in|to)(?![A-Za-z])"
 )
+_SOURCE = re.compile(r'(?<=given=")(?!lab\b|lesson:|#|[\w.-]+/)[^"]+')
+"""A source in words, as `ISO 80000-3`, with which nothing is compared."""
+_UNIT = re.compile(r"\\(?:begin|end|mathrm|operatorname|text)\s*(?:\{[^{}]*\}|\w)")
+_SIGN = re.compile(r"\\([A-Za-z]+)|[A-Za-z]")
+_LETTERS = frozenset(
+    """
+    Delta Gamma Lambda Omega Phi Psi Sigma Theta alpha beta chi delta ell epsilon eta gamma hbar
+    kappa lambda mu nu omega phi psi rho sigma tau theta varepsilon varphi xi zeta
+    """.split()
+)
+"""Commands that are letters."""
 _PLACES = {
     "words": "words of prose",
     "digits": "numbers in prose",
@@ -54,6 +65,7 @@ _PLACES = {
     "link": "links",
     "code": "inline code",
     "formula": "formulas",
+    "relation": "relations between letters",
     "symbols": "symbols",
     "heading": "heading marks",
     "emphasis": "emphasis marks",
@@ -167,10 +179,30 @@ def parts(path: str, text: str) -> list[Part]:
 def _prose_parts(text: str, start: int, end: int) -> Iterator[Part]:
     for match in _INLINE.finditer(text, start, end):
         for name, value in match.groupdict().items():
-            if name == "formula" and value and not _RELATION.search(value):
-                yield Part("symbols", match.start(name), match.end(name))
-            elif value:
-                yield Part(name, match.start(name), match.end(name))
+            at, stop = match.span(name)
+            if name == "formula" and value:
+                name = _kind_of_formula(value)
+            elif words := _SOURCE.search(text, at, stop):
+                yield Part(name, at, words.start())
+                yield Part("words", *words.span())
+                at = words.end()
+            if value:
+                yield Part(name, at, stop)
+
+
+def _kind_of_formula(tex: str) -> str:
+    """Whether a formula relates anything, and whether to a number."""
+    sides = _RELATION.split(tex)
+    if len(sides) == 1:
+        return "symbols"
+    are_numbers = (re.search(r"\d", side) and not _has_letters(side) for side in sides)
+    return "formula" if any(are_numbers) else "relation"
+
+
+def _has_letters(tex: str) -> bool:
+    """Whether letters stand in a formula, other than those of units, functions and numbers."""
+    signs = _SIGN.finditer(_UNIT.sub("", tex))
+    return any(not sign[1] or sign[1] in _LETTERS for sign in signs)
 
 
 # --- changes

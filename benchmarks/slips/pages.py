@@ -16,7 +16,7 @@ Token: TypeAlias = tuple[str, str]
 """A word of prose, or something else that readers see or a browser does; with what it is."""
 _PIECES = re.compile(r"[^\W\d_][^\W_]*|\S")
 _PUNCTUATION = set(".,;:!?'\"()-/‘’“”–—…")
-_CODE = {"code", "pre", "math", "script", "style", "svg", "kbd", "samp"}
+_CODE = {"code", "pre", "math", "script", "style", "kbd", "samp"}
 _SAID = ("alt", "title", "aria-label", "content", "placeholder")
 """Attributes that hold prose."""
 _KEY = re.compile("[0-9a-f]{8}")

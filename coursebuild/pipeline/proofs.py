@@ -21,6 +21,7 @@ from coursebuild.core.model import (
     Course,
     Document,
     FeatureBlock,
+    Heading,
     Link,
     Mjcf,
     Recording,
@@ -40,7 +41,9 @@ from coursebuild.core.values import fingerprint
 from coursebuild.pipeline.verify import Verification
 from coursebuild.report.values import plural
 
-Kind: TypeAlias = Literal["output", "table", "value", "figure", "lab", "block", "link", "result"]
+Kind: TypeAlias = Literal[
+    "output", "table", "value", "figure", "lab", "block", "section", "link", "result"
+]
 KIND = "proofs"
 """That of entries of the store: what was proved of a document, by the hash of its path."""
 _OPAQUE = regex(r"[A-Za-z][\w+.-]*:(?!//)")
@@ -173,6 +176,10 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
         if fence is not None and fence["word"] not in _TRIED:
             name = f"the block `{fence['word']}`"
             yield _proved("block", name, _fenced_line(block.span), block.span)
+    for heading in find_blocks(document, Heading):
+        if heading.goes_further:
+            title = heading.span.text.rpartition(" {")[0].lstrip("# ")
+            yield _proved("section", f"the optional section `{title}`", title, heading.span)
     for span in (s for f in features() if f.proofs is not None for s in f.proofs(document)):
         if numbers := _NUMBER.findall(span.text):
             yield _proved("result", f"the result `{numbers[-1]}`", numbers[-1], span)

@@ -90,10 +90,11 @@ def test_a_link_that_became_text_is_told(make: Make, old: str, new: str, remark:
 
 
 @pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["blocks"])
-def test_a_block_whose_word_is_misspelt_is_told(
+def test_a_block_or_section_whose_word_is_misspelt_is_told(
     make: Make, old: str, new: str, remark: str
 ) -> None:
     question = '{"kind": "numeric", "id": "a", "q": "One and one?", "answer": 2, "tol": 0.1}'
     quiz = f'```quiz\n{{"id": "1.1-q", "title": "Q", "questions": [\n{question}]}}\n```\n\n'
-    lesson = f"## Sums\n\n{quiz}```mjcf\n<mujoco/>\n```\n"
+    section = "\n### The *sum* {#sum .further}\n\nIt is two.\n"
+    lesson = f"## Sums\n\n{quiz}```mjcf\n<mujoco/>\n```\n{section}"
     assert_told(make, lesson, old, new, remark)

@@ -125,6 +125,7 @@ _WORDING = (
         re.compile(r"""^(?:Unsupported [\w ]+: |Function "|Got [\w ]+: ')\\?(.+?)(?:" is.*|')?$"""),
         r"unknown command \\\1",
     ),
+    (re.compile(r"^Can't use function '(.+)' in text mode$"), r"\1 cannot stand in text"),
     (re.compile(r"^Expected 'EOF', got (.*)$", re.DOTALL), r"unexpected \1"),
     (re.compile(r"^Too many expansions.*$", re.DOTALL), "a macro expands without end"),
     (re.compile(r"'EOF'"), "the end of the formula"),

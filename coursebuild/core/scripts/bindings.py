@@ -328,7 +328,8 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         return mismatch
     elif places_now:
         place, better = places_now[0], text.rewrite(places_now[0])
-        if better and not BoundText.of(better, text.comma, may_join=True).is_in([place.output]):
+        better_text = BoundText.of(better, bool(text.comma), may_join=True)
+        if better and not better_text.is_in([place.output]):
             better = ""  # other numbers have its words or unit
         are = "are" if len(text.numbers) > 1 else "is"
         label = f"{place.text} {are} printed there now, in `{plain_text(place.line.text)}`"

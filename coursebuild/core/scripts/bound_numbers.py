@@ -59,8 +59,8 @@ class BoundText(Struct, frozen=True):
     numbers: tuple[Number, ...]
     after: str
 
-    comma: bool = False
-    """Whether its numbers were written with a comma before the decimals; here it is a point."""
+    comma: str = ""
+    """What stood before decimals, if a comma or TeX's `{,}` did; here it is a point."""
     space: str = ""
     """What parted thousands, if a space did; here it is a comma."""
     decimal_space: str = ""
@@ -76,9 +76,12 @@ class BoundText(Struct, frozen=True):
             without_gaps = replace_ranges(text, ((*gap, "") for gap in gaps))
             bound_text = cls.of(without_gaps, comma, may_join=True)
             return replace(bound_text, decimal_space=text[slice(*gaps[0])])
+        sign = "{,}" if "{,}" in text else ","
+        text = text.replace(sign, ",")
         pointed = as_printed(join_thousands(text) if may_join else text, comma)
         if pointed != text:
-            return replace(cls.of(pointed), comma=comma, space=group_space(text))
+            sign = sign if comma else ""
+            return replace(cls.of(pointed), comma=sign, space=group_space(text))
         numbers = numbers_of_quantities(text, scan_prose(text))
         if not numbers:
             return cls(text, plain_text(text), (), "")
@@ -113,7 +116,7 @@ class BoundText(Struct, frozen=True):
             number = re.sub(
                 r"\.[0-9]{4,}", lambda m: self.decimal_space.join(_DECIMALS.findall(m[0])), number
             )
-        number = write_comma(number) if self.comma else number
+        number = write_comma(number).replace(",", self.comma) if self.comma else number
         return number.replace("." if self.comma else ",", self.space) if self.space else number
 
     def is_in(self, outputs: Iterable[PrintedText]) -> bool:

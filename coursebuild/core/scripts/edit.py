@@ -317,7 +317,7 @@ def _update_table(
             span, text = cell.span(old), number_text(old, new, comparison)
             number = BoundText.of(span.text, table.comma, may_join=True)
             if number.text.replace(MINUS, "-") != old.text:
-                reason = "a number written with an entity or an escape cannot be replaced"
+                reason = "a number written with an entity, an escape or a macro cannot be replaced"
                 return refusal(span, reason)
             # The minus signs of the old number stay: before it, and in its exponent.
             halves = (re.split("(?=[eE])", h) for h in (span.text, number.as_written(text)))

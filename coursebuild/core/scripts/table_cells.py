@@ -23,6 +23,7 @@ from coursebuild.core.scripts.lines import (
     numbers_fit,
     same_number,
 )
+from coursebuild.core.text.macros import COMMAND
 from coursebuild.core.text.numbers import (
     Number,
     as_printed,
@@ -44,7 +45,7 @@ from coursebuild.core.text.quantities import (
     unit_of_header,
 )
 from coursebuild.core.text.regex import regex
-from coursebuild.core.text.source import Span
+from coursebuild.core.text.source import Excerpt, Span
 
 _RUN = regex(r"\s{2,}|(?<![0-9])[^\S ]|[^\S ](?![0-9])")
 """What is one space in a cell; not what may part thousands."""
@@ -195,7 +196,8 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
             case model.NumberBinding():
                 text, span = inline.text, inline.text_span
             case model.Math():
-                text, span = inline.tex.text, inline.tex.span()
+                stretches.append(_formula_text(inline.tex))
+                continue
             case model.Image():
                 text = inline.alt
             case model.SoftBreak() | model.HardBreak():
@@ -212,6 +214,16 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
     mapped = apply_filters(MappedText.join(stretches), filters)
     folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
     return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)
+
+
+def _formula_text(tex: Excerpt) -> MappedText:
+    """A formula; what a macro stands for stands where its name does."""
+    starts = [tex.offset(at) for at in range(len(tex.text))]
+    names = (COMMAND.match(tex.source.text, start) for start in starts)
+    ends = [
+        start + 1 if name is None else name.end() for start, name in zip(starts, names, strict=True)
+    ]
+    return MappedText(tex.text, starts, ends)
 
 
 def cell_matches(recorded: Number, printed: Number, comparison: model.Comparison) -> bool:

@@ -45,8 +45,8 @@ _MISQUOTED = regex(
 )
 _SPACES = regex(r"\s+")
 _NUMBER = regex(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
-_RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?![,\d])((?s:.*))\Z")
-_WITH_COMMA = regex(_RESULT.pattern.replace(r"\.", ","))
+_RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?!\{{?[,\d])((?s:.*))\Z")
+_WITH_COMMA = regex(_RESULT.pattern.replace(r"\.", r"(?:,|\{,\})"))
 """A formula that ends with a number, and what stands behind it."""
 
 _TERM_HELP = 'write `{term}`, or `{term="headword"}` if the glossary should name it differently'
