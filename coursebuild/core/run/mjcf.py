@@ -91,8 +91,11 @@ def compile_or_recall(
 ) -> tuple[CompileResult, ...]:
     """A result for each text, see `compile_all`; `stage` is entered if one has to be compiled."""
     keys = {model: model_key(root, *model) for model in texts}
-    entries = {model: store.get_value(_KIND, key, CompileResult) for model, key in keys.items()}
-    results = {model: result for model, result in entries.items() if result is not None}
+    results = {
+        model: result
+        for model, key in keys.items()
+        if (result := store.get_value(_KIND, key, CompileResult)) is not None
+    }
     uncompiled = [model for model in keys if model not in results]
     if uncompiled:
         with stage():

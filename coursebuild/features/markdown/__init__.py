@@ -1,7 +1,5 @@
 """Every page as plain Markdown, and the list of these copies."""
 
-from __future__ import annotations
-
 from coursebuild.api import Feature, PageCopy, on_demand
 
 FEATURE = Feature(

@@ -50,13 +50,13 @@ def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> by
     """Return the text of a page; empty if it has no copy."""
     if not has_copies(inputs.head.path):
         return b""
+    place = urls.Place(inputs.head.path)
+    locate = functools.partial(markdown_href, place)
     if page is None or inputs.head.kind == "home":
-        path = urls.Place(inputs.head.path)
-        text = html_to_markdown(body, lambda href: markdown_href(path, href))
+        text = html_to_markdown(body, locate)
         return visible(f"{text}\n").encode()
-    place, words, document = page.place, page.renderer.words, page.document
-    page_href = place.href(place.path)
-    writer = DocumentWriter(page, lambda href: markdown_href(place, href), page_href)
+    words, document = page.renderer.words, page.document
+    writer = DocumentWriter(page, locate, place.href(place.path))
     rows = []
     scripts = inputs.values.get("scripts")
     if isinstance(scripts, tuple) and scripts:
@@ -67,11 +67,11 @@ def note_markdown(inputs: PageInputs, page: PageContext | None, body: str) -> by
         ("previous", "lesson.previous"),
         ("following", "lesson.next"),
     ):
-        links = lesson_links(inputs.values.get(name), writer.locate)
+        links = lesson_links(inputs.values.get(name), locate)
         if links:
             rows.append(f"{escape_line(words(key))}: {', '.join(links)}")
     parts = (
-        *head(inputs, words, writer.locate),
+        *head(inputs, words, locate),
         writer.blocks(document.blocks),
         writer.footnotes(document.footnotes),
         writer.references(),

@@ -1,7 +1,5 @@
 """Lessons as Jupyter notebooks that run."""
 
-from __future__ import annotations
-
 from coursebuild.api import Feature, PageCopy, on_demand
 
 FEATURE = Feature(

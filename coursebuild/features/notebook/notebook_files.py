@@ -155,8 +155,8 @@ def _script_cells(writer: DocumentWriter, section: str, block: _ScriptBlock) -> 
     output = None
     remarks: list[str] = []
     for recording in recordings:
-        is_first = is_run and output is None and not script.parts
-        if is_first and not isinstance(recording.body, model.Table):
+        is_table = isinstance(recording.body, model.Table)
+        if is_run and output is None and not script.parts and not is_table:
             output = f"{recording.body.text.rstrip()}\n"
             remarks.append(f"{writer.caption(recording)} {writer.receipt(recording)}")
         else:
@@ -197,7 +197,7 @@ def notebook_files(site: SiteContext) -> Iterator[CachedFile]:
         lesson = site.library.lessons[page.id]
         archive = site.archives.get(urls.lesson_zip_path(lesson))
         language = site.library.words.language
-        installs = str(site.library.course.launch is not None)
+        installs = site.library.course.launch is not None
         key = step_key("notebook", language, installs, page.digest, archive.key if archive else "")
         path = urls.copy_path(page.path, ".ipynb")
         yield CachedFile(
@@ -210,11 +210,11 @@ def _write_notebook(
 ) -> bytes:
     head, *cells = json.loads(site.note(page))
     setup = () if archive is None else _setup_cells(site, lesson, archive)
-    names = [author.name for author in site.library.course.authors]
+    authors = [{"name": author.name} for author in site.library.course.authors]
     document = {
         "cells": [head, *setup, *cells],
         "metadata": {
-            **({"authors": [{"name": name} for name in names]} if names else {}),
+            **({"authors": authors} if authors else {}),
             "kernelspec": {
                 "display_name": "Python 3 (ipykernel)",
                 "language": "python",

@@ -1,7 +1,5 @@
 """The pages of the hard cases, and the command that measures them."""
 
-from __future__ import annotations
-
 from coursebuild.api import Command, Feature, PageKind, on_demand
 
 KIND = PageKind(

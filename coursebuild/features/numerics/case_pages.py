@@ -84,11 +84,9 @@ _SHADES = 3
 
 def case_families(library: Library) -> dict[str, tuple[CaseReport, ...]]:
     """The cases by the id of their family, which names its page."""
-    cases = sorted(library.reports.cases, key=attrgetter("case"))
-    return {
-        f"case-{number}": tuple(reports)
-        for number, reports in groupby(cases, key=attrgetter("case"))
-    }
+    number_of = attrgetter("case")
+    groups = groupby(sorted(library.reports.cases, key=number_of), key=number_of)
+    return {f"case-{number}": tuple(reports) for number, reports in groups}
 
 
 def _family_title(words: Strings, reports: tuple[CaseReport, ...]) -> str:
@@ -108,7 +106,6 @@ def numerics_values(library: Library) -> dict[str, object]:
         families.append(CaseFamily(_family_title(words, reports), href, rows))
     return {
         "families": tuple(families),
-        "columns": ("largest", "order", "cost"),
         "integrators": INTEGRATORS,
         **_sources(library, place),
     }
@@ -141,9 +138,8 @@ def _labs(
 
 def _sources(library: Library, place: urls.Place) -> dict[str, object]:
     """What was measured where, and the file with all of it."""
-    reports = [report for family in case_families(library).values() for report in family]
-    machines = dict.fromkeys(grids.machine_text(library.words, r.machine) for r in reports)
-    return {"where": machines, "file": place.href(urls.file_path(STABILITY.path()))}
+    texts = (grids.machine_text(library.words, case.machine) for case in library.reports.cases)
+    return {"where": dict.fromkeys(texts), "file": place.href(urls.file_path(STABILITY.path()))}
 
 
 def _matrix(words: Strings, report: CaseReport) -> tuple[tuple[MatrixCell, ...], ...]:

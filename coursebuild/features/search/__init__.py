@@ -1,7 +1,5 @@
 """The search: its page, its script, and the index of a course."""
 
-from __future__ import annotations
-
 from coursebuild.api import Feature, PageKind, PagePart, on_demand
 
 _PAGE = PageKind(
