@@ -44,6 +44,7 @@ UNTRIED = {
     r"rsync|npx|coursebuild \w+ --cache s3:": "needs a server, and whoever may write to it",
     r"code ": "needs Visual Studio Code",
     r"make (site|test|quick|pages|release-files)": "makes all that the tests are part of",
+    r"pytest --coursebuild": "tried in cli/test_pytest_plugin.py",
     r"pytest tests": "tried in features/authoring/test_new.py",
     r"coursebuild (-C \S+ )?(serve|lsp)": "runs until it ends; tried in pipeline/test_serving.py",
     r"coursebuild (-C \S+ )?(bench|stability|diet)": (

@@ -122,7 +122,11 @@ def test_metadata_names_the_command_and_the_ranges(
     assert bool(links) == bool(REPOSITORY or SITE), "a repository without an owner has no address"
     assert [link for link in links if "OWNER" in link or "//example." in link] == []
     points = archive.read(f"{info}/entry_points.txt").decode()
-    assert "coursebuild = coursebuild.cli:main" in points
+    for line in (
+        "coursebuild = coursebuild.cli:main",
+        "coursebuild = coursebuild.cli.pytest_plugin",
+    ):
+        assert line in points
 
 
 def test_sdist_holds_the_sources_and_what_was_bundled(root: Path, sdist: Path) -> None:

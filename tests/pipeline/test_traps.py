@@ -122,6 +122,23 @@ def test_no_trap_runs_in_an_editor(traps: TrapFolder) -> None:
 
 
 @pytest.mark.site
+def test_no_trap_runs_in_a_run_of_pytest(traps: TrapFolder) -> None:
+    """Its own settings in the folder are obeyed, as pytest's rules are; ours are not sought."""
+    folder = traps.folder
+    for host in ("conftest.py", "setup.cfg", "pyproject.toml"):
+        (folder.root / host).unlink()
+    result = subprocess.run(
+        [sys.executable, "-P", "-m", "pytest", "-q", "--coursebuild", "-p", "no:cacheprovider"],
+        cwd=folder.root,
+        env=folder.environment(variables()),
+        capture_output=True,
+        text=True,
+    )
+    assert traps.marks() == [], result.stdout
+    assert "passed" in result.stdout, result.stdout + result.stderr
+
+
+@pytest.mark.site
 def test_no_trap_runs_in_a_hook_or_an_action(traps: TrapFolder, tmp_path: Path) -> None:
     """The lines that pre-commit and a workflow give to a shell, each in the course's folder."""
     hooks = yaml.safe_load((ROOT / ".pre-commit-hooks.yaml").read_text())
