@@ -155,9 +155,9 @@ def _script_cells(writer: DocumentWriter, section: str, block: _ScriptBlock) -> 
     output = None
     remarks: list[str] = []
     for recording in recordings:
-        is_table = isinstance(recording.body, model.Table)
-        if is_run and output is None and not script.parts and not is_table:
-            output = f"{recording.body.text.rstrip()}\n"
+        body = recording.body
+        if is_run and output is None and not (script.parts or isinstance(body, model.Table)):
+            output = f"{body.text.rstrip()}\n"
             remarks.append(f"{writer.caption(recording)} {writer.receipt(recording)}")
         else:
             remarks.append(writer.recording(recording))
