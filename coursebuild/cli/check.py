@@ -18,7 +18,6 @@ from coursebuild.output import CLEAN, write
 from coursebuild.pipeline import arguments as shared
 from coursebuild.pipeline.arguments import options_of, print_report, report_text
 from coursebuild.pipeline.check import check
-from coursebuild.pipeline.fix import fix, proposals, propose
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.shards import read_shard
 from coursebuild.report import Report, unchanged_report
@@ -85,12 +84,15 @@ def run(arguments: argparse.Namespace) -> int:
             sensitivity=arguments.sensitivity,
             truth=arguments.truth,
         )
-        safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
         remarks = [*report.remarks]
-        if safe:
-            remarks.append(f"`coursebuild check --fix` fixes {safe} of {len(report.diagnostics)}")
-        if count := len(proposals(report.diagnostics)):
-            remarks.append(f"`coursebuild check --propose` has {plural(count, 'proposal')}")
+        if report.diagnostics:
+            from coursebuild.pipeline.fix import proposals
+
+            safe = sum(diagnostic.safe for diagnostic in report.diagnostics)
+            of_all = f"{safe} of {len(report.diagnostics)}"
+            remarks += [f"`coursebuild check --fix` fixes {of_all}"] if safe else []
+            if count := len(proposals(report.diagnostics)):
+                remarks.append(f"`coursebuild check --propose` has {plural(count, 'proposal')}")
         if arguments.hints:
             return replace(report, remarks=tuple(remarks), diagnostics=with_hints(report))
         if report.hints:
@@ -108,6 +110,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _mend(arguments: argparse.Namespace) -> int:
     """Mend what can be mended, and print what is left."""
+    from coursebuild.pipeline.fix import fix, propose
+
     option = "--fix" if arguments.fix else "--propose"
     conflicts = ["--propose"] if arguments.fix and arguments.propose else []
     conflicts += (o for o in _special_options(arguments) if (option, o) != ("--propose", "--truth"))

@@ -45,7 +45,6 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.held import HeldDocuments
 from coursebuild.pipeline.options import Options, Progress
 from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
-from coursebuild.pipeline.script_downloads import find_downloads, try_downloads
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
     extract_scripts,
@@ -163,6 +162,8 @@ def with_downloads(
     course: Course, results: Results, options: Options, *, only_known: bool = False
 ) -> tuple[Results, tuple[Diagnostic, ...]]:
     """The results with what is handed over of scripts, after its trial; see `try_downloads`."""
+    from coursebuild.pipeline.script_downloads import find_downloads, try_downloads  # for a site
+
     scripts, runs = extract(course).value, results.runs
     downloads = find_downloads(course, scripts, runs, results.models, options)
     downloads, diagnostics = try_downloads(

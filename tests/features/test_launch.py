@@ -10,7 +10,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from coursebuild.core.model.course import Launch
-from coursebuild.features.notebook import launch_services
+from coursebuild.features.notebook.notebook_files import launch_services
 from support.fixture_cases import check_lines, fixture_text
 from support.rendered_course import MAP, Make
 

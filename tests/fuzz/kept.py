@@ -28,7 +28,7 @@ from coursebuild.core.text.diagnostics import Parsed
 from coursebuild.core.text.source import Source
 from coursebuild.core.values import DAMAGE, decode, encode
 from coursebuild.features.lab.export.script import LabExport
-from coursebuild.features.search import IndexPlan, join_slices, read_slices, sort_terms
+from coursebuild.features.search.index_files import IndexPlan, join_slices, sort_terms
 from fuzz.texts import PATH, lessons
 from support.random_lessons import KINDS
 from support.search_shards import read_shard
@@ -254,26 +254,18 @@ def manifests() -> Iterator[bytes]:
 
 
 def slices(data: bytes) -> None:
-    """What was kept is refused or can be actual; what is sorted now has each term where it was.
+    """What is sorted has each term where it was.
 
-    After the first byte: kept slices; or pages, between which is the byte 1, of terms with blanks.
+    After the first byte: pages, between which is the byte 1, of terms with blanks.
     """
-    form, payload = data[:1], data[1:]
     plan = IndexPlan(4, 2)
-    if form != AS_JSON:
-        kept_slices = read_slices(plan, payload)
-        for part in kept_slices or ():
-            read_shard(join_slices([part, part]))
-        return
-    texts = payload.decode("utf-8", "replace").split("\1")
+    texts = data[1:].decode("utf-8", "replace").split("\1")
     pages = [{term: len(term) % 16 for term in text.replace("\0", " ").split()} for text in texts]
     weighed = ["\n".join(f"{weight:x}{term}" for term, weight in page.items()) for page in pages]
     batches = [
         sort_terms(plan, (text.encode() for text in weighed[start : start + 16]))
         for start in range(0, len(weighed), 16)
     ]
-    for batch in batches:
-        assert read_slices(plan, b"\0".join(batch)) == batch
     actual: dict[str, list[tuple[int, int]]] = {}
     for parts in [*zip(*batches, strict=True)][: plan.terms]:
         actual |= read_shard(join_slices(parts))
@@ -285,8 +277,5 @@ def slices(data: bytes) -> None:
 
 
 def slice_groups() -> Iterator[bytes]:
-    yield WHOLE + b"\0\0\0\0\0"
-    yield WHOLE + b"a 01\nb 0213\0c 11\0\0d \0\0"
-    yield WHOLE + "é 01\nß 02\0\0\0\0é \0".encode()
     yield AS_JSON + "mass Energie \1 mass naïve 漢字\1\1x".encode()
     yield AS_JSON + b"\1".join(b"a b%d" % number for number in range(40))

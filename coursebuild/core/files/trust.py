@@ -30,8 +30,6 @@ _OWNER = "owner"
 _SIZE = hashlib.sha256().digest_size
 _NOWHERE = os.devnull
 """A folder that is not there and that nobody can make."""
-_MOST_READ = 1 << 28
-"""Bytes of the largest index of Git that is looked at."""
 
 
 def seal(name: str, data: bytes, key: bytes) -> bytes:
@@ -101,19 +99,19 @@ def store_key(root: str) -> bytes:
 
 
 def _read_key(path: str) -> bytes:
-    data = _read(path, _SIZE, os.geteuid())
+    data = _read(path, os.geteuid())
     return data if len(data) == _SIZE else b""
 
 
-def _read(path: str, limit: int, user: int | None = None) -> bytes:
-    """A regular file of a user, at most so large, that no link leads to; else empty."""
+def _read(path: str, user: int | None = None) -> bytes:
+    """A regular file of a user, no larger than a seal, that no link leads to; else empty."""
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError:
         return b""
     with open(descriptor, "rb") as file:
         status = os.fstat(descriptor)
-        if not stat.S_ISREG(status.st_mode) or status.st_size > limit:
+        if not stat.S_ISREG(status.st_mode) or status.st_size > _SIZE:
             return b""
         return b"" if user not in (None, status.st_uid) else file.read()
 
@@ -132,7 +130,7 @@ def find_store(root: str) -> tuple[str, str]:
     if not key:
         reason = "needs a key of its user's own, and there is nowhere to keep it"
         return _NOWHERE, f"{reason}: set HOME, XDG_STATE_HOME or {_SECRET}"
-    reason = _strangeness(root, folder, key)
+    reason = _strangeness(folder, key)
     if not reason:
         return folder, ""
     state = state_folder(root)
@@ -142,7 +140,7 @@ def find_store(root: str) -> tuple[str, str]:
     return os.path.join(state, "stores", name), reason
 
 
-def _strangeness(root: str, folder: str, key: bytes) -> str:
+def _strangeness(folder: str, key: bytes) -> str:
     """Why the folder may not be this user's own store; empty where it is, or can be made."""
     try:
         status = os.lstat(folder)
@@ -150,9 +148,7 @@ def _strangeness(root: str, folder: str, key: bytes) -> str:
             return FOREIGN
         if status.st_uid != os.geteuid():
             return "belongs to another user"
-        if _is_tracked(root):
-            return "is tracked by Git"
-        mark = _read(os.path.join(folder, _OWNER), _SIZE)
+        mark = _read(os.path.join(folder, _OWNER))
         if mark:
             return "" if unseal(_OWNER, mark, key) is not None else FOREIGN
         # Somebody may be about to put a mark into a new folder.
@@ -186,58 +182,3 @@ def replace_file(path: str, data: bytes) -> None:
         except OSError:
             pass
         raise
-
-
-def _is_tracked(root: str) -> bool:
-    """Whether the index of Git has the store of a course or something in it.
-
-    Git itself is not asked: it would obey the configuration that lies in the folder.
-    """
-    top = os.path.realpath(root)
-    name = FOLDER
-    while not os.path.lexists(os.path.join(top, ".git")):
-        if os.path.dirname(top) == top:
-            return False
-        name = f"{os.path.basename(top)}/{name}"
-        top = os.path.dirname(top)
-    git = os.path.join(top, ".git")
-    if not os.path.isdir(git):  # of a linked work tree
-        _, _, place = _read(git, 4096).partition(b"gitdir:")
-        git = os.path.join(top, os.fsdecode(place.strip()))
-    try:
-        names = os.listdir(git)
-    except OSError:
-        return False
-    target = os.fsencode(name).lower()  # as file systems that ignore case would find it
-    files = (os.path.join(git, n) for n in names if n == "index" or n.startswith("sharedindex."))
-    return any(_names(_read(file, _MOST_READ), target) for file in files)
-
-
-def _names(index: bytes, target: bytes) -> bool:
-    """Whether an index (gitformat-index(5)) has an entry of this name, or below it."""
-    if index[4:8] == b"\0\0\0\4":  # where each begins with a part of the one before: spell them out
-        at, name, names = 12, b"", []
-        try:
-            for _ in range(int.from_bytes(index[8:12], "big")):
-                at += 64 if index[at + 60] & 0x40 else 62
-                dropped = index[at] & 0x7F
-                while index[at] & 0x80:
-                    at += 1
-                    dropped = (dropped + 1 << 7) + (index[at] & 0x7F)
-                end = index.index(b"\0", at + 1)
-                name = name[: len(name) - dropped] + index[at + 1 : end]
-                names.append(min(len(name), 0xFFF).to_bytes(2, "big") + name + b"\0")
-                at = end + 1
-        except (IndexError, ValueError):  # damaged, or of a repository with longer hashes
-            pass
-        index = b"".join(names)
-    text = index.lower()
-    at = text.find(target)
-    while at >= 0:
-        end = text.find(b"\0", at)
-        # Before the name stands its length, perhaps with two bytes in between.
-        lengths = [int.from_bytes(index[s - 2 : s], "big") & 0xFFF for s in (at, at - 2)]
-        if text[at + len(target)] in b"/\0" and min(end - at, 0xFFF) in lengths:
-            return True
-        at = text.find(target, at + 1)
-    return False

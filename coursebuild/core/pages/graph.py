@@ -20,21 +20,19 @@ The same graph gives the same layout: ties are broken by the order of the nodes.
 from __future__ import annotations
 
 import functools
-from bisect import bisect_right, insort
 from collections.abc import Iterable, Mapping, Sequence
 from graphlib import TopologicalSorter
-from itertools import pairwise
+from itertools import accumulate, combinations, pairwise, product
+from statistics import fmean
 from typing import TypeAlias
 
-from markupsafe import Markup, escape
 from msgspec import Struct
 
-from coursebuild.core.drawing.scales import markup_text, shorten_to_width, text_width
+from coursebuild.core.drawing.scales import shorten_to_width, text_width
 from coursebuild.core.model import Lesson, Level
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.context import GraphNode, LessonGraph
 from coursebuild.core.pages.library import Library
-from coursebuild.core.pages.renderer import Strings
 
 _MOST_LINKED = 5
 """The most prerequisites that are shown of a lesson, and the most lessons it leads to."""
@@ -47,17 +45,15 @@ _MOST_IN_LEVEL = 40
 class _Look(Struct, frozen=True):
     """Sizes in the units of the drawing, which are the pixels of CSS."""
 
+    name: str
     width: float
     height: float
     gap: float
     step: float
-    titles: bool
 
 
-_WIDE = _Look(132, 56, 12, 92, True)
-_NARROW = _Look(50, 30, 5, 58, False)
+_WIDE, _NARROW = _Look("wide", 132, 56, 12, 92), _Look("narrow", 50, 30, 5, 58)
 _SIZE = 12.0
-_LINE = 15.0
 _CROSSING_WIDTH = 0.2
 """Room for an arrow that crosses a layer, in widths of nodes."""
 _EDGE = 2.0
@@ -122,91 +118,73 @@ def _graph(
 # --- drawing
 
 
-def drawings(graph: LessonGraph, words: Strings) -> tuple[Markup, Markup]:
+class DrawnNode(Struct, frozen=True):
+    """A node with the middle of its upper edge, and the lines of its title."""
+
+    node: GraphNode
+    x: float
+    top: float
+    lines: list[str]
+
+
+class Drawing(Struct, frozen=True):
+    """A graph as `partials/graph.html` draws it."""
+
+    name: str
+    """`wide`, with titles, or `narrow`, without."""
+    width: float
+    height: float
+    node_width: float
+    node_height: float
+    edges: str
+    """The path of all arrows, and that of their heads."""
+    heads: str
+    nodes: tuple[DrawnNode, ...]
+
+
+def drawings(graph: LessonGraph) -> tuple[Drawing, Drawing]:
     """The drawing with titles and the one without, both with the same layout."""
     numbers = {node.id: number for number, node in enumerate(graph.nodes)}
     edges = tuple((numbers[a], numbers[b]) for a, b in graph.edges)
     layout = layered_layout(len(numbers), edges, _CROSSING_WIDTH)
-    return _drawing(graph, layout, words, _WIDE), _drawing(graph, layout, words, _NARROW)
+    return _drawing(graph, layout, _WIDE), _drawing(graph, layout, _NARROW)
 
 
-def _drawing(graph: LessonGraph, layout: Layout, words: Strings, look: _Look) -> Markup:
-    longest = max(text_width(node.id, _SIZE) for node in graph.nodes)
-    wide = max(look.width, longest + 26)
-    unit = wide + look.gap
+def _drawing(graph: LessonGraph, layout: Layout, look: _Look) -> Drawing:
+    node_width = max(look.width, 26 + max(text_width(node.id, _SIZE) for node in graph.nodes))
+    unit, edges, heads = node_width + look.gap, "", ""
+    left = _EDGE - look.gap / 2
+    for edge in layout.edges:
+        xs = [left + x * unit for x in edge.xs]
+        top = _EDGE + edge.layer * look.step
+        edges += f"M{xs[0]:.1f} {top + look.height:.1f}"
+        for x, following in pairwise(xs):
+            bend = top + (look.height + look.step) / 2
+            top += look.step
+            edges += f"C{x:.1f} {bend:.1f} {following:.1f} {bend:.1f} {following:.1f} {top:.1f}"
+            edges += f"v{look.height:g}"  # behind the node, at the end
+        heads += f"M{xs[-1] - 4:.1f} {top - 7:.1f}l4 7 4-7z"
+    nodes = (
+        DrawnNode(
+            node,
+            left + place.x * unit,
+            _EDGE + place.layer * look.step,
+            _title_lines(node.title, node_width - 12) if look is _WIDE else [],
+        )
+        for node, place in zip(graph.nodes, layout.nodes, strict=True)
+    )
     width = layout.width * unit - look.gap + 2 * _EDGE
     height = (layout.layers - 1) * look.step + look.height + 2 * _EDGE
-    name = "wide" if look.titles else "narrow"
-    parts = [
-        f'<svg class="graph-{name}" width="{width:.0f}" height="{height:.0f}" role="group"'
-        f' aria-label="{escape(words("graph.label"))}">',
-    ]
-    lines, heads = [], []
-    for edge in layout.edges:
-        xs = [_x(x, unit, look) for x in edge.xs]
-        top = _EDGE + edge.layer * look.step
-        path = [f"M{xs[0]:.1f} {top + look.height:.1f}"]
-        for number, (x, following) in enumerate(pairwise(xs), 1):
-            start, top = top + look.height, top + look.step
-            bend = (start + top) / 2
-            path.append(f"C{x:.1f} {bend:.1f} {following:.1f} {bend:.1f} {following:.1f} {top:.1f}")
-            if number < len(xs) - 1:
-                path.append(f"v{look.height:.1f}")
-        lines.append("".join(path))
-        heads.append(f"M{xs[-1] - 4:.1f} {top - 7:.1f}l4 7 4-7z")
-    if lines:
-        parts.append(f'<path class="edges" d="{"".join(lines)}"/>')
-        parts.append(f'<path class="heads" d="{"".join(heads)}"/>')
-    for node, placed_node in zip(graph.nodes, layout.nodes, strict=True):
-        x, top = _x(placed_node.x, unit, look), _EDGE + placed_node.layer * look.step
-        parts.append(_node(node, x, top, wide, words, look))
-    return Markup("".join((*parts, "</svg>")))
+    sizes = width, height, node_width, look.height
+    return Drawing(look.name, *sizes, edges, heads, tuple(nodes))
 
 
-def _x(place: float, unit: float, look: _Look) -> float:
-    return place * unit - look.gap / 2 + _EDGE
-
-
-def _node(node: GraphNode, x: float, top: float, width: float, words: Strings, look: _Look) -> str:
-    """A node, its middle at `x`, with its status as a full or half disc, or a ring."""
-    kinds = f"node node-{node.status}" + (" node-outside" if node.outside else "")
-    left, middle = x - width / 2, top + look.height / 2
-    texts: list[str] = []
-    if look.titles:
-        room, line, title_words = width - 12, "", node.title.split()
-        while title_words and text_width(f"{line} {title_words[0]}".strip(), _SIZE) <= room:
-            line = f"{line} {title_words.pop(0)}".strip()
-        lines = (line, shorten_to_width(" ".join(title_words), room, _SIZE))
-        texts = [text for text in lines if text]
-    first = middle + 4.3 - len(texts) * _LINE / 2
-    id_x, mark_x, mark_y = x, left + 10, top + 10
-    if not look.titles:  # the mark is on the line of the number
-        id_x += 5.5
-        mark_x, mark_y = id_x - text_width(node.id, _SIZE) / 2 - 7, middle
-    inner = [
-        f'<rect x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{look.height:.1f}"'
-        ' rx="3"/>',
-        f'<circle class="ring" cx="{mark_x:.1f}" cy="{mark_y:.1f}" r="3.5"/>',
-    ]
-    if node.status == "complete":
-        inner.append(f'<circle class="done" cx="{mark_x:.1f}" cy="{mark_y:.1f}" r="3.5"/>')
-    elif node.status == "draft":
-        half = f"M{mark_x:.1f} {mark_y - 3.5:.1f}a3.5 3.5 0 0 0 0 7z"
-        inner.append(f'<path class="done" d="{half}"/>')
-    inner.append(
-        f'<text class="node-id" x="{id_x:.1f}" y="{first:.1f}">{markup_text(node.id)}</text>'
-    )
-    for number, text in enumerate(texts, 1):
-        y = first + number * _LINE
-        inner.append(f'<text x="{x:.1f}" y="{y:.1f}">{markup_text(text)}</text>')
-    content = " ".join(inner)
-    if node.current:
-        return f'<g class="{kinds} node-current">{content}</g>'
-    name = ""
-    if not look.titles:  # otherwise the texts name it
-        status = words(f"status.{node.status}")
-        name = f' aria-label="{markup_text(f"{node.id} {node.title} ({status})")}"'
-    return f'<a class="{kinds}" href="{escape(node.href)}"{name}>{content}</a>'
+def _title_lines(title: str, room: float) -> list[str]:
+    """A title on one line or on two, of which the second is cut."""
+    line, words = "", title.split()
+    while words and text_width(f"{line} {words[0]}".strip(), _SIZE) <= room:
+        line = f"{line} {words.pop(0)}".strip()
+    return [text for text in (line, shorten_to_width(" ".join(words), room, _SIZE)) if text]
 
 
 # --- layout
@@ -216,10 +194,6 @@ _Point: TypeAlias = int | tuple[int, int, int]
 
 _SWEEPS = 12
 _PASSES = 40
-_BOTH_SIDES = 32
-"""The last passes, which use the layers above and below at once."""
-_STRAIGHT = 20.0
-"""The weight of an edge that is the only one of both its ends on that side."""
 
 
 class PlacedNode(Struct, frozen=True):
@@ -293,7 +267,11 @@ def layered_layout(count: int, edges: tuple[tuple[int, int], ...], passing: floa
     children = _neighbours(links, upwards=False)
     rows = _order_rows(rows, parents, children)
     half_widths = {p: (1.0 if isinstance(p, int) else passing) / 2 for row in rows for p in row}
-    x = _place_points(rows, parents, children, half_widths)
+    neighbours = {
+        point: [*parents.get(point, ()), *children.get(point, ())] or [point]
+        for point in half_widths
+    }
+    x = _place_points(rows, neighbours, half_widths)
     left = min((x[point] - half_widths[point] for point in x), default=0.0)
     right = max((x[point] + half_widths[point] for point in x), default=0.0)
     return Layout(
@@ -328,14 +306,13 @@ def _order_rows(
         down = sweep % 2 == 0
         fixed_neighbours = parents if down else children
         rows = [list(row) for row in rows]
-        order = range(1, len(rows)) if down else range(len(rows) - 2, -1, -1)
-        for level in order:
-            fixed_row = rows[level - 1] if down else rows[level + 1]
-            places = {point: float(position) for position, point in enumerate(fixed_row)}
-            means: dict[_Point, float] = {}
-            for position, point in enumerate(rows[level]):
-                near = [places[neighbour] for neighbour in fixed_neighbours.get(point, ())]
-                means[point] = sum(near) / len(near) if near else float(position)
+        for level in range(1, len(rows)) if down else range(len(rows) - 2, -1, -1):
+            fixed_row = rows[level - 1 if down else level + 1]
+            places = {point: position for position, point in enumerate(fixed_row)}
+            means = {
+                point: fmean([places[n] for n in fixed_neighbours.get(point, ())] or [position])
+                for position, point in enumerate(rows[level])
+            }
             rows[level].sort(key=means.__getitem__)
         crossings = _crossings(rows, children)
         if crossings < fewest:
@@ -347,61 +324,32 @@ def _crossings(rows: Sequence[list[_Point]], children: Mapping[_Point, list[_Poi
     count = 0
     for upper, lower in pairwise(rows):
         places = {point: position for position, point in enumerate(lower)}
-        ends_so_far: list[int] = []
-        for point in upper:
-            ends = sorted(places[neighbour] for neighbour in children.get(point, ()))
-            count += sum(len(ends_so_far) - bisect_right(ends_so_far, end) for end in ends)
-            for end in ends:
-                insort(ends_so_far, end)
+        ends = [[places[child] for child in children.get(point, ())] for point in upper]
+        pairs = (pair for a, b in combinations(ends, 2) for pair in product(a, b))
+        count += sum(first > second for first, second in pairs)
     return count
 
 
 def _place_points(
     rows: Sequence[list[_Point]],
-    parents: Mapping[_Point, list[_Point]],
-    children: Mapping[_Point, list[_Point]],
+    neighbours: Mapping[_Point, list[_Point]],
     half_widths: Mapping[_Point, float],
 ) -> dict[_Point, float]:
     x: dict[_Point, float] = {}
     steps: list[list[float]] = []
     for row in rows:
-        position, places = 0.0, []
-        for point in row:
-            places.append(position + half_widths[point])
-            position += 2 * half_widths[point]
-        middle = position / 2
-        steps.append(places)
-        x |= {point: place - middle for point, place in zip(row, places, strict=True)}
-    weights = _weigh_neighbours(parents, children), _weigh_neighbours(children, parents)
+        ends = list(accumulate((2 * half_widths[point] for point in row), initial=0.0))
+        steps.append([(start + end) / 2 for start, end in pairwise(ends)])
+        x |= {p: place - ends[-1] / 2 for p, place in zip(row, steps[-1], strict=True)}
     for number in range(_PASSES):
-        down = number % 2 == 0
-        sides = weights if number >= _PASSES - _BOTH_SIDES else weights[:1] if down else weights[1:]
-        for level in range(len(rows)) if down else reversed(range(len(rows))):
+        levels = range(len(rows))
+        for level in reversed(levels) if number % 2 else levels:
             row, places = rows[level], steps[level]
-            offsets = []
-            for point, place in zip(row, places, strict=True):
-                pairs = [pair for side in sides for pair in side.get(point, ())]
-                best = x[point]  # without neighbours it stays where it is
-                if pairs:
-                    best = sum(weight * x[neighbour] for neighbour, weight in pairs)
-                    best /= sum(weight for _, weight in pairs)
-                offsets.append(best - place)
+            near = ([x[neighbour] for neighbour in neighbours[p]] for p in row)
+            offsets = [fmean(xs) - place for xs, place in zip(near, places, strict=True)]
             fitted = zip(row, places, _isotonic_regression(offsets), strict=True)
             x |= {point: place + offset for point, place, offset in fitted}
     return x
-
-
-def _weigh_neighbours(
-    neighbours: Mapping[_Point, list[_Point]], opposite: Mapping[_Point, list[_Point]]
-) -> dict[_Point, list[tuple[_Point, float]]]:
-    """The neighbours on one side with their weights; `opposite` are their neighbours back."""
-    return {
-        point: [
-            (neighbour, _STRAIGHT if len(points) == len(opposite[neighbour]) == 1 else 1.0)
-            for neighbour in points
-        ]
-        for point, points in neighbours.items()
-    }
 
 
 def _isotonic_regression(values: Sequence[float]) -> list[float]:

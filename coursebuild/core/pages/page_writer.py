@@ -398,7 +398,7 @@ def draw(
                 lines = highlight_lines(value.language, value.text)
                 values[name] = numbered_lines(lines, value.path)
             case LessonGraph():
-                values[name] = drawings(value, renderer.words)
+                values[name] = drawings(value)
             case AddedParts():
                 parts = model_parts()
                 html = (parts[key].draw(renderer, part) for key, part in value.values.items())

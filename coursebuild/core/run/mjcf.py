@@ -34,7 +34,7 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Limits
 from coursebuild.core.model.course import MJCF_KEYWORDS
 from coursebuild.core.model.results import CompileResult, Misspelling, ModelFacts
-from coursebuild.core.run import compile_main, mujoco_files
+from coursebuild.core.run import mujoco_files
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.mujoco_files import ATTRIBUTE, MARKUP, ModelFiles
 from coursebuild.core.run.script_environment import engine_version
@@ -46,9 +46,9 @@ _ONE = 0.5
 """
 _LEAST = 0.01
 """Seconds; where less is left, nothing is compiled any more."""
-_CODE = tuple(
-    Path(m).read_bytes() for m in (__file__, compile_main.__file__, mujoco_files.__file__)
-)
+PROGRAM = str(Path(__file__).with_name("compile_main.py"))
+"""That of the child."""
+_CODE = tuple(Path(m).read_bytes() for m in (__file__, PROGRAM, mujoco_files.__file__))
 """The code that compiles models and reads their facts."""
 OWN_FAULT = "MuJoCo's compiler "
 """How messages begin that are about the process that compiles."""
@@ -91,8 +91,11 @@ def compile_or_recall(
 ) -> tuple[CompileResult, ...]:
     """A result for each text, see `compile_all`; `stage` is entered if one has to be compiled."""
     keys = {model: model_key(root, *model) for model in texts}
-    entries = {model: store.get_value(_KIND, key, CompileResult) for model, key in keys.items()}
-    results = {model: result for model, result in entries.items() if result is not None}
+    results = {
+        model: result
+        for model, key in keys.items()
+        if (result := store.get_value(_KIND, key, CompileResult)) is not None
+    }
     uncompiled = [model for model in keys if model not in results]
     if uncompiled:
         with stage():
@@ -114,7 +117,7 @@ def model_key(root: Path, path: str, text: str) -> str:
 
 class _Compiler(JsonChild):
     def __init__(self, root: Path, limits: Limits, python: str | None) -> None:
-        super().__init__(compile_main.__file__, limits.models, python, memory=limits.memory)
+        super().__init__(PROGRAM, limits.models, python, memory=limits.memory)
         self.root = root
         self.seconds = self.left = limits.models
 

@@ -38,7 +38,6 @@ from coursebuild.core.run.script_worker import (
     SUPERVISOR_MEMORY,
     SandboxWatch,
 )
-from coursebuild.core.run.seccomp import compile_filter
 
 SIZE = 1 << 30
 """Bytes that may be written, in memory."""
@@ -100,6 +99,8 @@ def examine_sandbox(
 
     `seconds` are what its trial start may take.
     """
+    from coursebuild.core.run.seccomp import compile_filter
+
     bubblewrap, system_call_filter = "Bubblewrap", "a filter of system calls"
     program, machine = gate.find_program("bwrap"), platform.machine()
     if program is None:

@@ -21,7 +21,8 @@ import msgspec
 from msgspec import Struct
 
 from coursebuild.core.model.results import Outcome
-from coursebuild.core.run import gate, supervisor
+from coursebuild.core.run import gate
+from coursebuild.core.run.watching import LENGTH, PROGRAM, STARTED
 
 _MAX_REPORT_SIZE = 256 << 20
 """Bytes that a report may have."""
@@ -78,7 +79,7 @@ class Worker:
         job_reader, job_writer = os.pipe()
         self.reports, report_writer = os.pipe()
         self.jobs: int | None = job_writer
-        command = [python, supervisor.PROGRAM, str(job_reader), str(report_writer), str(int(fork))]
+        command = [python, PROGRAM, str(job_reader), str(report_writer), str(int(fork))]
         try:
             self._process = gate.start(
                 command,
@@ -110,7 +111,7 @@ class Worker:
         assert self.jobs is not None
         # The pipe is broken if the supervisor has died, which reading will show.
         with contextlib.suppress(BrokenPipeError), open(self.jobs, "wb", closefd=False) as pipe:
-            pipe.write(supervisor.LENGTH.pack(len(message)) + message)
+            pipe.write(LENGTH.pack(len(message)) + message)
 
     def enforce_limits(self, timeout: float, memory: int) -> None:
         """End its sandbox if that takes too many seconds, too many MiB, or too many processes.
@@ -148,13 +149,13 @@ class Worker:
 
     def take_report(self) -> ChildReport | None:
         """Take the next report if all of it has been read; a `ValueError` says that it is none."""
-        size = supervisor.LENGTH.size
-        if not self._has_started and self._buffer.startswith(supervisor.STARTED):
+        size = LENGTH.size
+        if not self._has_started and self._buffer.startswith(STARTED):
             del self._buffer[:size]
             self._start_time, self._has_started = time.monotonic(), True
         if len(self._buffer) < size:
             return None
-        (length,) = supervisor.LENGTH.unpack(self._buffer[:size])
+        (length,) = LENGTH.unpack(self._buffer[:size])
         if length > _MAX_REPORT_SIZE:
             raise ValueError("too long")
         if len(self._buffer) < size + length:

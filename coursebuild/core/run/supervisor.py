@@ -33,7 +33,6 @@ import resource
 import select
 import shutil
 import signal
-import struct
 import subprocess
 import sys
 import traceback
@@ -50,12 +49,15 @@ from coursebuild.core.run.script_process import (
     figure_path,
     notes_folder,
 )
-from coursebuild.core.run.watching import STDERR_KEPT, STDOUT_LIMIT, RunningScript, has_ended
-
-LENGTH = struct.Struct(">I")
-STARTED = LENGTH.pack(0)
-"""What is sent when a script has been started."""
-PROGRAM = str(Path(__file__).with_name("script_main.py"))
+from coursebuild.core.run.watching import (
+    LENGTH,
+    PROGRAM,
+    STARTED,
+    STDERR_KEPT,
+    STDOUT_LIMIT,
+    RunningScript,
+    has_ended,
+)
 
 FIGURE_LIMIT = 4 << 20
 """Bytes that a figure may have."""

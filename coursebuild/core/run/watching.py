@@ -10,12 +10,19 @@ import mmap
 import os
 import select
 import signal
+import struct
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
+PROGRAM = str(Path(__file__).with_name("script_main.py"))
+"""The program of a supervisor."""
+LENGTH = struct.Struct(">I")
+"""Stands before each job and each report."""
+STARTED = LENGTH.pack(0)
+"""What a supervisor sends when it has started a script."""
 _EXITING_FLAG = 0x4
 """A flag of a process, see proc_pid_stat(5): `PF_EXITING`."""
 STDOUT_LIMIT = 1 << 20

@@ -264,13 +264,13 @@ def _find_python(text: str) -> Iterator[tuple[Kind, str, str]]:
             elif path is not None and not path.startswith("_"):
                 name = path.removesuffix("()")
                 yield ("word" if name == path else "call"), name, name
-        elif isinstance(node, ast.Name) and node.id not in targets and _is_telling(node.id):
+        elif (
+            isinstance(node, ast.Name)
+            and node.id not in targets
+            # with the shape of a name by itself
+            and (re.search(r"[A-Za-z0-9]_[A-Za-z0-9]", node.id) or ENGINE_WORD.fullmatch(node.id))
+        ):
             yield "word", node.id, node.id
-
-
-def _is_telling(name: str) -> bool:
-    """Whether a word has the shape of a name by itself."""
-    return bool(re.search(r"[A-Za-z0-9]_[A-Za-z0-9]", name) or ENGINE_WORD.fullmatch(name))
 
 
 def _path(node: ast.expr, parts: set[int]) -> str | None:

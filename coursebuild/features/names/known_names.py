@@ -29,11 +29,11 @@ from coursebuild.core.run.child import JsonChild
 from coursebuild.core.run.script_environment import engine_version, python_version
 from coursebuild.core.syntax.course_schema import CourseFile
 from coursebuild.core.text.source import key_of
-from coursebuild.features.names import introspect
 
 _MANUAL = "https://mujoco.readthedocs.io/en/{}/{}"
 _KIND = "names"
 _SECONDS = 30.0
+_PROGRAM = str(Path(__file__).with_name("introspect.py"))
 ITEM_CLASSES = {
     "MjContactList": "MjContact",
     "MjSolverStatList": "MjSolverStat",
@@ -135,7 +135,7 @@ def engine_names(store: Store, interpreter: Interpreter | None) -> EngineTable:
     folders = sys.path if interpreter is None else interpreter.packages
     packages = [Path(folder) for folder in folders if folder.endswith("-packages")]
     states = [str(folder.stat().st_mtime_ns) for folder in packages if folder.is_dir()]
-    files = (introspect.__file__, mjcf.__file__)
+    files = (_PROGRAM, mjcf.__file__)
     code = [Path(file).read_text("utf-8") for file in files]
     key = key_of(engine, version, python, *states, *code)
     data = _in_memory.get(key) or store.get(_KIND, key, bytes)
@@ -155,7 +155,7 @@ def list_names(python: str) -> EngineNames:
     Raises:
         EffectError: MuJoCo cannot be loaded.
     """
-    with JsonChild(introspect.__file__, _SECONDS, python) as child:
+    with JsonChild(_PROGRAM, _SECONDS, python) as child:
         answer = child.ask(None)
         if answer is None:
             raise EffectError(f"listing the names of MuJoCo {child.death()}")

@@ -15,7 +15,6 @@ import pytest
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files import trust
 from coursebuild.pipeline.options import open_store
-from support.workflows import git
 
 KEY = "a" * 64
 
@@ -238,58 +237,3 @@ def test_store_of_another_user_is_set_aside_with_a_warning(
     monkeypatch.setattr(os, "geteuid", lambda: user)
     warning = "warning: .coursebuild belongs to another user; it is set aside"
     assert look_up(root) == (None, [warning])
-
-
-# --- Git
-
-
-@pytest.mark.parametrize("version", [2, 3, 4])
-@pytest.mark.parametrize("place", ["", "courses/one/"])
-def test_store_that_git_tracks_is_set_aside_with_a_warning(
-    tmp_path: Path, state: Path, version: int, place: str
-) -> None:
-    top = tmp_path / "repository"
-    for number in range(60):  # names that begin alike are compressed
-        path = top / place / f".course{number}/file"
-        path.parent.mkdir(parents=True)
-        path.write_text("")
-    root = top / place
-    entry = fill(root)
-    git(top, "init", "--quiet")
-    git(top, "add", "--all")
-    assert look_up(root) == (b"kept", [])
-    git(top, "add", "--force", str(entry))
-    git(top, "update-index", "--index-version", str(version))
-    assert look_up(root) == (None, ["warning: .coursebuild is tracked by Git; it is set aside"])
-    assert look_up(root / ".course1") == (None, []), "another folder of the repository"
-    git(top, "rm", "--quiet", "--cached", str(entry))
-    assert look_up(root) == (b"kept", [])
-
-
-def test_linked_work_tree_and_letters_of_another_case(tmp_path: Path, state: Path) -> None:
-    top = tmp_path / "repository"
-    (top / ".Coursebuild").mkdir(parents=True)
-    (top / ".Coursebuild/changes").write_text("")
-    git(top, "init", "--quiet")
-    git(top, "add", "--force", ".Coursebuild")
-    git(top, "commit", "--quiet", "-m", "a branch")
-    git(top, "worktree", "add", "--quiet", str(tmp_path / "tree"))
-    shutil.rmtree(tmp_path / "tree/.Coursebuild")
-    fill(tmp_path / "tree")
-    warning = "warning: .coursebuild is tracked by Git; it is set aside"
-    assert look_up(tmp_path / "tree")[1] == [warning]
-
-
-def test_git_folder_that_no_git_has_made_ends_nothing(root: Path) -> None:
-    fill(root)
-    for data in (b"", b"DIRC", b"DIRC\0\0\0\4\xff\xff\xff\xff" + b"x" * 500, b"\0" * 99):
-        (root / ".git").mkdir()
-        (root / ".git/index").write_bytes(data)
-        assert look_up(root) == (b"kept", [])
-        shutil.rmtree(root / ".git")
-    (root / ".git").mkdir()
-    os.mkfifo(root / ".git/index")
-    assert look_up(root) == (b"kept", [])
-    shutil.rmtree(root / ".git")
-    (root / ".git").write_text("gitdir: /dev/zero\n")
-    assert look_up(root) == (b"kept", [])

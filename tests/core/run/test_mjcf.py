@@ -16,7 +16,7 @@ from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError, LackError
 from coursebuild.core.model import Limits
 from coursebuild.core.model.results import CompileResult, Misspelling, ModelFacts
-from coursebuild.core.run import compile_main, mjcf
+from coursebuild.core.run import mjcf
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import TEXT_PATH, compile_all, model_files, readable_error
 from support.fixture_cases import fixture_tables, fixture_text
@@ -285,7 +285,7 @@ def test_a_compiler_that_crashes_or_cannot_be_loaded(
 ) -> None:
     worker = tmp_path / "worker.py"
     worker.write_text(program("bad_compiler").replace("SOURCE", str(SOURCE_TREE)))
-    monkeypatch.setattr(compile_main, "__file__", str(worker))
+    monkeypatch.setattr(mjcf, "PROGRAM", str(worker))
     good = "<mujoco model='noise'/>"
     results = texts(root, [good, "<!-- crash -->", good, "<!-- exit -->", good])
     assert [result.error for result in results] == [

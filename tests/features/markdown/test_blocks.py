@@ -25,7 +25,7 @@ from coursebuild.core.pages.marks import (
 from coursebuild.core.pages.urls import Place
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
-from coursebuild.features.markdown import markdown_href
+from coursebuild.features.markdown.page_copies import markdown_href
 from coursebuild.features.markdown.writer import DocumentWriter
 from support.fixture_cases import check_lines, check_text, fixture_text
 from support.markdown_files import commonmark_examples

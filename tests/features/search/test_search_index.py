@@ -15,8 +15,7 @@ from coursebuild.core.model.results import CachedFile
 from coursebuild.core.pages.context import NotedPage, PageInputs, SiteContext
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.page_list import page_list
-from coursebuild.features import search
-from coursebuild.features.search import IndexPlan, search_files
+from coursebuild.features.search.index_files import LIST, IndexPlan, search_files
 from coursebuild.features.search.page import (
     Section,
     SectionPiece,
@@ -158,7 +157,7 @@ def test_the_files_follow_from_the_pages_alone(
 
 def test_the_list_of_pages_says_where_everything_is(library: Library) -> None:
     files = search_site(library, course(5))
-    text = files[search.LIST].make().decode()
+    text = files[LIST].make().decode()
     assert text.startswith('coursebuildSearch.take("index","",')
     listing = json.loads(text.partition(',"",')[2].rstrip()[:-1])
     assert listing["strings"]["list"] == library.words("search.live.list")
@@ -183,7 +182,7 @@ def test_pages_that_are_alike_have_files_of_their_own(library: Library) -> None:
 def test_levels_and_planned_lessons_share_files_of_texts(library: Library) -> None:
     for kind in ("level", "stub"):
         files = search_site(library, course(40, words=1), kind=kind)
-        listing = json.loads(files[search.LIST].make().decode().partition(',"",')[2].rstrip()[:-1])
+        listing = json.loads(files[LIST].make().decode().partition(',"",')[2].rstrip()[:-1])
         assert len({page[4] for page in listing["pages"]}) == 3
         for path, *_, file, place in listing["pages"]:
             text = files[f"assets/search/{file}.js"].make().decode()
