@@ -14,7 +14,7 @@ import { say } from './page/words.js'
 
 const PAGES = 50 // that are kept
 
-function showReview(document, { words, progress, improve = () => {} }) {
+function showReview(document, { words, progress, improve }) {
   return new Review(document, words, progress, improve).start()
 }
 

@@ -13,7 +13,7 @@ import { sign } from '../progress/signs.js'
 import { formulaCode } from './formula.js'
 
 export class Exercise extends Instrument {
-  constructor(element, config, base, words, progress = null) {
+  constructor(element, config, base, words, progress) {
     const worker = `${config.worker}#${config.id}` // so that it is dedicated
     super(element, { ...config, worker, kind: 'exercise', exportPython: null }, base, words, progress) // an export would be the solution
     this.leave = progress?.onChange(() => this.showState())

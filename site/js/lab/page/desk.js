@@ -19,7 +19,7 @@ const LENGTH = 8 // s, of any other
 const LONGEST_FRAME = 0.1 // s
 
 export class Desk extends Shell {
-  constructor(element, config, words, progress = null) {
+  constructor(element, config, words, progress) {
     super(element, config, words, progress)
     this.curves = new Curves(config)
     this.initial = config.controls.map(({ value }) => value)

@@ -74,7 +74,7 @@ export class Shell {
     this.element.querySelector('.lab-room')?.remove()
     if (still !== null) still.before(body)
     else this.element.append(body)
-    this.unwatch = watchSight(body, see)
+    this.unwatch = watchSight(this.element, see) // style sheets may leave the body no box of its own
   }
 
   /** Listeners of a simulation that say what goes wrong in it. @param {any} config its lab's JSON @param {import('./view.js').View | null} view */

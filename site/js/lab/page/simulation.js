@@ -192,7 +192,7 @@ export class Simulation {
    *
    * @param {string} xml @param {any} own @param {boolean} isOther whether it is no edition of the lab's model, whose camera then stays
    */
-  load(xml, own = null, isOther = false) {
+  load(xml, own, isOther) {
     this.config = { ...this.config, xml, isOther }
     this.own = own
     this.restart()
