@@ -10,7 +10,8 @@ Run: python benchmarks/labs.py [--rounds N] [--only speed|pages] [--robots ZIP â
    in an order that moves on: what else the machine does, meets all of them. Medians are printed, of
    the speeds and of the ratios within a round.
 3. A page without and with a lab: requests and bytes as sent, time from Play to the first moving
-   frame on a warm cache, frame times, long tasks, and how busy the page's thread is while it runs.
+   frame on a warm cache, also of a worker without a tape, frame times, long tasks, and how busy the
+   page's thread is while it runs.
 4. With `--robots`, that alone, for zips of models with their meshes, opened in the editor of a lab.
 
 All but native MuJoCo also do what a lab does besides stepping: look for divergence after each step,
@@ -106,6 +107,11 @@ LESSON = """## {model}
              "traces": [{{"label": "z", "expr": "lib.bodyPos(1)[2]"}}]}}]}}
 ```
 """
+NO_TAPE = (
+    "{range:{start:0,end:0,marks:[],touches:[]},isPast:false,before:()=>null,"
+    "clear(){},after(){},event(){},mark(){},cut(){}}"
+)
+"""What stands in the place of a lab's tape, in JavaScript, to see what the tape costs."""
 PAGES = {"without a lab": "1.0-plain", "with a lab": "1.1-tumbling-box"}
 SCRIPT = "## None\n\n```python file=examples/one.py\nprint(1)\n```\n\nOutput:\n\n```text\n1\n```\n"
 
@@ -327,8 +333,14 @@ def page_cost(browser: Any, url: str, name: str) -> str:
 def run_cost(context: Any, page: Any) -> str:
     """How the lab of a page runs, from Play on."""
     page.evaluate(WATCH)
+    start_ms = first_frame(page)
+    return f"Play to first moving frame {start_ms:.0f} ms (warm cache); {frame_cost(context, page)}"
+
+
+def first_frame(page: Any) -> float:
+    """Milliseconds from Play to the first moving frame of a page's first lab, which is in sight."""
     clock = "document.querySelector('.lab-time').textContent"
-    start_ms = page.evaluate(
+    return page.evaluate(
         f"""async () => {{
           const first = {clock}; const began = performance.now()
           document.querySelector('.lab-play').click()
@@ -336,7 +348,33 @@ def run_cost(context: Any, page: Any) -> str:
           return performance.now() - began
         }}"""
     )
-    return f"Play to first moving frame {start_ms:.0f} ms (warm cache); {frame_cost(context, page)}"
+
+
+def leave_out_tape(route: Any) -> None:
+    """Answer the request for the worker by one that keeps no run."""
+    text, count = re.subn(r"\.tape=new \w+\(this\.lab\)", f".tape={NO_TAPE}", route.fetch().text())
+    if count != 1:
+        sys.exit("the worker does not make a tape as expected")
+    route.fulfill(body=text, content_type="text/javascript")
+
+
+def tape_cost(browser: Any, url: str, rounds: int) -> str:
+    """The time to the first moving frame with the tape and without, in turns."""
+    starts: dict[bool, list[float]] = {True: [], False: []}
+    for has_tape in [True, False] * (rounds + 1):
+        context = browser.new_context(
+            viewport={"width": 1280, "height": 900}, service_workers="block"
+        )
+        page = context.new_page()
+        if not has_tape:
+            page.route("**/lab-worker.*.js", leave_out_tape)
+        page.goto(url, wait_until="networkidle")
+        page.locator(".lab").first.scroll_into_view_if_needed()
+        page.wait_for_selector(".lab-play", timeout=60_000)
+        starts[has_tape].append(first_frame(page))
+        context.close()
+    taped, plain = (statistics.median(times[1:]) for times in starts.values())
+    return f"  first moving frame {taped:.0f} ms with the tape, {plain:.0f} ms without (medians)"
 
 
 def robot_cost(browser: Any, url: str, path: Path) -> str:
@@ -416,6 +454,8 @@ def main() -> None:
                 print("\npages")
                 for name, page in PAGES.items():
                     print(page_cost(browser, f"{url}lessons/{page}.html", name))
+                lab_page = f"{url}lessons/{PAGES['with a lab']}.html"
+                print(tape_cost(browser, lab_page, arguments.rounds))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ import { fill as fillIn, readWords } from './page/words.js'
 
 const words = readWords(document)
 const CHOICES = ['read', 'text', 'all', 'none']
-const SIZES = { text: ['shell', 'text'], all: ['shell', 'text', 'rest'] }
 
 const root = workingRoot(window)
 const place = document.querySelector('[data-keep]')
@@ -70,7 +69,7 @@ async function offer(place, store) {
   const labels = CHOICES.map((choice) => {
     const checked = choice === (currentChoice === 'auto' ? automatic : currentChoice)
     const button = h('input', { type: 'radio', name: 'keep', value: choice, checked, onchange: () => choose(place, store, choice) })
-    const size = list ? megabytes((SIZES[choice] ?? []).reduce((sum, name) => sum + list.bytes[name], 0)) : '…'
+    const size = list ? megabytes(groupsFor(choice, list, false).reduce((sum, name) => sum + list.bytes[name], 0)) : '…'
     return h('label', {}, button, h('span', {}, fill(choice, { size })))
   })
   place.replaceChildren(h('fieldset', {}, h('legend', {}, words('offline.live.legend')), ...labels), makeStatus())

@@ -7,12 +7,13 @@
 
 import { h } from './lab/page/dom.js'
 import { holdPlace } from './page/place.js'
-import { connect } from './preview/connection.js'
 import { Marks } from './preview/marks.js'
 import { Panel } from './preview/panel.js'
 import { setClock } from './preview/times.js'
 import { Twin } from './preview/twin.js'
 import { say } from './page/words.js'
+
+const AGAIN = 1000 // ms
 
 const script = document.currentScript
 const page = script.dataset.page
@@ -99,6 +100,36 @@ async function loadFonts(address) {
   const text = await (await fetch(address)).text()
   const fonts = [...text.matchAll(/url\(["']?([^"')]+\.woff2)["']?\)/g)].map(([, file]) => new URL(file, address))
   await Promise.all(fonts.map(async (font) => (await fetch(font)).arrayBuffer()))
+}
+
+/**
+ * Listen to the server, which sends its whole state whenever a page connects; not while the page is hidden, as browsers allow few
+ * connections to one host.
+ */
+function connect(page, handlers) {
+  let source = null
+  let timer = null
+  const close = () => {
+    clearTimeout(timer)
+    source?.close()
+    source = null
+  }
+  const open = () => {
+    if (source !== null || document.visibilityState === 'hidden') return
+    source = new EventSource(`/.coursebuild/events?page=${encodeURIComponent(page)}`)
+    for (const name of ['hello', 'page', 'news']) {
+      source.addEventListener(name, (event) => handlers[name](JSON.parse(event.data)))
+    }
+    source.addEventListener('error', () => {
+      handlers.lost()
+      close()
+      timer = setTimeout(open, AGAIN)
+    })
+  }
+  document.addEventListener('visibilitychange', () => (document.visibilityState === 'hidden' ? close() : open()))
+  window.addEventListener('pagehide', close)
+  window.addEventListener('pageshow', open)
+  open()
 }
 
 connect(page, {

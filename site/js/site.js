@@ -8,7 +8,7 @@ import { keepOffline } from './page/offline.js'
 import { addLineNumbers, followLines } from './page/lines.js'
 import { placeNotes } from './page/notes.js'
 import { followPath } from './page/path.js'
-import { openForPrint } from './page/print.js'
+import { prepareForPrint } from './page/print.js'
 import { markScrolling } from './page/scroll.js'
 import { settle } from './page/settle.js'
 import { leaveQuizzes, mountQuizzes } from './page/quizzes.js'
@@ -33,16 +33,22 @@ function improve(part) {
   mountQuizzes(part, words, progress)
 }
 
+let leaves = []
+
+/** Follow the reader on the page as it is now. */
+function follow() {
+  leaves.forEach((leave) => leave())
+  leaves = [showProgress(document, words, progress, improve), followContents(document), placeNotes(document)]
+}
+
 addThemeSwitch(document, words)
 addSearch(document, words)
 rekeyAnswers(document, progress)
 improve(document)
 gatePredictions(document, words, progress)
 followPredictions(document, progress)
-let leaveProgress = showProgress(document, words, progress, improve)
-let leaveContents = followContents(document)
-let leaveNotes = placeNotes(document)
-openForPrint(window)
+follow()
+prepareForPrint(window)
 keepOffline(window, words)
 followLines(window)
 followPath(document)
@@ -60,10 +66,5 @@ document.addEventListener('coursebuild:changed', ({ detail: { added, removed } }
   added.forEach(improve)
   gatePredictions(document, words, progress)
   addLineNumbers(document, words) // for listings of which only some lines were replaced
-  leaveContents()
-  leaveContents = followContents(document)
-  leaveNotes()
-  leaveNotes = placeNotes(document)
-  leaveProgress()
-  leaveProgress = showProgress(document, words, progress, improve)
+  follow()
 })

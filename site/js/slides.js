@@ -87,42 +87,30 @@ function press(event) {
   go(current + step)
 }
 
-function addControls() {
-  back.addEventListener('click', () => go(current - 1))
-  on.addEventListener('click', () => go(current + 1))
-  document.body.append(h('nav', { class: 'slides-bar', 'aria-label': words('slides.label') }, back, counter, on))
-}
-
-/** A file in the page, unpacked. */
+/** The bytes of a file in the page, unpacked. */
 async function unpack(element) {
-  const bytes = Uint8Array.from(atob(element.textContent), (letter) => letter.charCodeAt(0))
+  const bytes = /** @type {any} */ (Uint8Array).fromBase64(element.textContent)
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('gzip'))
-  return new Blob([await new Response(stream).arrayBuffer()], { type: element.dataset.type })
+  return new Uint8Array(await new Response(stream).arrayBuffer())
 }
 
-function readAddress(blob) {
-  return new Promise((resolve, reject) => {
-    const reader = new FileReader()
-    reader.onload = () => resolve(reader.result)
-    reader.onerror = () => reject(reader.error)
-    reader.readAsDataURL(blob)
-  })
-}
+/** @param {Uint8Array} bytes @param {string} type */
+const addressOf = (bytes, type) => `data:${type};base64,${/** @type {any} */ (bytes).toBase64()}`
 
 /** Give the files in the page addresses, and put these where their paths stand. */
 async function openFiles() {
-  const blobs = new Map()
+  const files = new Map()
   const addresses = new Map()
   for (const element of document.querySelectorAll('body > script[data-file]')) {
-    const blob = await unpack(element)
-    blobs.set(element.dataset.file, blob)
-    addresses.set(element.dataset.file, await readAddress(blob))
+    const { file, type } = element.dataset
+    files.set(file, await unpack(element))
+    addresses.set(file, addressOf(files.get(file), type))
   }
   const address = (path) => addresses.get(path) ?? path
   for (const lab of document.querySelectorAll('[data-lab][data-config]')) {
-    const config = JSON.parse(await blobs.get(lab.dataset.config).text())
+    const config = JSON.parse(new TextDecoder().decode(files.get(lab.dataset.config)))
     for (const name of ['module', 'mjb', 'worker', 'wasm']) if (config[name]) config[name] = address(config[name])
-    lab.dataset.config = await readAddress(new Blob([JSON.stringify(config)], { type: 'application/json' }))
+    lab.dataset.config = addressOf(new TextEncoder().encode(JSON.stringify(config)), 'application/json')
     lab.dataset.script = address(lab.dataset.script)
   }
   const table = document.getElementById('_words').dataset
@@ -135,7 +123,9 @@ for (const slide of slides) {
   // It is the only one on the page.
   slide.querySelector('.prose > :is(h2, h3):first-child')?.setAttribute('aria-level', '1')
 }
-addControls()
+back.addEventListener('click', () => go(current - 1))
+on.addEventListener('click', () => go(current + 1))
+document.body.append(h('nav', { class: 'slides-bar', 'aria-label': words('slides.label') }, back, counter, on))
 follow()
 window.addEventListener('hashchange', follow)
 document.addEventListener('keydown', press)

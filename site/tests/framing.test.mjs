@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict'
 import { before, test } from 'node:test'
 import { Framing, cameraAxes } from '../js/lab/core/framing.js'
-import { Motion } from '../js/lab/trial/motion.js'
+import { Motion, played } from '../js/lab/trial/motion.js'
 import { Lab } from '../js/lab/core/lab.js'
 import { code, compile, config, newEngine } from './helpers.mjs'
 
@@ -171,4 +171,10 @@ test('what is seen to move counts, and only in the first three seconds', () => {
   assert.ok(fall > 0.005 && fall < 0.1, `${fall}`)
   const late = share(ball, { gravity: '0 0 -0.0001', seconds: 3 })
   assert.equal(late, 0)
+})
+
+test('what an exercise begins with is seen, also if its first step goes far', () => {
+  const falling = model('', '<geom size=".1"/>', '<option timestep="9"/>')
+  const { begin } = played(() => new Lab(engine, compile(engine, falling), config(), code({})))
+  assert.ok(begin.scene.camera.distance < 1)
 })

@@ -42,7 +42,7 @@ test('half of the height of the view turns by a quarter; the elevation ends at t
   moved.rotate(0.5, 0)
   assert.equal(moved.azimuth, 0)
   moved.rotate(1.5, 0)
-  assert.equal(moved.azimuth, 90)
+  assert.equal(moved.azimuth, 90 - 360)
   moved.rotate(0, 5)
   assert.equal(moved.elevation, -90)
   moved.rotate(0, -50)

@@ -1,11 +1,12 @@
 /** Numbers, texts, links and scripts that the page writes. */
 
+import './new-in-node.mjs'
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { deflateRawSync } from 'node:zlib'
 import { readError } from '../js/lab/page/editor.js'
 import { fillScript } from '../js/lab/page/export.js'
-import { placeOf } from '../js/lab/page/notices.js'
+import { placeOf } from '../js/lab/page/shell.js'
 import {
   digitsOfStep,
   formatLabel,

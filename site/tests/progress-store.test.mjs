@@ -3,7 +3,8 @@
 import assert from 'node:assert/strict'
 import { test } from 'node:test'
 import { ImportError, importText } from '../js/progress/exchange.js'
-import { matchQuestions, openProgress } from '../js/progress/store.js'
+import { matchQuestions } from '../js/progress/match.js'
+import { openProgress } from '../js/progress/store.js'
 import { answer, Browser, random } from './progress-helpers.mjs'
 
 const NAME = 'coursebuild.progress.c'

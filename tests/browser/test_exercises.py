@@ -81,10 +81,10 @@ def test_attempts_are_judged_watched_and_kept(page: Page) -> None:
     expect(bar.get_by_text("You have solved this exercise before.")).to_be_visible()
 
 
-def test_the_start_is_seen_before_anything_runs(
+def test_the_start_is_seen_before_anything_runs_and_plays_on_a_wide_page(
     browsers: Mapping[str, Browser], sites: Mapping[str, Site]
 ) -> None:
-    with browsers["webgl"].new_context(viewport={"width": 1000, "height": 800}) as context:
+    with browsers["webgl"].new_context(viewport={"width": 1440, "height": 800}) as context:
         page, _ = watch_page(context)
         addresses: list[str] = []
         page.on("request", lambda request: addresses.append(request.url))
@@ -96,6 +96,7 @@ def test_the_start_is_seen_before_anything_runs(
         bar, _ = exercise(page, titles[0])
         press(bar, "Play")
         expect(bar.locator(".lab-view img")).to_have_count(0)
+        expect(bar.locator(".lab-time")).not_to_have_text("0.00 s")
 
 
 def pytest_of(path: Path) -> tuple[int, str]:

@@ -13,7 +13,7 @@ import { sign } from '../progress/signs.js'
 import { formulaCode } from './formula.js'
 
 export class Exercise extends Instrument {
-  constructor(element, config, base, words, progress = null) {
+  constructor(element, config, base, words, progress) {
     const worker = `${config.worker}#${config.id}` // so that it is dedicated
     super(element, { ...config, worker, kind: 'exercise', exportPython: null }, base, words, progress) // an export would be the solution
     this.leave = progress?.onChange(() => this.showState())
@@ -121,7 +121,7 @@ export class Exercise extends Instrument {
   }
 
   finish(problem, results) {
-    const { words, rows, progress, config, element } = this
+    const { words, rows, config, element } = this
     for (const row of rows.slice(results.length)) this.showVerdict(row, 'waiting')
     if (problem !== null) this.editor.fail(problem === '' ? words('exercise.live.endless') : problem)
     const passed = results.filter(Boolean).length
@@ -130,9 +130,7 @@ export class Exercise extends Instrument {
     this.showState(isJudged ? words(isSolved ? 'exercise.live.solved' : 'exercise.live.unsolved', { n: passed, all: rows.length }) : '')
     if (!isSolved) return
     const { id } = config.exercise
-    const lesson = document.querySelector('main')?.dataset.lesson ?? ''
-    const answer = { kind: 'exercise', given: 'solved', right: true, tries: this.tries, hints: 0, number: 1, lesson }
-    progress?.put(id, id, answer)
+    const answer = this.storeDone(id, 'exercise', 'solved', this.tries)
     element.dispatchEvent(new CustomEvent('coursebuild:answered', { bubbles: true, detail: { quiz: id, key: id, answer } }))
   }
 
@@ -140,7 +138,7 @@ export class Exercise extends Instrument {
   showState(state = this.stateText) {
     this.stateText = state
     const { id } = this.config.exercise
-    const isKept = this.progress?.get(id, id)?.right === true
+    const isKept = this.hasDone(id)
     const text = state || (isKept ? this.words('exercise.live.kept') : '')
     this.summary.replaceChildren(...(isKept ? [sign('read'), text] : [text]))
   }

@@ -101,16 +101,10 @@ async function answerFile(request, path, { store, fetch }) {
 }
 
 /** Answer with a range of a file: browsers request videos in ranges. */
-async function answerPart(request, path, { store, fetch }) {
-  const copy = isLasting(path) ? await store.get(path, '') : null
-  if (copy) return sliceOf(copy, request.headers.get('Range'))
-  try {
-    return await fetch(request)
-  } catch (error) {
-    const fallback = await store.find([path])
-    if (fallback) return sliceOf(fallback.response, request.headers.get('Range'))
-    throw error
-  }
+async function answerPart(request, path, services) {
+  const copy = isLasting(path) ? await services.store.get(path, '') : null
+  const response = copy ?? (await answerFile(request, path, services))
+  return response.status === 200 ? sliceOf(response, request.headers.get('Range')) : response
 }
 
 async function sliceOf(response, header) {

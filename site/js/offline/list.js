@@ -74,7 +74,7 @@ export function isSparing(connection) {
 /**
  * The groups to store.
  *
- * @param {'auto' | 'read' | 'text' | 'all' | 'none'} keep the reader's choice; `auto`: none yet
+ * @param {string} keep the reader's choice; `auto`: none yet
  * @param {List} list
  * @param {boolean} sparing
  */

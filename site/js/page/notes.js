@@ -64,7 +64,7 @@ function arrange(prose, list, wide) {
   if (!wide) return
   const origin = prose.getBoundingClientRect().top
   const sizes = notes.map((note) => ({ mark: heightOf(markOf(note), origin), height: note.offsetHeight }))
-  const tops = noteTops(sizes, obstaclesOf(prose, list, notes[0]), list.getBoundingClientRect().top - origin)
+  const tops = noteTops(sizes, obstaclesOf(prose, list, notes[0], origin), list.getBoundingClientRect().top - origin)
   for (const [n, note] of notes.entries()) {
     note.classList.toggle('aside', tops[n] !== null)
     note.style.top = `${tops[n] ?? 0}px`
@@ -81,8 +81,7 @@ function heightOf(mark, origin) {
 }
 
 /** The content that reaches into the margin, from the top. */
-function obstaclesOf(prose, list, note) {
-  const origin = prose.getBoundingClientRect().top
+function obstaclesOf(prose, list, note, origin) {
   const { left, right } = note.getBoundingClientRect()
   const boxes = [...prose.querySelectorAll('.prose > :not(.further), .formula')].filter((box) => box !== list)
   return boxes

@@ -1,6 +1,6 @@
 /**
- * Prepares for print: sets the running title, puts answers and solutions behind the text, and opens folds for browsers in which
- * style sheets cannot. A further section that is closed is not printed, nor is a folded listing of more than sixty lines.
+ * Prepares for print: sets the running title, and puts answers and solutions behind the text. (Style sheets open the folds.) A further
+ * section that is closed is not printed.
  */
 
 import { h } from '../lab/page/dom.js'
@@ -10,20 +10,14 @@ function cssString(text) {
   return `"${text.replaceAll(/["\\]/g, '\\$&').replaceAll(/[\n\r\f\0]/g, ' ')}"`
 }
 
-export function openForPrint(window) {
+export function prepareForPrint(window) {
   const { document } = window
-  let openedFolds = []
   let putBack = () => {}
   window.addEventListener('beforeprint', () => {
     document.documentElement.style.setProperty('--running-title', cssString(document.title))
-    openedFolds = [...document.querySelectorAll('details:not([open], .further-text, .fold:has([id]:nth-child(61)))')]
-    for (const details of openedFolds) details.open = true
     putBack = moveAnswers(document)
   })
-  window.addEventListener('afterprint', () => {
-    putBack()
-    for (const details of openedFolds) details.open = false
-  })
+  window.addEventListener('afterprint', () => putBack())
 }
 
 /** Move what answers questions, exercises and tasks, where it is printed, to a list behind the text. @returns {() => void} puts it back */

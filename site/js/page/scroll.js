@@ -6,7 +6,7 @@
 import { selectAll } from './select.js'
 
 /** The sides of a box on which something is hidden: `start`, `end`, `both`, or ''. */
-function hiddenSides(scrollLeft, clientWidth, scrollWidth) {
+function hiddenSides({ scrollLeft, clientWidth, scrollWidth }) {
   const position = Math.abs(scrollLeft) // negative where text runs from the right
   const hasBefore = position > 1
   const hasAfter = position + clientWidth < scrollWidth - 1
@@ -15,7 +15,7 @@ function hiddenSides(scrollLeft, clientWidth, scrollWidth) {
 
 export function markScrolling(part) {
   const mark = (box) => {
-    const sides = hiddenSides(box.scrollLeft, box.clientWidth, box.scrollWidth)
+    const sides = hiddenSides(box)
     if (sides) box.dataset.more = sides
     else delete box.dataset.more
     const overflows = box.scrollHeight > box.clientHeight + 1 && getComputedStyle(box).overflowY !== 'hidden'

@@ -20,5 +20,8 @@ export function offerButton(text, say, accept) {
   return [button, ' ', answer]
 }
 
+/** What a mistake is: how bad, and the message. */
+export const verdict = (say, severity, message) => [h('strong', {}, say(severity)), ' ', h('span', OF_THE_TOOL, ...formatCode(message))]
+
 /** Show text between backticks as code. */
 export const formatCode = (text) => text.split(/`([^`]*)`/).map((part, index) => (index % 2 ? h('code', {}, part) : part))

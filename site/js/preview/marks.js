@@ -7,7 +7,8 @@
  */
 
 import { h } from '../lab/page/dom.js'
-import { formatCode, offerButton, OF_THE_TOOL } from './elements.js'
+import { unfold } from '../page/unfold.js'
+import { formatCode, offerButton, OF_THE_TOOL, verdict } from './elements.js'
 import { timesOf } from './times.js'
 
 const SIGNS = { ' ': '\u2007', '-': '−', '+': '+' }
@@ -68,8 +69,7 @@ export class Marks {
   /** What is wrong in the block below; without elements of blocks, as it may stand in a line. */
   markMistakes(element, { mistakes }) {
     const notes = mistakes.map(({ severity, message, help }) => {
-      const note = h('span', { class: `preview-mistake preview-${severity}`, role: 'note', tabIndex: -1 })
-      note.append(h('strong', {}, this.say(severity)), ' ', h('span', OF_THE_TOOL, ...formatCode(message)))
+      const note = h('span', { class: `preview-mistake preview-${severity}`, role: 'note', tabIndex: -1 }, ...verdict(this.say, severity, message))
       if (help) note.append(h('span', { class: 'preview-help', ...OF_THE_TOOL }, ...formatCode(help)))
       return note
     })
@@ -145,9 +145,10 @@ export class Marks {
 /** Bring the mark of a mistake into view, out of folds, and give it the focus. */
 export function showMistake(mark) {
   const element = document.getElementById(mark)
-  for (let fold = element?.closest('details'); fold; fold = fold.parentElement.closest('details')) fold.open = true
-  element?.scrollIntoView({ block: 'center' })
-  element?.querySelector('.preview-mistake')?.focus({ preventScroll: true })
+  if (!element) return
+  unfold(element)
+  element.scrollIntoView({ block: 'center' })
+  element.querySelector('.preview-mistake')?.focus({ preventScroll: true })
 }
 
 function sign(mark) {

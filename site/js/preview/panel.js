@@ -6,7 +6,7 @@
  */
 
 import { h } from '../lab/page/dom.js'
-import { formatCode, offerButton, OF_THE_TOOL } from './elements.js'
+import { formatCode, offerButton, OF_THE_TOOL, verdict } from './elements.js'
 import { showMistake } from './marks.js'
 import { timesOf } from './times.js'
 
@@ -134,10 +134,7 @@ export class Panel {
 
   makeProblem({ severity, rule, place, message, label, help, notes, choices, line, start, end, mark, offer, fixed }) {
     const item = h('li', { class: `preview-problem preview-${severity}` })
-    item.append(
-      h('p', { class: 'preview-message' }, h('strong', {}, this.say(severity)), ' ', h('span', OF_THE_TOOL, ...formatCode(message))),
-      this.makePlace(place, rule),
-    )
+    item.append(h('p', { class: 'preview-message' }, ...verdict(this.say, severity, message)), this.makePlace(place, rule))
     if (mark) item.append(h('p', {}, this.makeLink(mark)))
     if (line.trim()) {
       const excerpt = h('mark', {}, line.slice(start, Math.max(end, start + 1)) || '\u00a0')

@@ -81,10 +81,9 @@ function tellImported(message, { answers, lessons, restorable }, text, words, pr
 function addReset(place, key, words, progress) {
   const message = status()
   const open = button(words('progress.live.reset'), () => {
-    const n = { answers: progress.all().length, lessons: progress.lessons().size }
     summary.textContent = say(words, 'progress.live.reset_what', {
-      answers: say(words, 'progress.live.answers_n', { n: n.answers }),
-      lessons: say(words, 'progress.live.lessons_n', { n: n.lessons }),
+      answers: say(words, 'progress.live.answers_n', { n: progress.all().length }),
+      lessons: say(words, 'progress.live.lessons_n', { n: progress.lessons().size }),
     })
     dialog.showModal()
   })

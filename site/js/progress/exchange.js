@@ -4,7 +4,7 @@
  * Entry point: `importText(progress, text)`. A module of its own, since only the page of the reader's progress imports files.
  */
 
-import { decode, merge, NOTHING, StateError, VERSION } from './state.js'
+import { decode, merge, NOTHING, StateError, wrongHead } from './state.js'
 
 const SIZE = 32 * 2 ** 20
 
@@ -26,9 +26,8 @@ function readFile(text, course) {
   } catch (error) {
     throw new ImportError('json', error.message)
   }
-  if (data?.coursebuild !== 'progress') throw new ImportError('kind')
-  if (data.version !== VERSION) throw new ImportError(data.version > VERSION ? 'version' : 'kind')
-  if (data.course !== course) throw new ImportError('course', String(data.course).slice(0, 200))
+  const wrong = wrongHead(data, course)
+  if (wrong !== '') throw new ImportError(wrong, wrong === 'course' ? String(data.course).slice(0, 200) : '')
   try {
     return decode(data, (error) => {
       throw error

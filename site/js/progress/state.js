@@ -15,7 +15,7 @@
  * has `read` and `place`. Nothing changes a state or an entry once it is made.
  */
 
-export const VERSION = 1
+const VERSION = 1
 /** The latest tick that is accepted from a file or another tab; above it there is room for more changes with exact integers. */
 export const LAST_TICK = 2 ** 52
 /** The number of recalls of a question that are stored, the latest ones. */
@@ -158,13 +158,20 @@ export function decode(data, bad) {
   return merge(state, emptyState())
 }
 
+/** What is wrong with the head of parsed JSON: `kind`, `version` (a newer one) or `course`; else ''. */
+export function wrongHead(data, course) {
+  if (data?.coursebuild !== 'progress') return 'kind'
+  if (data.version !== VERSION) return data.version > VERSION ? 'version' : 'kind'
+  return data.course === course ? '' : 'course'
+}
+
 /** Parse a stored text as far as possible; `trouble` is `newer`, `damaged` or `null`. */
 export function parseState(text, course) {
   let whole = true
   try {
     const data = JSON.parse(text)
-    if (data?.coursebuild === 'progress' && data.version > VERSION) return { state: null, trouble: 'newer' }
-    if (data?.coursebuild !== 'progress' || data.version !== VERSION || data.course !== course) return { state: null, trouble: 'damaged' }
+    const wrong = wrongHead(data, course)
+    if (wrong !== '') return { state: null, trouble: wrong === 'version' ? 'newer' : 'damaged' }
     const state = decode(data, () => {
       whole = false
     })

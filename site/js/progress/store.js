@@ -17,8 +17,6 @@ import { changesSchedule } from './schedule.js'
 import { answerOf, canonical, emptyState, encode, isTime, latest, latestRecalls, merge, NOTHING } from './state.js'
 import { placeOf, readOf, parseState } from './state.js'
 
-export { matchQuestions } from './match.js'
-
 const LAST_TIME = Date.UTC(9999, 11, 31)
 
 /**

@@ -5,7 +5,7 @@
 import { fill } from '../page/words.js'
 import { termsOf } from './words.js'
 
-/** The commands of a page, each with an id and a title; `href` is its target, `run` does it and may return a message. */
+/** The commands of a page, each with a title; `href` is its target, `run` does it and may return a message. */
 export function pageActions(document, strings) {
   return [...pageLinks(document, strings), ...commands(document, strings), ...menuPages(document)]
 }
@@ -17,13 +17,12 @@ function* pageLinks(document, strings) {
   ]) {
     const link = document.querySelector(`.pager a[rel="${rel}"]`)
     const title = link?.querySelector('.pager-title') ?? link
-    if (link) yield { id: rel, title: fill(text, { title: plain(title) }), href: link.href }
+    if (link) yield { title: fill(text, { title: plain(title) }), href: link.href }
   }
 }
 
 function* commands(document, strings) {
   yield {
-    id: 'link',
     title: strings.command_link,
     run: async () => {
       await navigator.clipboard.writeText(hereAddress(document))
@@ -31,15 +30,15 @@ function* commands(document, strings) {
     },
   }
   const read = document.querySelector('[data-progress="lesson"] button')
-  if (read) yield { id: 'read', title: plain(read), run: () => read.click() }
-  yield { id: 'print', title: strings.command_print, run: () => window.print() }
+  if (read) yield { title: plain(read), run: () => read.click() }
+  yield { title: strings.command_print, run: () => window.print() }
   const themes = document.querySelector('[data-tools] .theme select')
   for (const option of themes?.options ?? []) {
     const run = () => {
       themes.value = option.value
       themes.dispatchEvent(new Event('change', { bubbles: true }))
     }
-    yield { id: `theme-${option.value}`, title: fill(strings.command_theme, { theme: option.text }), run }
+    yield { title: fill(strings.command_theme, { theme: option.text }), run }
   }
 }
 
@@ -47,7 +46,7 @@ function* commands(document, strings) {
 function* menuPages(document) {
   const hrefs = new Set()
   for (const link of document.querySelectorAll('.site-nav a[href], .site-more a[href]:not([download])')) {
-    if (!hrefs.has(link.href)) yield { id: `page ${link.href}`, title: plain(link), href: link.href }
+    if (!hrefs.has(link.href)) yield { title: plain(link), href: link.href }
     hrefs.add(link.href)
   }
 }

@@ -4,7 +4,7 @@
  */
 
 import { h } from '../lab/page/dom.js'
-import { fill } from '../page/words.js'
+import { fill, readWords } from '../page/words.js'
 import { matchActions, pagesByNumber, pageActions } from './actions.js'
 import { forgetQueries, noteQuery, recentQueries } from './recent.js'
 import { address, hitParts, pageTitle, summary } from './view.js'
@@ -80,8 +80,7 @@ class SearchDialog {
     try {
       this.listing = await this.context.listing()
     } catch {
-      const words = document.querySelector('#_words')?.content.querySelector('[data-key="search.failed"]')
-      this.status.textContent = words?.textContent ?? ''
+      this.status.textContent = readWords(document)('search.failed')
       return
     }
     this.strings = this.listing.strings

@@ -1,6 +1,7 @@
 /** The search page: a form, and below it the results as a list. */
 
 import { h } from '../lab/page/dom.js'
+import { readWords } from '../page/words.js'
 import { noteQuery } from './recent.js'
 import { address, hitParts, pageTitle, summary } from './view.js'
 
@@ -29,18 +30,16 @@ export async function mountPage(context) {
       const [result, listing] = [await context.find(query, limit), await context.listing()]
       if (request === lastRequest) show(result, query, listing.strings)
     } catch {
-      if (request === lastRequest) status.textContent = document.querySelector('#_words').content.querySelector('[data-key="search.failed"]').textContent
+      if (request === lastRequest) status.textContent = readWords(document)('search.failed')
     }
   }
 
   const show = (result, query, strings) => {
-    const count = list.children.length
     status.textContent = result ? summary(result, strings) + (result.count === 0 ? ` ${strings.advice}` : '') : ''
     list.replaceChildren(...(result?.pages ?? []).map((page) => pageItem(page, context.root, strings)))
     moreButton.hidden = !result || result.count <= limit
     moreButton.textContent = strings?.more ?? ''
     history.replaceState(history.state, '', query ? `?q=${encodeURIComponent(query)}` : location.pathname)
-    return count
   }
 
   form.addEventListener('submit', (event) => {

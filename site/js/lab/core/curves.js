@@ -11,9 +11,9 @@
 
 import { solve } from './ode.js'
 import { link } from './program.js'
+import { Goal } from './sampler.js'
 
 const SAMPLES = 600
-const EPSILON = 1e-9 // s, of a goal that has to hold for a while
 
 export class Curves {
   /** @param {Record<string, any>} config of the lab */
@@ -127,9 +127,8 @@ export class Run {
     const times = []
     const states = Array.from({ length: curves.count }, () => [])
     const data = plots.map(({ traces }) => ({ x: [], traces: traces.map(() => []) }))
+    const status = goal && new Goal(goal)
     const held = []
-    let since = null
-    let reached = null
     const take = (t, before) => {
       const env = this.at(t, before)
       times.push(t)
@@ -139,10 +138,8 @@ export class Run {
         traces.forEach((value, j) => data[i].traces[j].push(value(env)))
       })
       if (!goal) return
-      const holds = goal.holds(env) > 0
-      since = holds ? (since ?? t) : null
-      held.push(holds ? t - since : 0)
-      if (holds && t - since >= goal.hold - EPSILON) reached ??= t
+      status.look(goal.holds(env) > 0, t)
+      held.push(status.held)
     }
     const jumps = solution?.events ?? []
     for (let i = 0, next = 0; i <= SAMPLES; i++) {
@@ -155,7 +152,7 @@ export class Run {
       if (times[times.length - 1] !== t) take(t, false)
     }
     if (times.length === 0 || times[times.length - 1] < end) take(end, false)
-    return { times, states, plots: data, held, reached }
+    return { times, states, plots: data, held, reached: status?.reached ?? null }
   }
 
   /** The direction of motion in the plane of a plot: `[dx, dy]` at a point, in the environment of a place of the axis. */

@@ -26,7 +26,8 @@ export class Sampler {
     const windows = config.plots.map((plot) => plot.window ?? DEFAULT_WINDOW)
     this.interval = Math.min(DEFAULT_WINDOW, ...windows) / PER_WINDOW
     this.site = site
-    this.goal = config.goal ? new Goal(config.goal, code.goal) : null
+    this.goal = config.goal ? new Goal(config.goal) : null
+    this.holds = code.goal
     this.active = this.traces.length > 0 || site >= 0 || this.goal !== null
     this.trail = new Float32Array(site >= 0 ? 3 * TRAIL : 0)
     this.epoch = 0
@@ -67,7 +68,7 @@ export class Sampler {
       const source = 3 * this.site
       this.trail.set(env.data.site_xpos.subarray(source, source + 3), offset)
     }
-    this.goal?.look(env)
+    if (this.goal !== null) this.goal.look(call(ENTRY, () => condition(ENTRY, this.holds(env))), env.data.time)
     this.last = env.data.time
   }
 
@@ -122,12 +123,11 @@ export class Sampler {
   }
 }
 
-/** The goal of a lab: a condition that has to stay true for a while. It is evaluated whenever a sample is taken. */
-class Goal {
-  /** @param {{hold: number}} data; @param {(env: Record<string, any>) => boolean} run its condition */
-  constructor({ hold }, run) {
+/** The goal of a lab: a condition that has to stay true for a while. It is looked at whenever a sample is taken. */
+export class Goal {
+  /** @param {{hold: number}} data s, for which it has to be true */
+  constructor({ hold }) {
     this.hold = hold
-    this.run = run
     this.clear()
   }
 
@@ -150,10 +150,8 @@ class Goal {
     Object.assign(this, status)
   }
 
-  /** Evaluate it on data whose derived quantities are current. */
-  look(env) {
-    const { time } = env.data
-    const holds = call(ENTRY, () => condition(ENTRY, this.run(env)))
+  /** Note whether it is true at a time (s). */
+  look(holds, time) {
     this.since = holds ? (this.since ?? time) : null
     this.held = holds ? time - this.since : 0
     this.longest = Math.max(this.longest, this.held)

@@ -38,7 +38,7 @@ export class OrbitCamera {
 
   /** Turn about the target: a view's height of movement is half a turn. */
   rotate(dx, dy) {
-    this.azimuth = wrap(this.azimuth - 180 * dx)
+    this.azimuth -= 180 * dx
     this.elevation = Math.min(STEEPEST, Math.max(-STEEPEST, this.elevation - 180 * dy))
   }
 
@@ -87,8 +87,4 @@ export class ModelCamera {
   zoom() {}
 
   reset() {}
-}
-
-function wrap(degrees) {
-  return ((((degrees + 180) % 360) + 360) % 360) - 180
 }

@@ -251,7 +251,7 @@ export class Chart {
     for (let i = from; i < to; i++) {
       const [x, y] = [scaleX(xs[i]), scaleY(ys[i])]
       if (!Number.isFinite(x + y)) last = NaN
-      else if (Number.isNaN(last) || i + 1 === to || !(isNear(x, last) && goesOn(xs, i) && goesOn(ys, i))) {
+      else if (Number.isNaN(last) || i + 1 === to || !(Math.abs(x - last) < 1 && goesOn(xs, i) && goesOn(ys, i))) {
         if (side(i) !== 0 && side(i - 1) === side(i) && side(i + 1) === side(i)) continue
         path += `${Number.isNaN(last) ? 'M' : 'L'}${x.toFixed(1)} ${Math.min(Math.max(y, -FAR), FAR).toFixed(1)}`
         last = x
@@ -299,8 +299,6 @@ function put(element, x, y, prefix = '') {
 }
 
 const colour = (i) => `lab-trace-${(i % COLOURS) + 1}`
-
-const isNear = (x, last) => Math.abs(x - last) < 1
 
 function dashOf({ dash }, index) {
   if (Array.isArray(dash)) return dash.join(' ')

@@ -1,7 +1,7 @@
 /** The controls of a lab: sliders, lists, buttons, and which overlays are drawn. */
 
 import { freshId, h, onInput, textButton } from './dom.js'
-import { digitsOfStep, formatNumber, withUnit } from './numbers.js'
+import { digitsOfStep, formatNumber, formatReadout, withUnit } from './numbers.js'
 
 const USUAL = 9 // characters of a value, for which there is room at first (lab-live.css)
 const STEPS = 200 // of a slider without a step
@@ -98,13 +98,13 @@ export function switchButton(sign, kind, text, isOn, toggle) {
 }
 
 /** The readouts: labels, and values whose space grows but never shrinks. */
-export function buildReadouts(readouts, format) {
+export function buildReadouts(readouts) {
   if (readouts.length === 0) return { element: null, show: () => {} }
   const rows = readouts.map(({ label }) => ({ label, value: h('dd', {}, '–'), room: USUAL, text: '–' }))
   const element = h('dl', { class: 'lab-readouts' }, ...rows.map(({ label, value }) => h('div', {}, h('dt', {}, label), value)))
   const show = (values) => {
     rows.forEach((row, i) => {
-      const text = format(values[i], readouts[i].digits)
+      const text = formatReadout(values[i], readouts[i].digits)
       if (text === row.text) return
       row.text = text
       row.value.textContent = text

@@ -3,21 +3,19 @@
  */
 
 import { buildControls, buildReadouts } from './controls.js'
-import { h } from './dom.js'
+import { h, prefersStillness } from './dom.js'
 import { formatLabel, formatReadout, formatTime } from './numbers.js'
 import { PLAIN_PLOT, Plot } from './plots.js'
 import { Hands } from './pointer.js'
 import { Shell } from './shell.js'
 import { Simulation } from './simulation.js'
-import { prefersStillness } from './support.js'
 import { buildTransport } from './transport.js'
 import { View } from './view.js'
 
 const HEIGHT = 240 // CSS pixels
 const PLAIN_LAB = {
-  key: null, camera: null, toggles: [], overlays: [], forceScale: null, autoplay: false, stopAt: null, start: null, still: '',
-  trail: null, seed: null,
-  controls: [], readouts: [], plots: [], expect: [],
+  key: null, camera: null, overlays: [], forceScale: null, autoplay: false, stopAt: null, trail: null, seed: null,
+  controls: [], readouts: [], plots: [],
 } // prettier-ignore
 const PLAIN_CONTROL = {
   type: 'slider',
@@ -89,11 +87,7 @@ class Kit extends Shell {
           controls.map((control) => ({ ...PLAIN_CONTROL, ...control })),
           actions,
         ),
-      createReadouts: (readouts) =>
-        buildReadouts(
-          readouts.map((readout) => ({ digits: null, ...readout })),
-          formatReadout,
-        ),
+      createReadouts: buildReadouts,
       createTransport: (actions) => buildTransport(words, { full: null, ...actions }),
       announce: (text) => notices.say(text),
       notice: (text, kind = /** @type {'note' | 'warning' | 'wrong'} */ ('note')) => (text === null ? notices.clear() : notices.show(text, kind)),
@@ -116,17 +110,13 @@ class Kit extends Shell {
     const { on = {}, picture = true, height = HEIGHT, label = this.config.title, ...fields } = options
     const { words, config } = this
     const number = this.simulations.length + 1
-    const lab = { ...PLAIN_LAB, ...pickAddresses(config), ...fields, id: `${config.id}/${number}`, kind: 'simlab' }
+    const { worker, wasm, module, mjb } = config
+    const lab = { ...PLAIN_LAB, worker, wasm, module, mjb, ...fields, id: `${config.id}/${number}`, kind: 'simlab' }
     lab.controls = lab.controls.map((control) => ({ ...PLAIN_CONTROL, ...control }))
     lab.plots = lab.plots.map((plot) => ({ ...PLAIN_PLOT, ...plot }))
     const name = words('lab.live.view', { title: label })
     const view = picture ? new View({ height, label: words('lab.live.picture', { title: label }), name, words }) : null
-    const simulation = new Simulation({
-      config: { ...lab, autoplay: lab.autoplay && !prefersStillness() },
-      base: this.base,
-      view,
-      on: { ...this.faults(lab, view), ...on },
-    })
+    const simulation = new Simulation({ config: lab, base: this.base, view, on: { ...this.faults(lab, view), ...on } })
     if (view !== null) {
       const keys = {
         ' ': () => (simulation.state === 'playing' ? simulation.pause() : simulation.play()),
@@ -159,5 +149,3 @@ class Kit extends Shell {
     super.dispose()
   }
 }
-
-const pickAddresses = ({ worker, wasm, module, mjb }) => ({ worker, wasm, module, mjb })

@@ -10,7 +10,7 @@ import { Curves } from '../core/curves.js'
 import { Chart } from './chart.js'
 import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
-import { formatNumber, formatReadout, withUnit } from './numbers.js'
+import { formatNumber, withUnit } from './numbers.js'
 import { Shell } from './shell.js'
 import { buildTransport } from './transport.js'
 
@@ -19,7 +19,7 @@ const LENGTH = 8 // s, of any other
 const LONGEST_FRAME = 0.1 // s
 
 export class Desk extends Shell {
-  constructor(element, config, words, progress = null) {
+  constructor(element, config, words, progress) {
     super(element, config, words, progress)
     this.curves = new Curves(config)
     this.initial = config.controls.map(({ value }) => value)
@@ -65,7 +65,7 @@ export class Desk extends Shell {
     Object.assign(this.slider, { min: String(axis.min), max: String(axis.max), step: String((axis.max - axis.min) / 600) })
     this.slider.addEventListener('input', () => this.seek(Number(this.slider.value)))
     this.controls = buildControls(config.controls, { set: (index, value) => this.set(index, value) })
-    this.readouts = buildReadouts(config.readouts, formatReadout)
+    this.readouts = buildReadouts(config.readouts)
     this.goal = this.makeGoal({
       show: () => this.begin(config.goal.values),
       unit: this.unit,

@@ -104,3 +104,6 @@ export function download(name, text, type = 'text/plain') {
   link.remove()
   setTimeout(() => URL.revokeObjectURL(address), 10_000)
 }
+
+/** Whether the reader wants nothing to move by itself. */
+export const prefersStillness = () => window.matchMedia('(prefers-reduced-motion: reduce)').matches

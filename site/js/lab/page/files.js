@@ -65,12 +65,10 @@ function findModels(files) {
   const included = new Set([...texts].flatMap(([path, text]) => [...text.matchAll(INCLUDED)].flatMap(([, file]) => placesOf(file, path))))
   const roots = [...texts.keys()].filter((path) => !included.has(path) && texts.get(path).length <= LONGEST_MODEL)
   if (roots.length === 0) throw new FilesError(texts.size === 0 ? 'file_none' : 'file_large')
-  const rank = (path) => [SCENE.test(path) ? 0 : 1, texts.get(path).match(INCLUDED) ? 0 : 1, path.split('/').length]
-  roots.sort((a, b) => {
-    const [left, right] = [rank(a), rank(b)]
-    const i = left.findIndex((value, k) => value !== right[k])
-    return i < 0 ? a.localeCompare(b, 'en') : left[i] - right[i]
-  })
+  roots.sort((a, b) => a.localeCompare(b, 'en'))
+  // Sorting keeps the order of equals, so that the last rank counts most.
+  const ranks = [(path) => path.split('/').length, (path) => (texts.get(path).match(INCLUDED) ? 0 : 1), (path) => (SCENE.test(path) ? 0 : 1)]
+  for (const rank of ranks) roots.sort((a, b) => rank(a) - rank(b))
   return new Map(roots.map((path) => [path, texts.get(path)]))
 }
 

@@ -24,7 +24,7 @@ import { cross } from '../core/vectors.js'
 /** mjtGeom */
 export const GEOM = Object.freeze({
   PLANE: 0, HFIELD: 1, SPHERE: 2, CAPSULE: 3, ELLIPSOID: 4, CYLINDER: 5, BOX: 6, MESH: 7, SDF: 8,
-  ARROW: 100, ARROW1: 101, ARROW2: 102, LINE: 103, LINEBOX: 104, TRIANGLE: 108,
+  ARROW: 100, ARROW1: 101, ARROW2: 102, LINE: 103, LINEBOX: 104,
 }) // prettier-ignore
 
 const ROUND = 40 // segments around

@@ -1,5 +1,5 @@
 /**
- * The samples of a plot, or the poses of a picture: of a window of some seconds, or of the whole run.
+ * Samples of a plot, or poses of a picture: of a window of some seconds, or of the whole run.
  *
  * With a window, samples that have left it are dropped. Without one, every second sample is dropped whenever there are too many. No DOM.
  */
@@ -78,63 +78,4 @@ export function valuesAt(times, columns, time) {
   const i = Math.max(0, times.findLastIndex((x) => x <= time))
   const part = i + 1 < times.length ? Math.max(0, time - times[i]) / (times[i + 1] - times[i]) : 0
   return columns.map((column) => (part > 0 ? column[i] + part * (column[i + 1] - column[i]) : column[i]))
-}
-
-export const PLAYING = { time: 0, resting: false, marks: [] }
-
-/** The samples of a plot, in its window and of the whole run, and those of a run that is kept. */
-export class Samples {
-  /** @param {any} config a plot of the lab's JSON @param {number} [count] numbers of a sample */
-  constructor(config, count = config.traces.length) {
-    this.config = config
-    this.count = count
-    this.recent = new History(count, config.window)
-    this.whole = config.window === null ? this.recent : new History(count, null)
-    /** @type {{time: number, resting: boolean, marks: {time: number, label: string}[]}} */
-    this.now = PLAYING
-    /** @type {number[][] | null} the samples of an earlier run */
-    this.kept = null
-    this.dirty = false
-  }
-
-  /** Add samples: `values` has `width` numbers for each time, those of this plot from `offset` on. */
-  push(times, values, width, offset) {
-    for (const history of new Set([this.recent, this.whole])) {
-      for (let i = 0; i < times.length; i++) history.push(times[i], values, i * width + offset)
-    }
-    if (times.length > 0) this.dirty = true
-  }
-
-  clear() {
-    this.recent.clear()
-    this.whole.clear()
-    this.dirty = true
-  }
-
-  /** Drop what came after a time (s). */
-  cut(time) {
-    const { recent, whole, config } = this
-    whole.cut(time)
-    if (recent !== whole) recent.refill(whole, time - config.window)
-    this.dirty = true
-  }
-
-  /** Keep the run, so that its lines stay behind those of the next; or keep none. */
-  keep(on) {
-    this.kept = on && this.whole.length > 0 ? this.whole.columns.map((column) => column.slice()) : null
-    this.dirty = true
-  }
-
-  /** The samples that are shown. */
-  get history() {
-    return this.now.resting ? this.whole : this.recent
-  }
-
-  /** Take what there is to draw; returns whether it differs from what was drawn before. */
-  take(now) {
-    const { time, resting } = this.now
-    this.now = now
-    if (now.resting !== resting || (resting && now.time !== time)) this.dirty = true
-    return this.dirty
-  }
 }

@@ -12,7 +12,7 @@ import { buildControls, buildOverlays, buildReadouts, switchButton } from './con
 import { download, h, icon, textButton } from './dom.js'
 import { curvesText, fillScript } from './export.js'
 import { History } from './history.js'
-import { digitsOfStep, formatReadout, formatTime } from './numbers.js'
+import { digitsOfStep, formatTime } from './numbers.js'
 import { followLegend } from './legend.js'
 import { ModelPanel } from './panel.js'
 import { Plot } from './plots.js'
@@ -20,7 +20,6 @@ import { Hands } from './pointer.js'
 import { writeLog } from './share.js'
 import { Shell } from './shell.js'
 import { Simulation } from './simulation.js'
-import { prefersStillness } from './support.js'
 import { buildTape, buildTransport } from './transport.js'
 import { View } from './view.js'
 import { ROW } from './world.js'
@@ -51,12 +50,7 @@ export class Instrument extends Shell {
     this.poses = null
     this.keptPoses = null
     this.build()
-    this.simulation = new Simulation({
-      config: { ...config, autoplay: Boolean(config.autoplay) && !prefersStillness() },
-      base,
-      view: this.view,
-      on: this.listeners(),
-    })
+    this.simulation = new Simulation({ config, base, view: this.view, on: this.listeners() })
     this.leaveLegend = followLegend(element, (name, isAsked) => this.simulation.point(name, isAsked))
   }
 
@@ -94,7 +88,7 @@ export class Instrument extends Shell {
     if (arrows !== null) this.transport.speed.after(arrows)
     const grab = switchButton(icon('hand'), 'lab-icon', words('lab.live.grab'), this.hands.grabs, (isOn) => (this.hands.grabs = isOn))
     this.transport.speed.after(grab)
-    this.readouts = buildReadouts(config.readouts, formatReadout)
+    this.readouts = buildReadouts(config.readouts)
     const others = isEdited ? new Set([...FLAGS, ...config.toggles]) : FLAGS.filter((name) => !config.toggles.includes(name))
     const toggles = [...others].filter((name) => !config.arrows?.[name])
     const flags = buildOverlays({ toggles, overlays: config.overlays, arrows: null }, words, overlay).boxes

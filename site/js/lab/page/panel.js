@@ -5,7 +5,7 @@
 
 import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
-import { formatNumber, formatReadout } from './numbers.js'
+import { formatNumber } from './numbers.js'
 import { PLAIN_PLOT, Plot } from './plots.js'
 
 const DIGITS = 3 // of sensors
@@ -43,10 +43,7 @@ export class ModelPanel {
       actuators.map(({ name, min, max }) => ({ type: 'slider', label: name, min, max, step: null, digits: DIGITS })),
       { set: (i, value) => actions.actuate(i, Number(value)) },
     )
-    this.readouts = buildReadouts(
-      sensors.map(({ name }) => ({ label: name, digits: DIGITS })),
-      formatReadout,
-    )
+    this.readouts = buildReadouts(sensors.map(({ name }) => ({ label: name })))
     const views = [[words('lab.live.camera_free'), -1], ...cameras.map(({ name, index }) => [name, index])]
     const menu = buildControls([{ type: 'select', label: words('lab.live.camera'), options: views }], {
       set: (_, camera) => actions.look(Number(camera)),
@@ -127,10 +124,7 @@ export class ModelPanel {
     }
     if (rows === null) return
     if (!this.rows.hasChildNodes()) {
-      this.table = buildReadouts(
-        rows.map(([label]) => ({ label, digits: null })),
-        formatReadout,
-      )
+      this.table = buildReadouts(rows.map(([label]) => ({ label })))
       this.rows.append(this.table.element)
     }
     this.table.show(rows.map(([, values]) => textOf(values, null)))

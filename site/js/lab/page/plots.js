@@ -3,10 +3,12 @@
  */
 
 import { Chart } from './chart.js'
-import { PLAYING, Samples } from './history.js'
+import { History } from './history.js'
 import { formatTime } from './numbers.js'
 
 const HEIGHT = 170 // CSS pixels where texts have their usual size
+const PLAYING = { time: 0, resting: false, marks: [] }
+
 /** A plot of the lab's JSON with nothing in it. */
 export const PLAIN_PLOT = {
   xlabel: '',
@@ -20,7 +22,7 @@ export const PLAIN_PLOT = {
   log: false,
 }
 
-export class Plot extends Samples {
+export class Plot {
   /**
    * @param {any} config a plot of the lab's JSON; `log: true` gives it a logarithmic y axis; with an `x`, whose numbers come behind those
    *   of the traces, it is not against time
@@ -28,13 +30,47 @@ export class Plot extends Samples {
    * @param {((time: number) => void) | null} [seek] the reader points at a time (s)
    */
   constructor(config, words, seek = null) {
-    super(config, config.traces.length + (config.x ? 1 : 0))
+    const { traces, window, x } = config
+    this.config = config
+    this.count = traces.length + (x ? 1 : 0) // numbers of a sample
+    this.recent = new History(this.count, window)
+    this.whole = window === null ? this.recent : new History(this.count, null)
+    /** @type {{time: number, resting: boolean, marks: {time: number, label: string}[]}} */
+    this.now = PLAYING
+    /** @type {number[][] | null} the samples of an earlier run */
+    this.kept = null
+    this.dirty = true
     const format = (time) => `${formatTime(time)} s`
     this.chart = new Chart(config, { words, across: words('lab.time'), height: HEIGHT, format, seek })
     this.element = this.chart.element
     this.element.classList.add('lab-plot')
-    this.dirty = true
     this.draw()
+  }
+
+  /** Add samples: `values` has `width` numbers for each time, those of this plot from `offset` on. */
+  push(times, values, width, offset) {
+    for (const history of new Set([this.recent, this.whole])) {
+      for (let i = 0; i < times.length; i++) history.push(times[i], values, i * width + offset)
+    }
+    if (times.length > 0) this.dirty = true
+  }
+
+  clear() {
+    this.cut(-Infinity)
+  }
+
+  /** Drop what came after a time (s). */
+  cut(time) {
+    const { recent, whole, config } = this
+    whole.cut(time)
+    if (recent !== whole) recent.refill(whole, time - config.window)
+    this.dirty = true
+  }
+
+  /** Keep the run, so that its lines stay behind those of the next; or keep none. */
+  keep(on) {
+    this.kept = on && this.whole.length > 0 ? this.whole.columns.map((column) => column.slice()) : null
+    this.dirty = true
   }
 
   /**
@@ -44,10 +80,13 @@ export class Plot extends Samples {
    *   and when which control was used
    */
   draw(now = PLAYING) {
-    if (!this.take(now)) return
-    this.dirty = false
-    const { config, kept, history } = this
+    const before = this.now
+    this.now = now
     const { time, resting, marks } = now
+    if (!this.dirty && resting === before.resting && (!resting || time === before.time)) return
+    this.dirty = false
+    const { config, kept } = this
+    const history = resting ? this.whole : this.recent
     const curves = (columns) => {
       const [times, ...traces] = columns
       return { times, x: config.x ? traces.pop() : times, traces }
@@ -55,7 +94,7 @@ export class Plot extends Samples {
     this.chart.draw({
       ...curves(history.columns),
       ghost: kept && curves(kept),
-      across: config.x ? null : this.timeRange(),
+      across: config.x ? null : this.timeRange(history.last),
       at: resting ? time : Infinity,
       from: resting ? time - (config.window ?? Infinity) : undefined,
       pale: resting,
@@ -63,9 +102,8 @@ export class Plot extends Samples {
     })
   }
 
-  timeRange() {
+  timeRange(last) {
     const { window } = this.config
-    const { last } = this.history
     if (window === null || this.now.resting) return [0, Math.max(window ?? 1, last, this.kept?.[0].at(-1) ?? 0)]
     return last <= window ? [0, window] : [last - window, last]
   }

@@ -47,7 +47,8 @@ export async function copyLink(link) {
 
 async function field(head, physics) {
   const content = new Blob([`${JSON.stringify(head)}\n`, Float64Array.from(physics)])
-  return `z=${toBase64(await pipe(content, new CompressionStream('deflate-raw')))}`
+  const bytes = /** @type {any} */ (await pipe(content, new CompressionStream('deflate-raw')))
+  return `z=${bytes.toBase64({ alphabet: 'base64url', omitPadding: true })}`
 }
 
 /**
@@ -62,7 +63,8 @@ export async function readLink(fragment) {
   const fields = new URLSearchParams(fragment.slice(1))
   const id = fields.get('lab')
   try {
-    return { id, state: parse(await pipe(fromBase64(fields.get('z')), new DecompressionStream('deflate-raw'))) }
+    const bytes = /** @type {any} */ (Uint8Array).fromBase64(fields.get('z'), { alphabet: 'base64url' })
+    return { id, state: parse(await pipe(bytes, new DecompressionStream('deflate-raw'))) }
   } catch {
     return { id, state: null }
   }
@@ -112,14 +114,4 @@ export async function pipe(bytes, stream, most = LARGEST, tooMuch = new RangeErr
     }
   }
   return new Uint8Array(await new Blob(chunks).arrayBuffer())
-}
-
-function toBase64(bytes) {
-  let text = ''
-  for (let i = 0; i < bytes.length; i += 4096) text += String.fromCharCode(...bytes.subarray(i, i + 4096))
-  return btoa(text).replaceAll('+', '-').replaceAll('/', '_').replaceAll('=', '')
-}
-
-function fromBase64(text) {
-  return Uint8Array.from(atob(text.replaceAll('-', '+').replaceAll('_', '/')), (character) => character.charCodeAt(0))
 }

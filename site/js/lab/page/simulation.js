@@ -9,7 +9,7 @@
  *   state(state, reason)   'asleep' (nothing is loaded before something is asked of it), 'loading', 'paused', 'playing', 'ended' (it will not run again)
  *   ready({scene, values, time, version})
  *   samples({epoch, from, times, values}, fresh)   `fresh`: a new run began, earlier samples belong to another
- *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, contacts, goal, panel, tape}
+ *   refresh(frame, now)    once for each picture at most: {time, readouts, realtime, goal, panel, tape}
  *   model(model)           what the model offers (core/panel.js), after `inspect(true)`
  *   controls(values)       lab code may have changed them
  *   diverged({time, kind, message}), warning({time, kind, message}), error({message, entry, kind, fatal}), saved(state)
@@ -20,6 +20,7 @@
  */
 
 import { connection } from './connection.js'
+import { prefersStillness } from './dom.js'
 
 export class Simulation {
   /**
@@ -30,7 +31,8 @@ export class Simulation {
    * @param {Record<string, any>} [options.on] listeners
    */
   constructor({ config, base, view = null, on = {} }) {
-    this.config = config
+    /** @type {Record<string, any>} */
+    this.config = { ...config, autoplay: Boolean(config.autoplay) && !prefersStillness() }
     this.view = view
     this.on = on
     /** @type {HTMLElement | null} of a custom lab: see custom.js */
@@ -44,7 +46,7 @@ export class Simulation {
     this.line = null
     this.pointed = null
     this.latest = null
-    if (config.autoplay) this.connect()
+    if (this.config.autoplay) this.connect()
     else this.setState('asleep')
   }
 
@@ -190,7 +192,7 @@ export class Simulation {
    *
    * @param {string} xml @param {any} own @param {boolean} isOther whether it is no edition of the lab's model, whose camera then stays
    */
-  load(xml, own = null, isOther = false) {
+  load(xml, own, isOther) {
     this.config = { ...this.config, xml, isOther }
     this.own = own
     this.restart()

@@ -10,7 +10,7 @@ import { h, textButton } from './dom.js'
 import { Editor } from './editor.js'
 import { FilesError, MOST_BYTES, readModels } from './files.js'
 import { Instrument } from './instrument.js'
-import { LONGEST_MODEL, copyLink, writeLink } from './share.js'
+import { LONGEST_MODEL } from './share.js'
 
 /**
  * Let the reader edit the model of an instrument, in its place.
@@ -125,17 +125,8 @@ export class Workbench extends Instrument {
   }
 
   shareAction() {
-    return ['link_model', () => this.shareModel()]
-  }
-
-  async shareModel() {
-    const { words, notices, config, editor, own } = this
-    const state = { values: [], steps: 0, time: 0, physics: new Float64Array(), text: editor.text }
-    const { link, only } = await writeLink(config.id, state)
-    if (only !== null) return notices.show(words('lab.live.link_long'), 'warning')
-    const said = words(await copyLink(link))
-    if (own === null || own.files.size === 1) notices.show(said, 'note')
-    else notices.show(`${said} ${words('lab.live.link_files')}`, 'warning')
+    const state = { values: [], steps: 0, time: 0, physics: new Float64Array() }
+    return ['link_model', () => this.share({ ...state, text: this.editor.text }, this.own?.files.size > 1 ? 'files' : '')]
   }
 
   /** Show the model of a link. */

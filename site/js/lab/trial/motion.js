@@ -70,8 +70,8 @@ export class Motion {
 }
 
 /**
- * What a reader sees who plays what an exercise begins with, in a camera that shows all of it: `moved`, the part of the picture, or null if
- * the lab cannot run; and `begin`, the `scene` and the `pictures` of the start, as in a trial's main run, or null if there is none.
+ * What a reader sees in the first seconds who plays what an exercise begins with, in a camera that shows all of it: `moved`, the part of the
+ * picture, or null if the lab cannot run; and `begin`, the `scene` and the `pictures` of the start, as in a trial's main run, or null if there is none.
  *
  * @param {() => import('../core/lab.js').Lab} open
  */
@@ -88,13 +88,14 @@ export function played(open) {
     const framing = new Framing(lab, camera)
     const motion = new Motion(lab)
     framing.begin()
+    framing.observe(lab)
     const button = controls.findIndex(({ label }) => label === start)
     if (button >= 0) lab.press(button)
     const slice = Math.max(1, Math.round(SECONDS / MOMENTS / lab.option.timestep)) // steps
     do {
       framing.observe(lab)
       motion.observe(lab)
-    } while (lab.time < motion.end && lab.step(slice).steps > 0 && lab.diverged === null)
+    } while (lab.step(slice).steps > 0 && lab.diverged === null && lab.time <= motion.end)
     const fitting = camera.orthographic ? null : framing.fit()
     if (fitting !== null && placed?.distance == null && placed?.target == null) Object.assign(camera, fitting)
     scene.floor = framing.floor()

@@ -36,7 +36,7 @@
  *
  *   ready {version, scene, values, time}  `scene` of core/scene.js; `values` of the controls, `null` for none yet
  *   model {model}                     what the model offers, or `null`: the answer to `inspect`
- *   frame {time, buffer, readouts, samples, realtime, contacts, goal, panel, tape}
+ *   frame {time, buffer, readouts, samples, realtime, goal, panel, tape}
  *   playing
  *   paused {reason}                   `user`, `stopAt`, `code`, `diverged`, `error`, `offscreen`
  *   controls {values}                 after anything that lab code may have changed
@@ -117,8 +117,7 @@ export class Session {
   receive(message) {
     const handler = HANDLERS[message.type]
     if (handler === undefined) throw new RangeError(`the worker knows no message "${message.type}"`)
-    if (message.type === 'frame') this.buffers.push(message.buffer)
-    else if (this.lab !== null) this.guard(() => handler(this, message))
+    if (this.lab !== null) this.guard(() => handler(this, message))
   }
 
   play() {
@@ -246,13 +245,13 @@ export class Session {
     const samples = lab.sampler.take()
     const realtime = this.playing ? this.clock.ratio() : 1
     const panel = lab.panel?.read() ?? null
-    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, contacts: lab.data.ncon, goal: lab.goal, panel, tape: lab.tape.range }
+    const rest = { time: lab.time, buffer: frame.buffer, readouts, samples, realtime, goal: lab.goal, panel, tape: lab.tape.range }
     this.post('frame', rest, [frame.buffer, samples.times.buffer, samples.values.buffer])
   }
 }
 
 const HANDLERS = {
-  frame: () => {},
+  frame: (session, { buffer }) => session.buffers.push(buffer),
   play: (session) => session.play(),
   pause: (session) => session.stop('user'),
   step(session, { n }) {
