@@ -185,14 +185,20 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
         return f"`{expression}`" if expression else ""
     if name[0].isupper():
         words = "" if part["end"] else write_component(name, attributes, context)
-        before, after = part.string[: part.start()], part.string[part.end() :]
-        if before.endswith(">") and after.startswith("</a>"):  # an icon that is a link
+        text, start, end = part.string, part.start(), part.end()
+        if text[start - 1 : start] == ">" and text.startswith(
+            "</a>", end
+        ):  # an icon that is a link
             words = words or find_group(r"\sicon=[\"']([^\"']+)", attributes)
-        is_first = not before.rpartition("\n")[2].strip()
-        lines = len(after) - len(after.lstrip("\n"))
-        if words and is_first and re.search(r">[ \t]*\n[ \t]*\Z", before):
+        line = text.rfind("\n", 0, start) + 1
+        if not words or text[line:start].strip():
+            return words
+        line_above = text[text.rfind("\n", 0, max(line - 1, 0)) + 1 : line]
+        if line_above.rstrip().endswith(">"):
             words = f"\n\n{words}"  # else it were HTML, too
-        return words + "\n" * (2 - lines if words and is_first and after[lines:] else 0)
+        below = text[end : end + 2]
+        lines = len(below) - len(below.lstrip("\n"))
+        return words + "\n" * (2 - lines if below[lines:] else 0)
 
     def write_attribute(computed: re.Match[str]) -> str:
         address = _ADDRESS.search(computed[0])

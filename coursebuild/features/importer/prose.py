@@ -110,7 +110,7 @@ _FIELDS = regex(
 _ABBREVIATION = regex(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
 _EDGE = regex(
     r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?"
-    r"(`{3,}|~{3,}|<!--(?!.*-->)|<pre\b(?!.*</pre>)|\$\$(?!.*\$\$))"
+    r"(`{3,}|~{3,}|<!--(?!.*-->)|<pre(?=[\s>])(?!.*</pre>)|\$\$(?!.*\$\$))"
 )
 """The first or last line of code in a quotation or a list, or the first of what `_ENDS` has."""
 _PICTURE_LINE = regex(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)

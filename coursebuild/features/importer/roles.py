@@ -22,20 +22,20 @@ from coursebuild.features.importer.context import (
 from coursebuild.features.importer.jsx import write_component
 from coursebuild.features.importer.source_files import find_group, stem_of, title_of_file
 
-_BLOCK_START = r"[ \t]*(?:\n|[>|]|(?:[-*+]|\#+|\d+[.)])[ \t\n]|:::|```|~~~)"
+BLOCK_START = r"[ \t]*(?:\n|[>|]|(?:[-*+]|\#+|\d+[.)])[ \t\n]|:::|```|~~~)"
 _FENCE = (
     r"^[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)*(?P<mark>`{3,}|~{3,})[^`\n]*\n"
     r"(?:(?![ \t>]*(?P=mark))[^\n]*\n)*[^\n]*"
 )
 _OVER_LINES = regex(
     rf"(?P<block>{_FENCE})"  # what looks like one in code is none
-    rf"|(?<!`)(?P<ticks>`+)(?!`)(?:[^\n]|\n(?!{_BLOCK_START}))+?"
+    rf"|(?<!`)(?P<ticks>`+)(?!`)(?:[^\n]|\n(?!{BLOCK_START}))+?"
     r"(?<!`)(?P=ticks)(?!`)"
     r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
-    rf"|^[ ]{{0,3}}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n(?!{_BLOCK_START})[ \t]*[^\s<\[]\S*"
+    rf"|^[ ]{{0,3}}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n(?!{BLOCK_START})[ \t]*[^\s<\[]\S*"
     r"(?=[ \t]*(?:$|[\"'(]))"
     r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
     r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
@@ -131,7 +131,11 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case _ if name.rpartition(":")[2] in CODE_ROLES:
             name_of_part = re.sub(r"^(?:!|~(?:.*\.)?)", "", target)  # as Sphinx shows it
             return f"`{words or name_of_part}`"
-        case _ if name in _WORD_ROLES or name.startswith("bdg"):  # a badge
+        case _ if name.startswith("bdg-link"):  # a badge
+            return write_link(words or target, context.resolve_link(target))
+        case _ if name.startswith("bdg-ref"):
+            return convert_role("any", body, context)
+        case _ if name in _WORD_ROLES or name.startswith("bdg"):
             return words or body
         case _ if _ICON_ROLE.fullmatch(name):
             return ""
@@ -278,7 +282,9 @@ def convert_wiki_link(whole: str, page: str, part: str, words: str, context: Les
     return write_link(words or page or part.lstrip("#"), address)
 
 
-_ATTRIBUTE = regex(r"(?<=\s)(href|poster|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
+_ATTRIBUTE = regex(
+    r"(?<=\s)(href|poster|src|srcset)(=[\"'][\s,]*)([^\"'\s,][^\"'\n]*)", re.IGNORECASE
+)
 
 
 _WITH_FILE = regex(r"<(?:a|audio|(?P<frame>iframe)|img|source|track|video)\b", re.IGNORECASE)
@@ -316,7 +322,7 @@ def convert_tag(tag: str, context: LessonContext) -> str:
             continue
         address = attribute[3].removeprefix("attachment:")
         if attribute[1].lower() == "srcset":  # the first of several: pages take one size
-            address = address.split(",")[0].split()[0]
+            address = address.split()[0].rstrip(",")
         before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
         if new_address := context.resolve_picture(address):
             tag = before + new_address + after
