@@ -29,6 +29,7 @@ from coursebuild.features.importer.pandoc_tables import (
     write_meanings,
 )
 from coursebuild.features.importer.roles import (
+    LOOK,
     address_of_label,
     convert_attributes,
     convert_code,
@@ -230,6 +231,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
             mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
         elif edge is not None and edge[1].startswith(mark):
             mark = "" if mark else edge[1]
+            line = LOOK.sub("", line) if mark == "<pre" else line
         out.append(f"{line}\n" if is_open else line)
 
     def leave_cells(line: int, cells: str) -> None:

@@ -288,7 +288,7 @@ _ATTRIBUTE = regex(
 
 
 _WITH_FILE = regex(r"<(?:a|audio|(?P<frame>iframe)|img|source|track|video)\b", re.IGNORECASE)
-_LOOK = regex(
+LOOK = regex(
     r"(?<=<table)(?:(?!\sid=)[^<>])*?\salign=[\"'\w]+"  # by which words would stand beside it
     r"|[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
 )
@@ -301,7 +301,7 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     """
     if re.match(r"<img\b[^<>]*\sclass=[\"'][^\"'<>]*\b(?:only-dark|dark-only)\b", tag):
         return ""  # a page makes its pictures dark itself
-    tag = _LOOK.sub("", tag)
+    tag = LOOK.sub("", tag)
     name = tag[1:].split()[0]
     if name[0].isupper() and not name.isupper():  # no element of HTML
         return write_component(name, tag, context)
