@@ -97,6 +97,9 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case "ref" | "numref" | "prf:ref" | "any" | "embed":
             address = address_of_label(target, context)
             if not address:
+                path = context.resolve_path(f"{target}.md")
+                if name == "any" and stem_of(path) in context.targets:
+                    return convert_role("doc", body, context)
                 message = f"a link to `{target}`, which no text sets"
                 context.leave(f"role `{{{name}}}`", message)
                 if name == "any":  # what is left is the name of an object
