@@ -172,7 +172,7 @@ _KINDS = {
     "change": ("suggested change", "as if it had been accepted"),
     "latex": ("command of LaTeX", "dropped: it changes no word"),
     "mention": ("mention of a lesson", "its new number"),
-    "icon": ("icon", "dropped: it is a picture of its tool"),
+    "icon": ("icon", "its sign, or its name where it is alone; else dropped"),
     "emoji": ("emoji", "its sign"),
     "block": ("block of Obsidian", "an anchor"),
     "keys": ("keys", "their names"),
