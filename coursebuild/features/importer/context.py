@@ -173,9 +173,9 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         bare = stem if has_order else without_order(stem)
         names = [stem, path, f"{folder}/index", f"{folder}/README", own_route, bare]
         if self.files.mkdocs:  # from the address of its own page, which is a folder
-            page = stem_of(self.path).removesuffix("/index")
+            page = re.sub(r"(?:^|/)(?:index|README)\Z", "", stem_of(self.path))
             below = posixpath.normpath(posixpath.join(page, parts.path))
-            names += [below, f"{below}/index"]
+            names = [below, f"{below}/index", *names]
         target = next(filter(None, map(self.targets.get, names)), None)
         if target is None and address.startswith("/"):  # the folder of a site's texts is no route
             ends = (f"/{bare}", f"/{bare}/index")

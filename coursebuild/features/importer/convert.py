@@ -33,7 +33,7 @@ from coursebuild.features.importer.context import (
     without_order,
 )
 from coursebuild.features.importer.course_map import map_lines, read_course_json, read_texts
-from coursebuild.features.importer.jsx import MDX
+from coursebuild.features.importer.jsx import is_mdx
 from coursebuild.features.importer.lost_words import find_lost_words
 from coursebuild.features.importer.other_cells import languages_of_single_cells, write_joined_cells
 from coursebuild.features.importer.references import complete_texts
@@ -375,13 +375,12 @@ def _convert_texts(
 def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
     """Return a lesson or page in Markdown of coursebuild, with its cells as parts of one script."""
     folder = posixpath.dirname(text.path)
-    prose = (segment.text for segment in text.segments if segment.kind == "prose")
     context = replace(
         course_context,
         path=text.file,
         folder=folder,
         pictures=text.pictures,
-        is_mdx=text.file.endswith(".mdx") or any(map(MDX.search, prose)),
+        is_mdx=is_mdx(text.file, text.segments),
         references=frozenset(
             label.casefold()
             for segment in text.segments

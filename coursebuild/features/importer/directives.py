@@ -18,7 +18,13 @@ from coursebuild.features.importer.displays import display_formula
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.outlines import read_tree
 from coursebuild.features.importer.prose import rewrite_prose
-from coursebuild.features.importer.roles import CODE_ROLES, convert_role, words_of_link, write_link
+from coursebuild.features.importer.roles import (
+    BLOCK_START,
+    CODE_ROLES,
+    convert_role,
+    words_of_link,
+    write_link,
+)
 from coursebuild.features.importer.rst import read_rst
 from coursebuild.features.importer.source_files import TOO_MUCH, find_group, stem_of
 
@@ -292,9 +298,12 @@ def _write_list(directive: Directive, context: LessonContext) -> str:
     """Return the texts of a part of the course as a list of links."""
     caption = directive.options.get("caption", "").strip("\"'")
     lines = [f"**{caption}**\n"] if caption else []
+    shown = {context.path}
     for _, title, target, paths in read_tree(directive.text, context.path, context.files):
-        lines += (f"- {write_link(title, context.targets.get(stem_of(p), ''))}" for p in paths)
-        lines += [f"- [{title}]({target})"] if "://" in target else []
+        new = [context.targets.get(stem_of(path), "") for path in paths if path not in shown]
+        lines += (f"- {write_link(title, address)}" for address in new)
+        shown.update(paths)
+        lines += [f"- [{title or target}]({target})"] if "://" in target else []
     return "\n".join(lines)
 
 
@@ -341,7 +350,9 @@ def _write_glossary(directive: Directive) -> str:
             continue
         terms.append(_mark_term(term.strip(), marked_terms))
         if meaning.strip():
-            out.append(f"{', '.join(terms)}: {directive.nested(textwrap.dedent(meaning)).strip()}")
+            words = directive.nested(textwrap.dedent(meaning)).strip()
+            gap = "\n\n" if re.match(BLOCK_START, words) else " "
+            out.append(f"{', '.join(terms)}:{gap}{words}")
             terms = []
     return "\n\n".join(out)
 

@@ -7,11 +7,12 @@ is shown, and so is its label. An attribute whose value is computed has none her
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from textwrap import shorten
 
 from coursebuild.api import marks, regex
 from coursebuild.features.importer.context import LessonContext
-from coursebuild.features.importer.source_files import find_group
+from coursebuild.features.importer.source_files import Segment, find_group
 
 _STRING = r"(?:\"(?:\\.|[^\"\\\n])*\"|'(?:\\.|[^'\\\n])*'|`(?:\\.|[^`\\])*`)"
 _QUOTED = rf"(?<=[\s=(\[{{,:?+&|]){_STRING}"
@@ -26,7 +27,7 @@ _STATEMENT = (
     r"|export[ ](?:const|let|function|default)\b)"
     r"[^\n]*(?:\n(?!</)[^\n]+)*\n?"  # not the end of a script element
 )
-MDX = regex(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
+_MDX = regex(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
 """What only MDX can hold."""
 _PART = regex(
     r"(?P<code>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`))"
@@ -37,8 +38,14 @@ _PART = regex(
     rf"{_ATTRIBUTES}>",
     re.MULTILINE | re.DOTALL,
 )
-COMPONENT = regex(r"[ \t]*<(?P<end>/?)(?P<name>[A-Z][\w.]*)(?:\s[^<>]*)?(?<!/)>[ \t]*")
+COMPONENT = regex(r"[ \t]*</?[A-Z][\w.]*(?:\s[^<>]*)?(?<!/)>[ \t]*")
 """A line of nothing but where a component begins or ends."""
+_OPENING = regex(
+    r"[ \t]*<(?P<name>[A-Za-z][\w.]*)(?:\s(?:[^<>\n]|\n(?![ \t]*\n))*)?(?<!/)>[ \t]*$", re.MULTILINE
+)
+"""Lines of nothing but where an element begins."""
+_EDGE = regex(r"(?:(?:[-+*]|\d+[.)])[ \t]+)*(?P<mark>`{3,}|~{3,})(?P<info>(?!`)[^`\s]*)[^`]*\Z")
+"""The first or last line of code."""
 _WORDS = regex(
     rf"<(?P<name>[A-Z]\w*){_ATTRIBUTES}>"
     r"\s*(?P<words>[^\s<>{}](?:[^<>{}\n]|\n(?!\n))*?)\s*</(?P=name)>"
@@ -70,27 +77,39 @@ _ADDRESS = regex(r"(?:require|useBaseUrl)\(\s*[\"']([^\"']+)[\"']\s*\)(?:\.defau
 """The address of a picture where it is computed."""
 
 
+def is_mdx(name: str, segments: Iterable[Segment]) -> bool:
+    """Return whether a text is MDX, by the name of its file or by its prose."""
+    prose = (segment.text for segment in segments if segment.kind == "prose")
+    return name.endswith(".mdx") or any(map(_MDX.search, prose))
+
+
 def dedent_components(text: str) -> str:
-    """Return a text in which what components hold stands no further right than their tags.
+    """Return MDX in which what elements hold stands no further right than their tags.
 
     Indentation makes no code in MDX.
     """
+    closed = {*re.findall(r"</([A-Za-z][\w.]*)>", text)}
     lines, holders, fence = list[str](), [("", 0)], ""
     opening: tuple[str, int] | None = None
+    at = end = 0  # of the line, and of the last tag
     for line in text.split("\n"):
         words = line.lstrip(" \t")
         margin = len(line) - len(words)
-        tag = None if fence else COMPONENT.fullmatch(line)
-        if opening and words:
+        if opening and words and at >= end:
             holders.append((opening[0], holders[-1][1] + max(margin - opening[1], 0)))
             opening = None
-        if tag and tag["end"] and tag["name"] == holders[-1][0]:
+        name, shift = holders[-1]
+        lines.append(line[min(margin, shift) :])
+        if edge := _EDGE.match(words):
+            if not fence:
+                fence = edge["mark"]
+            elif words.startswith(fence) and not edge["info"]:
+                fence = ""
+        elif not fence and name and f"</{name}>" in words and f"<{name}" not in words:
             holders.pop()
-        lines.append(line[min(margin, holders[-1][1]) :])
-        if edge := re.match("`{3,}|~{3,}", words):
-            fence = fence * (not words.startswith(fence)) if fence else edge[0]
-        elif tag and not tag["end"]:
-            opening = tag["name"], margin
+        elif not fence and (tag := _OPENING.match(text, at)) and tag["name"] in closed:
+            opening, end = (tag["name"], margin), tag.end()
+        at += len(line) + 1
     return "\n".join(lines)
 
 
@@ -166,14 +185,20 @@ def _convert_part(part: re.Match[str], context: LessonContext) -> str:
         return f"`{expression}`" if expression else ""
     if name[0].isupper():
         words = "" if part["end"] else write_component(name, attributes, context)
-        before, after = part.string[: part.start()], part.string[part.end() :]
-        if before.endswith(">") and after.startswith("</a>"):  # an icon that is a link
+        text, start, end = part.string, part.start(), part.end()
+        if text[start - 1 : start] == ">" and text.startswith(
+            "</a>", end
+        ):  # an icon that is a link
             words = words or find_group(r"\sicon=[\"']([^\"']+)", attributes)
-        is_first = not before.rpartition("\n")[2].strip()
-        lines = len(after) - len(after.lstrip("\n"))
-        if words and is_first and re.search(r">[ \t]*\n[ \t]*\Z", before):
+        line = text.rfind("\n", 0, start) + 1
+        if not words or text[line:start].strip():
+            return words
+        line_above = text[text.rfind("\n", 0, max(line - 1, 0)) + 1 : line]
+        if line_above.rstrip().endswith(">"):
             words = f"\n\n{words}"  # else it were HTML, too
-        return words + "\n" * (2 - lines if words and is_first and after[lines:] else 0)
+        below = text[end : end + 2]
+        lines = len(below) - len(below.lstrip("\n"))
+        return words + "\n" * (2 - lines if below[lines:] else 0)
 
     def write_attribute(computed: re.Match[str]) -> str:
         address = _ADDRESS.search(computed[0])

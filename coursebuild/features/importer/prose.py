@@ -29,6 +29,7 @@ from coursebuild.features.importer.pandoc_tables import (
     write_meanings,
 )
 from coursebuild.features.importer.roles import (
+    LOOK,
     address_of_label,
     convert_attributes,
     convert_code,
@@ -110,7 +111,7 @@ _FIELDS = regex(
 _ABBREVIATION = regex(r"^\*\[(?P<short>[^\]\n]+)\]:[ \t]*(?P<long>.*)\n?", re.MULTILINE)
 _EDGE = regex(
     r"[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?"
-    r"(`{3,}|~{3,}|<!--(?!.*-->)|<pre\b(?!.*</pre>)|\$\$(?!.*\$\$))"
+    r"(`{3,}|~{3,}|<!--(?!.*-->)|<pre(?=[\s>])(?!.*</pre>)|\$\$(?!.*\$\$))"
 )
 """The first or last line of code in a quotation or a list, or the first of what `_ENDS` has."""
 _PICTURE_LINE = regex(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)
@@ -171,7 +172,7 @@ _KINDS = {
     "change": ("suggested change", "as if it had been accepted"),
     "latex": ("command of LaTeX", "dropped: it changes no word"),
     "mention": ("mention of a lesson", "its new number"),
-    "icon": ("icon", "dropped: it is a picture of its tool"),
+    "icon": ("icon", "its sign, or its name where it is alone; else dropped"),
     "emoji": ("emoji", "its sign"),
     "block": ("block of Obsidian", "an anchor"),
     "keys": ("keys", "their names"),
@@ -230,6 +231,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
             mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
         elif edge is not None and edge[1].startswith(mark):
             mark = "" if mark else edge[1]
+            line = LOOK.sub("", line) if mark == "<pre" else line
         out.append(f"{line}\n" if is_open else line)
 
     def leave_cells(line: int, cells: str) -> None:

@@ -22,20 +22,20 @@ from coursebuild.features.importer.context import (
 from coursebuild.features.importer.jsx import write_component
 from coursebuild.features.importer.source_files import find_group, stem_of, title_of_file
 
-_BLOCK_START = r"[ \t]*(?:\n|[>|]|(?:[-*+]|\#+|\d+[.)])[ \t\n]|:::|```|~~~)"
+BLOCK_START = r"[ \t]*(?:\n|[>|]|(?:[-*+]|\#+|\d+[.)])[ \t\n]|:::|```|~~~)"
 _FENCE = (
     r"^[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)*(?P<mark>`{3,}|~{3,})[^`\n]*\n"
     r"(?:(?![ \t>]*(?P=mark))[^\n]*\n)*[^\n]*"
 )
 _OVER_LINES = regex(
     rf"(?P<block>{_FENCE})"  # what looks like one in code is none
-    rf"|(?<!`)(?P<ticks>`+)(?!`)(?:[^\n]|\n(?!{_BLOCK_START}))+?"
+    rf"|(?<!`)(?P<ticks>`+)(?!`)(?:[^\n]|\n(?!{BLOCK_START}))+?"
     r"(?<!`)(?P=ticks)(?!`)"
     r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
-    rf"|^[ ]{{0,3}}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n(?!{_BLOCK_START})[ \t]*[^\s<\[]\S*"
+    rf"|^[ ]{{0,3}}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n(?!{BLOCK_START})[ \t]*[^\s<\[]\S*"
     r"(?=[ \t]*(?:$|[\"'(]))"
     r"|(?<![\\$])\$(?=[^\s$])[^$\n]*(?<=\S)\$(?!\d)"  # else its end could begin another
     r"|(?<![\\$])\$(?=\S)[^$\n]+\n[ ]{0,3}(?:>|[-+*][ ])[^$\n]*(?<=\S)\$(?![\d$])"
@@ -97,6 +97,9 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case "ref" | "numref" | "prf:ref" | "any" | "embed":
             address = address_of_label(target, context)
             if not address:
+                path = context.resolve_path(f"{target}.md")
+                if name == "any" and stem_of(path) in context.targets:
+                    return convert_role("doc", body, context)
                 message = f"a link to `{target}`, which no text sets"
                 context.leave(f"role `{{{name}}}`", message)
                 if name == "any":  # what is left is the name of an object
@@ -131,7 +134,11 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case _ if name.rpartition(":")[2] in CODE_ROLES:
             name_of_part = re.sub(r"^(?:!|~(?:.*\.)?)", "", target)  # as Sphinx shows it
             return f"`{words or name_of_part}`"
-        case _ if name in _WORD_ROLES or name.startswith("bdg"):  # a badge
+        case _ if name.startswith("bdg-link"):  # a badge
+            return write_link(words or target, context.resolve_link(target))
+        case _ if name.startswith("bdg-ref"):
+            return convert_role("any", body, context)
+        case _ if name in _WORD_ROLES or name.startswith("bdg"):
             return words or body
         case _ if _ICON_ROLE.fullmatch(name):
             return ""
@@ -278,11 +285,13 @@ def convert_wiki_link(whole: str, page: str, part: str, words: str, context: Les
     return write_link(words or page or part.lstrip("#"), address)
 
 
-_ATTRIBUTE = regex(r"(?<=\s)(href|poster|src|srcset)(=[\"'])([^\"'\n]+)", re.IGNORECASE)
+_ATTRIBUTE = regex(
+    r"(?<=\s)(href|poster|src|srcset)(=[\"'][\s,]*)([^\"'\s,][^\"'\n]*)", re.IGNORECASE
+)
 
 
 _WITH_FILE = regex(r"<(?:a|audio|(?P<frame>iframe)|img|source|track|video)\b", re.IGNORECASE)
-_LOOK = regex(
+LOOK = regex(
     r"(?<=<table)(?:(?!\sid=)[^<>])*?\salign=[\"'\w]+"  # by which words would stand beside it
     r"|[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
 )
@@ -295,7 +304,7 @@ def convert_tag(tag: str, context: LessonContext) -> str:
     """
     if re.match(r"<img\b[^<>]*\sclass=[\"'][^\"'<>]*\b(?:only-dark|dark-only)\b", tag):
         return ""  # a page makes its pictures dark itself
-    tag = _LOOK.sub("", tag)
+    tag = LOOK.sub("", tag)
     name = tag[1:].split()[0]
     if name[0].isupper() and not name.isupper():  # no element of HTML
         return write_component(name, tag, context)
@@ -316,7 +325,7 @@ def convert_tag(tag: str, context: LessonContext) -> str:
             continue
         address = attribute[3].removeprefix("attachment:")
         if attribute[1].lower() == "srcset":  # the first of several: pages take one size
-            address = address.split(",")[0].split()[0]
+            address = address.split()[0].rstrip(",")
         before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
         if new_address := context.resolve_picture(address):
             tag = before + new_address + after

@@ -20,7 +20,7 @@ from msgspec.structs import replace
 from coursebuild.api import UsageError, regex
 from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.displays import read_macros
-from coursebuild.features.importer.jsx import COMPONENT, dedent_components
+from coursebuild.features.importer.jsx import COMPONENT, dedent_components, is_mdx
 from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
 _MARK = regex(r"(:{3,}|/{3,})[ \t]*(.*?)[ \t]*")
@@ -109,8 +109,10 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
             raise UsageError(f"{name} is not a notebook of format 4") from None
     else:
         metadata, size = read_front_matter(text)
-        content = dedent_components(text[size:])
-        segments = list(read_markdown(content, 1 + text.count("\n", 0, size)))
+        content, line = text[size:], 1 + text.count("\n", 0, size)
+        segments = list(read_markdown(content, line))
+        if is_mdx(name, segments):
+            segments = list(read_markdown(dedent_components(content), line))
     segments = _raise_title(segments, title)
     # The first heading of level 1, and the segments without it; from the next on, all go down by 1
     titles: list[str] = []
