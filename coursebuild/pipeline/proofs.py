@@ -144,9 +144,11 @@ def find_losses(
         if now[_identity(proof)]:
             now[_identity(proof)] -= 1
             continue
+        # What a title of a section holds is proved for itself.
+        spans = [s for p, s, _ in texts if p.kind != "section" or proof.kind == "section"]
         for text, count in ((proof.text, proof.count), (proof.label, proof.labels)):
             places = [*_places(source, text)] if text else []
-            free = [p for p in places if not any(span.contains(p) for _, span, _ in texts)]
+            free = [p for p in places if not any(span.contains(p) for span in spans)]
             if free and len(places) >= count:
                 yield proof, min((p.line for p in free), key=lambda line: abs(line - proof.line))
                 break
@@ -177,8 +179,8 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
             name = f"the block `{fence['word']}`"
             yield _proved("block", name, _fenced_line(block.span), block.span)
     for heading in find_blocks(document, Heading):
-        if heading.goes_further:
-            title = heading.span.text.rpartition(" {")[0].lstrip("# ")
+        title = _longest_line(heading.span.text.rpartition("{")[0].lstrip("# \t"))
+        if heading.goes_further and title:
             yield _proved("section", f"the optional section `{title}`", title, heading.span)
     for span in (s for f in features() if f.proofs is not None for s in f.proofs(document)):
         if numbers := _NUMBER.findall(span.text):

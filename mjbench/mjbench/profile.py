@@ -198,12 +198,14 @@ def profile_text(
         return f"{most}; the verdict rests on errors, not on time"
     if cost is not None and not cost.low / _ALIKE <= after / before <= cost.high * _ALIKE:
         return f"{most}; which the verdict rests on is not known: other work disturbed the timers"
-    if 1 / _ALIKE < rival.step / own_profile.step < _ALIKE:
+    longer, more = rival.step / own_profile.step, rival.steps / own_profile.steps
+    if abs(math.log(longer)) < min(math.log(_ALIKE), abs(math.log(more))):
         steps = f"{own_profile.steps} → {rival.steps}"
         return f"{most}; the verdict rests on the number of steps: {steps} under {rival.name}"
     sign = math.copysign(1.0, after - before)
-    phase = max(phases, key=lambda name: sign * (pairs[name][1] - pairs[name][0]))
+    phase = max(pairs, key=lambda name: sign * (pairs[name][1] - pairs[name][0]))
     change = " → ".join(map(_text, pairs[phase]))
+    phase = "what has no timer" if phase == "other" else phase
     return f"{most}; the verdict rests on {phase}: over the scenario {change} under {rival.name}"
 
 

@@ -112,6 +112,10 @@ def phases(number: int = 0, *, steps: int = 500, **times: float) -> PhaseProfile
             phases(1, steps=2000, collision=3, solver=6),
             "the verdict rests on the number of steps: 500 → 2000 under Euler at 4 ms",
         ),
+        (
+            phases(1, steps=525, collision=3, solver=6.7),
+            "the verdict rests on solver: over the scenario 3 ms → 3.5 ms under Euler at 4 ms",
+        ),
         (phases(1, collision=3.1, solver=6.2), "the verdict rests on errors, not on time"),
     ],
 )
@@ -125,6 +129,8 @@ def test_a_sentence_says_what_the_verdict_rests_on(rival: PhaseProfile | None, t
 def test_what_has_no_timer_is_no_phase() -> None:
     text = profile_text(phases(solver=3, other=7), None)
     assert text == "of the phases solver takes the most, 30 % of a step"
+    text = profile_text(phases(solver=3, other=7), phases(1, solver=3, other=17))
+    assert "rests on what has no timer: over the scenario 3.5 ms → 8.5 ms under" in text
 
 
 def test_the_rival_of_a_verdict_is_profiled_and_named() -> None:

@@ -95,6 +95,6 @@ def test_a_block_or_section_whose_word_is_misspelt_is_told(
 ) -> None:
     question = '{"kind": "numeric", "id": "a", "q": "One and one?", "answer": 2, "tol": 0.1}'
     quiz = f'```quiz\n{{"id": "1.1-q", "title": "Q", "questions": [\n{question}]}}\n```\n\n'
-    section = "\n### The *sum* {#sum .further}\n\nIt is two.\n"
+    section = "\n### The *sum* of [it](#sum) {#sum .further}\n\nIt is two.\n"
     lesson = f"## Sums\n\n{quiz}```mjcf\n<mujoco/>\n```\n{section}"
     assert_told(make, lesson, old, new, remark)

@@ -7,6 +7,7 @@ from decimal import Decimal
 from msgspec.structs import replace
 
 from coursebuild.core import model
+from coursebuild.core.model.course import ENGLISH
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import apply_edits, update_body
@@ -30,8 +31,10 @@ def tolerance(rtol: str = "0", atol: str = "0") -> model.Comparison:
 # --- lessons
 
 
-def document(text: str, path: str = "content/lessons/4.2-mass.md") -> model.Document:
-    return parse_document(Source(path, text), frozenset(), lesson=True).value
+def document(
+    text: str, path: str = "content/lessons/4.2-mass.md", words: model.Words = ENGLISH
+) -> model.Document:
+    return parse_document(Source(path, text), frozenset(), lesson=True, words=words).value
 
 
 def recordings(document: model.Document) -> tuple[model.Recording, ...]:
@@ -48,9 +51,9 @@ def recording(
     return recordings(document(text))[0]
 
 
-def table(rows: str) -> model.Recording:
+def table(rows: str, words: model.Words = ENGLISH) -> model.Recording:
     text = f"```python file=examples/a.py\nprint(1)\n```\n\nOutput:\n\n{rows}\n\nAfter.\n"
-    return recordings(document(text))[0]
+    return recordings(document(text, words=words))[0]
 
 
 def course(

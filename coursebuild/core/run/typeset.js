@@ -292,7 +292,7 @@ const typeset = (() => {
     // In a macro that Temml defines, the position is one in that macro's own text.
     const isHere = excerpt.startsWith(left) && plain(tex.slice(start)).startsWith(right)
     const place = start + original.length - tex.length
-    const [, name] = /name: (\\[A-Za-z]+)/.exec(error.message) ?? []
+    const [, name] = /name: (\\@?[A-Za-z]+)/.exec(error.message.replace('\\@', '\\')) ?? []
     const isSymbol = name && name !== original && typeof one({ tex: name, source: name }) === 'string'
     const message = isSymbol ? `Can't use function '${name}' in text mode` : error.message.slice(0, at)
     return { message, position: isHere && original.endsWith(tex.slice(start)) ? place : null }

@@ -303,7 +303,7 @@ def _update_table(
         lines = " or ".join(f"`{line}`" for line in match.rivals)
         message, help = f"its rows may be lines such as {lines}", "show what tells them apart"
         return refusal(table.span.first_line(), message, f"{help}: words or units in the header")
-    edits: list[Edit] = []
+    texts: dict[tuple[int, int], str] = {}
     for row in match.rows:
         if row.line < 0 or not row.certain:
             span = row.row[0].cell.span.to(row.row[-1].cell.span)
@@ -312,30 +312,38 @@ def _update_table(
             )
             return refusal(span, f"{reason} the cells of this row in order")
         for cell, old, new in row.pairs:
-            if cell_matches(old, new, comparison):
-                continue
-            span, text = cell.span(old), number_text(old, new, comparison)
-            number = BoundText.of(span.text, table.comma, may_join=True)
-            if number.text.replace(MINUS, "-") != old.text:
+            span = cell.span(old)
+            text: str | None = span.text
+            if not cell_matches(old, new, comparison):
+                number = BoundText.of(span.text, table.comma, may_join=True)
+                text = _rewrite(number, span.text, old.text, number_text(old, new, comparison))
+            # A macro may show a number more than once.
+            if text is None or texts.setdefault((span.start, span.end), text) != text:
                 reason = "a number written with an entity, an escape or a macro cannot be replaced"
                 return refusal(span, reason)
-            # The minus signs of the old number stay: before it, and in its exponent.
-            halves = (re.split("(?=[eE])", h) for h in (span.text, number.as_written(text)))
-            parts = zip_longest(*halves, fillvalue="")
-            signed = (part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
-            edits.append(Edit(span, "".join(signed)))
     changes = (*matcher.header_changes(match), *chain(*map(matcher.unit_changes, match.rows)))
     for change in changes:
         message = f"`{change.recorded}` is not what is printed here"
         return refusal(change.span, message, HEADER_HELP)
+    source = table.span.source
+    edits = [(*at, text) for at, text in sorted(texts.items()) if text != source.text[slice(*at)]]
     if not edits:
         return None
     for title, _, _ in matcher.misplaced_titles(match):
         return refusal(title.span, "another number is printed with this title", HEADER_HELP)
-    whole = edits[0].span.to(edits[-1].span)
-    at = whole.start
-    ranges = ((edit.span.start - at, edit.span.end - at, edit.text) for edit in edits)
+    whole = source.span(edits[0][0], edits[-1][1])
+    ranges = ((start - whole.start, end - whole.start, text) for start, end, text in edits)
     return Edit(whole, replace_ranges(whole.text, ranges))
+
+
+def _rewrite(number: BoundText, written: str, old: str, new: str) -> str | None:
+    """A new number as the old one is written; `None` if that is not how it would be written."""
+    if number.text.replace(MINUS, "-") != old:
+        return None
+    # The minus signs of the old number stay: before it, and in its exponent.
+    halves = (re.split("(?=[eE])", half) for half in (written, number.as_written(new)))
+    parts = zip_longest(*halves, fillvalue="")
+    return "".join(part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
 
 
 ReadText = Callable[[str], str | None]

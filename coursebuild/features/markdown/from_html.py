@@ -69,7 +69,9 @@ class _Converter:
             yield marks.block_quote("\n\n".join(self.blocks(node.children)))
         elif name == "hr":
             yield "___"
-        elif name in ("summary", "figcaption", "caption"):
+        elif name in ("summary", "figcaption", "caption") and not any(
+            isinstance(child, HtmlElement) and child.name in _HEADINGS for child in node.children
+        ):
             text = self._line(node.children)
             yield f"**{text}**" if text else ""
         else:

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from coursebuild.core.model import Comparison, Filter, Table
+from coursebuild.core.model import Comparison, Filter, Table, Words
 from coursebuild.core.model.results import Verdict
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.edit import update_body
@@ -167,6 +167,17 @@ def test_a_decimal_comma_stays_in_a_table_of_its_language() -> None:
     assert edit.text == "0,82 | −3,5e-03"
     assert compare(german, EXACT, "a 0.5 0.71 -2.5e-03\n").status == "verified"
     assert compare(recording, EXACT, "a 0.5 0.71 -2.5e-03\n").status == "drift"
+
+
+def test_a_number_that_a_macro_moves_or_shows_twice_is_replaced_once_or_not_at_all() -> None:
+    words = Words(macros=(("pair", "#1 = #1"), ("swap", "#2 of #1")))
+    rows = "| a | $\\swap{4.1}{3.01}$ | $\\pair{2.5}$ |"
+    lesson = table(EDITED_HEAD + rows, words)
+    edit = update_body(lesson, EXACT, "a 3.02 of 5.1 2.6 = 2.6\n")
+    assert isinstance(edit, Edit)
+    assert edit.text == "5.1}{3.02}$ | $\\pair{2.6"
+    for printed in ("2.5 = 2.6", "2.6 = 2.5", "2.6 = 2.7"):
+        assert isinstance(update_body(lesson, EXACT, f"a 3.01 of 4.1 {printed}\n"), Diagnostic)
 
 
 CELLS = st.sampled_from(["Euler", "`RK4`", "**1.5 %**", "−2.50", "3.9e-11", "4", "x 7"])

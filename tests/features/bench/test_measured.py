@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from coursebuild.core.model.results import Reports
 from coursebuild.core.pages.materials import strings_for
 from coursebuild.features.bench.grids import bounded, factor, percent, power, sentence, size
+from coursebuild.features.markdown.from_html import html_to_markdown
 from mjbench.reports.model_report import StepCost
 from samples.reports import interval
 from support.bench_reports import swing
@@ -250,3 +251,5 @@ def test_a_hard_case_of_an_unknown_number_goes_by_its_own_title(make: Make) -> N
     assert "Hard cases A &lt;b&gt; A &lt;b&gt; No timestep" in text(files["numerics/case-99.html"])
     folds = [files[f"numerics/case-{n}.html"].count('<details class="case"') for n in (4, 99)]
     assert folds == [0, 2], "one alone is never folded"
+    copy = html_to_markdown(files["numerics/case-99.html"], str)
+    assert copy.count("\n## A") == 2, "headings stay headings in a fold"
