@@ -271,7 +271,7 @@ def loop_note(model: Any, pilot: Pilot, reference: EngineStates) -> str:
             else f"at no delay longer than {loop.delay:.3g} s"
         )
     span = f"for the {scene.scenario.duration:.3g} s of the scenario"
-    clause = "small differences do not grow"
+    clause = "small differences stay small"
     if not is_calm:
         clause = f"small differences do not fade at its own delay, and it stays bounded {span}"
     return (
