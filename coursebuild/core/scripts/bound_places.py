@@ -175,7 +175,10 @@ def place_note(
     """The line of a printed number, and the edit that chooses it among others."""
     line = plain_text(place.line.text)
     words = place.output.words_before(place, rivals)
-    if not words:
+    is_lost = binding.is_in_formula and (
+        "$" in words or "\\" in words
+    )  # which would end or change it
+    if not words or is_lost:
         return Note(f"`{line}`", place.span)
     mark = binding.mark(binding.script or "", words)
     return Note(f"`{mark}` chooses `{line}`", place.span, mark_edits(binding, mark))
@@ -187,8 +190,7 @@ def mark_edits(binding: model.NumberBinding, mark: str) -> tuple[Edit, ...]:
     if binding.is_in_formula:
         opening = source.span(start, binding.text_span.start - 1)
         backslashes = opening.text.partition("out")[0]  # two in a string of JSON
-        is_plain = "$" not in mark and "\\" not in mark[1:]
-        return (Edit(opening, f"{backslashes}{mark[1:]}"),) if is_plain else ()
+        return (Edit(opening, f"{backslashes}{mark[1:]}"),)
     attribute = source.text[end : binding.span.end]
     braces = source.span(end + attribute.find("{"), binding.span.end)
     is_whole = attribute.endswith("}") and "{" in attribute
