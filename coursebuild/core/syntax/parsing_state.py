@@ -37,10 +37,6 @@ _GAP = r"(?:\s|~|\{,\}|\\[,;:! ])*"
 _DIGIT_AFTER = regex(rf"{_GAP}\d")
 _LAST_SIGN = regex(rf"([\w.}}^]){_GAP}\Z")
 r"""What may take only the first sign of what follows, as `\sqrt` and `x_`, or be a part of it."""
-_OUT_HELP = (
-    r"write `\out{}{9.81}` or `\out{words before it}{9.81}`: the last braces hold one number, with "
-    "all its digits and its power of ten"
-)
 
 
 class ParsingState:
@@ -51,6 +47,7 @@ class ParsingState:
         self.lesson = lesson
         self.words = words
         self.macros = dict(words.macros)
+        self.can_bind_in_formulas = "out" not in self.macros
         self.has_decimal_comma = "," in words.decimal
         self.in_string = False
         """Whether what is read is in a string of a data text, such as JSON."""
@@ -81,22 +78,21 @@ class ParsingState:
     def read_formula(self, tex: Excerpt) -> tuple[Excerpt, tuple[NumberBinding, ...]]:
         r"""A formula with what its macros stand for, and what `\out{words}{0.3}` binds in it.
 
-        A macro `\out` that the course or the formula itself defines stays that macro.
+        A macro `\out` that the course or a formula above defines stays that macro.
         """
         parts, numbers, end = list[Excerpt](), list[NumberBinding](), 0
-        may_bind = r"\out" in tex.text and "out" not in (*self.macros, *DEFINED.findall(tex.text))
-        for command in COMMAND.finditer(tex.text) if may_bind else ():
+        is_used = r"\out" in tex.text
+        if is_used and "out" in DEFINED.findall(tex.text):
+            self.can_bind_in_formulas = False
+        for command in COMMAND.finditer(tex.text) if is_used and self.can_bind_in_formulas else ():
             if command[1] != "out" or command.start() < end:
                 continue
-            parts.append(tex.slice(end, command.start()))
-            before = "".join(part.text for part in parts)
+            before = "".join(part.text for part in (*parts, tex.slice(end, command.start())))
             is_group = _LAST_SIGN.search(before) is not None
-            use, end = _OUT.match(tex.text, command.start()), command.end()
+            use = _OUT.match(tex.text, command.start())
             if use is None or not self._is_whole_number(tex, before, use):
-                place = tex.span(*(use or command).span())
-                message = f"`{collapse_spaces(place.text)}` binds no number"
-                self.report(diagnose("binding-attribute", place, message, help=_OUT_HELP))
-                continue
+                continue  # no command of TeX, as typesetting tells
+            parts.append(tex.slice(end, command.start()))
             end, place = use.end(), tex.span(*use.span())
             script, words, number = use[1] or None, collapse_spaces(use[2]), tex.span(*use.span(3))
             comma = self.has_decimal_comma
@@ -117,9 +113,9 @@ class ParsingState:
         start, end = (len(text.replace("{,}", ",")) for text in (before, before + number))
         plain_text = f"{before}{number}{after}".replace("{,}", ",")
         text = as_printed(plain_text, self.has_decimal_comma)
-        shown = text[start:end].strip("+-\u2212.")  # a sign may stand before, a full stop behind
+        digits = text[start:end].strip("+-\u2212.")  # a sign may stand before, a full stop behind
         numbers = (n for n in scan_prose(text) if start <= n.end - 1 <= end)
-        return any(n.text.strip("+-\u2212.") == shown for n in numbers)
+        return any(n.text.strip("+-\u2212.") == digits for n in numbers)
 
     def take_label(self, braces: Excerpt | None, kind: str) -> Label | None:
         """The label in braces, whose id nothing else may have; `None` for none, or a mistake."""
