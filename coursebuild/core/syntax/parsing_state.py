@@ -98,7 +98,8 @@ class ParsingState:
             comma = self.has_decimal_comma
             numbers.append(NumberBinding(place, use[3], number, script, comma=comma, words=words))
             parts.append(tex.slice(use.start(3) - is_group, use.end(3) + is_group))
-        return expand_macros(Excerpt.join([*parts, tex.slice(end)]), self.macros), tuple(numbers)
+        parts = [part for part in (*parts, tex.slice(end)) if part.text] or [tex]
+        return expand_macros(Excerpt.join(parts), self.macros), tuple(numbers)
 
     def _is_whole_number(self, tex: Excerpt, before: str, use: re.Match[str]) -> bool:
         """Whether a text is a number where it stands, and no part of one as the 1.2 of `1.2e-3`."""
