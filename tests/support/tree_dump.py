@@ -66,7 +66,7 @@ def _node(node: Block | Inline | ListItem, depth: int) -> Iterator[str]:
             yield f"{indent}  caption:"
             yield from _nodes(node.caption, depth + 2)
         return
-    for name in ("title", "caption", "input", "process", "output"):
+    for name in ("title", "caption", "numbers", "input", "process", "output"):
         content = getattr(node, name, None)
         if content and isinstance(content, tuple):
             yield f"{indent}  {name}:"

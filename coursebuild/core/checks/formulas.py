@@ -111,6 +111,10 @@ def check_formulas(
     return tuple(diagnostics)
 
 
+_OUT_HELP = (
+    r"write `\out{}{9.81}` or `\out{words before it}{9.81}`: the last braces hold one number, with "
+    "all its digits and its power of ten"
+)
 _IN_MACRO = "it stands in a macro of the course, in `[macros]` of its map"
 
 
@@ -140,7 +144,9 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
         likely = nearest(command[2], SYMBOLS | _FUNCTIONS | _WITH_BRACES)
         help = f"a macro of the course is defined in `[macros]` of its map: `{command[2]} = '…'`"
         start = tex.text.find(command[2])
-        if likely is not None and start >= 0:
+        if command[2] == "out":
+            help = _OUT_HELP
+        elif likely is not None and start >= 0:
             place = tex.span(start, start + len(command[2]))
             help = Fix(f"did you mean `\\{likely}`?", likely).at(place)
     message = f"the formula cannot be typeset: {error.message}"

@@ -10,7 +10,14 @@ from typing import Annotated, ClassVar, Literal, TypeAlias, TypeVar
 
 from msgspec import Meta, Struct
 
-from coursebuild.core.model.inlines import Inline, Label, Located, RawHtml, SourceMark
+from coursebuild.core.model.inlines import (
+    Inline,
+    Label,
+    Located,
+    NumberBinding,
+    RawHtml,
+    SourceMark,
+)
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source, Span
 
@@ -112,6 +119,8 @@ class MathBlock(Labelled, frozen=True):
     meaning: ClassVar[None] = None
 
     tex: Excerpt
+    numbers: tuple[NumberBinding, ...] = ()
+    r"""Those that `\out{…}{…}` binds in it."""
 
 
 class Cell(Located, frozen=True):

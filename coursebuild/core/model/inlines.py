@@ -75,6 +75,18 @@ class NumberBinding(Located, frozen=True):
     in_string: bool = False
     """Whether it is in a string of a data text, where a quotation mark is behind a backslash."""
 
+    @property
+    def is_in_formula(self) -> bool:
+        r"""Whether `\out{words}{…}` binds it, which is its span."""
+        return "out{" in self.span.source.text[self.span.start : self.text_span.start]
+
+    def mark(self, script: str = "", words: str = "") -> str:
+        """What an author writes to bind it to a script, or to words that are printed."""
+        if self.is_in_formula:
+            return f"\\out{{{' '.join(filter(None, (script, words)))}}}"
+        quoted_words = f'"{words}"' if words else ""
+        return f"{{out={' '.join(filter(None, (script, quoted_words)))}}}"
+
 
 class SourceMark(Located, frozen=True):
     """`{given="models/x.xml"}` behind a paragraph, or below one, a list or a table.
@@ -137,7 +149,9 @@ class Math(Located, frozen=True):
     source: str | None = None
     """Likewise: the source of its numbers, as in `NumberBinding`."""
     value: NumberBinding | None = None
-    """What `value=…` says that the symbol is worth, or the number of the formula that is bound."""
+    """What `value=…` says that the symbol is worth, or the number that ends it and is bound."""
+    numbers: tuple[NumberBinding, ...] = ()
+    r"""Those that `\out{…}{…}` binds in it."""
 
 
 class Term(Parent, frozen=True):

@@ -79,6 +79,8 @@ def block_inlines(block: Block) -> tuple[Inline, ...]:
     match block:
         case Paragraph() | Heading() | HtmlFlow():
             return block.children
+        case MathBlock():
+            return block.numbers
         case FeatureBlock():
             return (*block.child_inlines(), *block.numbers)
         case Callout():
@@ -222,8 +224,8 @@ def _collect(inlines: Iterable[Inline], nodes: list[Inline]) -> None:
         nodes.append(inline)
         if isinstance(inline, _INLINE_CONTAINERS):
             _collect(inline.children, nodes)
-        elif isinstance(inline, Math) and inline.value is not None:
-            nodes.append(inline.value)
+        elif isinstance(inline, Math):
+            nodes += (*inline.numbers, *([inline.value] if inline.value else ()))
 
 
 def inlines_by_block(document: Document) -> tuple[tuple[Block, tuple[Inline, ...]], ...]:
@@ -292,7 +294,7 @@ def without_prose(document: Document) -> Document:
                 blocks.append(replace(block, children=inlines))
             case Table() if any(isinstance(inline, NumberBinding) for inline in inlines):
                 blocks.append(replace(block, label=None))
-            case Paragraph() | HtmlFlow() | Table():
+            case Paragraph() | HtmlFlow() | Table() | MathBlock():
                 blocks += _paragraph_of(block.span, inlines)
             case Heading():
                 blocks.append(replace(block, children=inlines))
@@ -309,7 +311,7 @@ def without_prose(document: Document) -> Document:
                 blocks.append(replace(block, title=inlines, blocks=()))
             case PlainCode():
                 blocks += [] if block.source is None else [block]
-            case BlockQuote() | ListBlock() | CodeBlock() | ThematicBreak() | MathBlock():
+            case BlockQuote() | ListBlock() | CodeBlock() | ThematicBreak():
                 pass
     if is_blank(blocks) and not is_blank(document_blocks(document)):
         blocks.append(ThematicBreak(document.blocks[0].span))

@@ -105,9 +105,9 @@ def _with_likely_script(
     }
     if len(paths) != 1:
         return finding
-    path = paths.pop()
-    help = f"an output further up has it: write `{{out={path}}}`"
-    return replace(finding, help=help, edits=mark_edits(binding, path))
+    mark = binding.mark(paths.pop())
+    help = f"an output further up has it: write `{mark}`"
+    return replace(finding, help=help, edits=mark_edits(binding, mark))
 
 
 def _check(bound: BoundNumber) -> tuple[Diagnostic | None, Sequence[PrintedPlace]]:
@@ -153,10 +153,16 @@ def _ambiguous(bound: BoundNumber, places: Sequence[PrintedPlace]) -> Diagnostic
     notes = [place_note(binding, place, places) for place in places[:_MAX_NOTES]]
     if len(places) > _MAX_NOTES:
         notes.append(Note(f"and {len(places) - _MAX_NOTES} more"))
-    return diagnose("output-ambiguous", binding.text_span, message, help=_CHOOSE, notes=notes)
+    return diagnose(
+        "output-ambiguous", binding.text_span, message, help=_choose(binding), notes=notes
+    )
 
 
-_CHOOSE = 'say which: write the words that are printed right before it, as in `{out="tau"}`'
+def _choose(binding: model.NumberBinding) -> str:
+    example = binding.mark(words="tau")
+    return f"say which: write the words that are printed right before it, as in `{example}`"
+
+
 _MAX_NOTES = 4
 
 
@@ -171,7 +177,10 @@ def _wrong_unit(
     quantity = with_unit(number.text, printed_text)
     message = f"`{bound.path}` printed `{quantity}`, and the unit here is `{unit_text}`"
     help = "write the unit that is printed, or let the script convert the number; where it is not"
-    help += ' meant, write `{given="…"}` in place of `{out}`'
+    escape = 'write `{given="…"}` in place of `{out}`'
+    if bound.binding.is_in_formula:
+        escape = r"write the number without `\out`"
+    help += f" meant, {escape}"
     return diagnose("binding-mismatch", bound.binding.text_span, message, help=help)
 
 
@@ -194,7 +203,8 @@ def _orphan_diagnostic(bound: BoundNumber) -> Diagnostic:
     binding, path, scripts = bound.binding, bound.path, bound.outputs.scripts
     if not path:
         target = ", but there is no recorded output above it"
-        help = "write it below the output, or name the script: `{out=examples/…}`"
+        example = binding.mark("examples/…")
+        help = f"write it below the output, or name the script: `{example}`"
     elif path in scripts:
         target = f" to `{path}`, which has no recorded output and is not run"
         help = "record its output below it"
@@ -323,7 +333,7 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         message = f"the places that showed `{binding.text}` have different numbers now"
         if binding.words:
             message = f"`{bound.path}` printed `{binding.words}` before {len(places_now)} numbers"
-        help = _CHOOSE
+        help = _choose(binding)
     elif places_now and (mismatch := _wrong_unit(bound, text, places_now[:1])):
         return mismatch
     elif places_now:
@@ -350,7 +360,8 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
         line_text = bound.lost_address().description
         message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
         noted_places = rivals = replace(bound, addresses=()).places()
-        help = 'bind it anew: choose the words before it, as in `{out="tau"}`'
+        example = binding.mark(words="tau")
+        help = f"bind it anew: choose the words before it, as in `{example}`"
     notes = [place_note(binding, place, rivals) for place in noted_places[:_MAX_NOTES]]
     return diagnose(
         "binding-mismatch", binding.text_span, message, label=label, help=help, notes=notes

@@ -62,7 +62,7 @@ class BoundText(Struct, frozen=True):
     comma: str = ""
     """What stood before decimals, if a comma or TeX's `{,}` did; here it is a point."""
     space: str = ""
-    """What parted thousands, if a space did; here it is a comma."""
+    """What parted thousands, if a space or TeX's `{,}` did; here it is a comma."""
     decimal_space: str = ""
     """What parted decimals in threes, if a space did; here nothing does."""
 
@@ -86,7 +86,8 @@ class BoundText(Struct, frozen=True):
         if not numbers:
             return cls(text, plain_text(text), (), "")
         before, after = text[: numbers[0].start], text[numbers[-1].end :]
-        return cls(text, plain_text(before), numbers, plain_text(after))
+        thousands = "" if sign == "," else sign
+        return cls(text, plain_text(before), numbers, plain_text(after), space=thousands)
 
     @property
     def bare(self) -> BoundText:

@@ -175,22 +175,28 @@ def place_note(
     """The line of a printed number, and the edit that chooses it among others."""
     line = plain_text(place.line.text)
     words = place.output.words_before(place, rivals)
-    if not words:
+    is_lost = binding.is_in_formula and (
+        "$" in words or "\\" in words
+    )  # which would end or change it
+    if not words or is_lost:
         return Note(f"`{line}`", place.span)
-    target = f"{binding.script} " if binding.script else ""
-    quote = '\\"' if binding.in_string else '"'
-    edits = mark_edits(binding, f"{target}{quote}{words}{quote}")
-    return Note(f'`{{out={target}"{words}"}}` chooses `{line}`', place.span, edits)
+    mark = binding.mark(binding.script or "", words)
+    return Note(f"`{mark}` chooses `{line}`", place.span, mark_edits(binding, mark))
 
 
-def mark_edits(binding: model.NumberBinding, target: str) -> tuple[Edit, ...]:
-    """The edit that writes `{out=target}` behind a bound number; none where it has no braces."""
-    end = binding.text_span.end
-    attribute = binding.span.source.text[end : binding.span.end]
-    braces = binding.span.source.span(end + attribute.find("{"), binding.span.end)
+def mark_edits(binding: model.NumberBinding, mark: str) -> tuple[Edit, ...]:
+    """The edit that writes another mark at a bound number; none where it has no braces."""
+    source, start, end = binding.span.source, binding.span.start, binding.text_span.end
+    if binding.is_in_formula:
+        opening = source.span(start, binding.text_span.start - 1)
+        backslashes = opening.text.partition("out")[0]  # two in a string of JSON
+        return (Edit(opening, f"{backslashes}{mark[1:]}"),)
+    attribute = source.text[end : binding.span.end]
+    braces = source.span(end + attribute.find("{"), binding.span.end)
     is_whole = attribute.endswith("}") and "{" in attribute
     is_whole &= binding.span.contains(binding.text_span)  # and not in a formula
-    return (Edit(braces, f"{{out={target}}}"),) if is_whole else ()
+    quoted_mark = mark.replace('"', '\\"') if binding.in_string else mark
+    return (Edit(braces, quoted_mark),) if is_whole else ()
 
 
 class BoundNumber(Struct, frozen=True, dict=True):
@@ -272,9 +278,10 @@ class BoundNumber(Struct, frozen=True, dict=True):
         Where no unit stands there, the one of a label that ends before it, as in `v (m/s):`.
         """
         text, end = self.binding.span.source.text, self.binding.span.end
-        rest = self.binding.unit or _LINE_END.sub(" ", text[end : end + 80])
+        rest = self.binding.unit or _LINE_END.sub(" ", text[end : end + 80].removeprefix("$"))
         label = text[: self.binding.span.start].rpartition("\n")[2].rstrip(" *_")
         is_label = label.endswith((":", "=")) and not unit_behind(rest)
+        is_label &= not self.binding.is_in_formula
         return (is_label and unit_of_label(label).text) or rest
 
     def places(self) -> list[PrintedPlace]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from unicodedata import normalize
 
 from msgspec import Struct, field
@@ -123,12 +123,17 @@ def read_term(braces: Excerpt, report: Callable[[Diagnostic], None]) -> str | No
 
 
 def read_meaning(
-    braces: Excerpt, tex: Excerpt, report: Callable[[Diagnostic], None], *, comma: bool = False
+    braces: Excerpt,
+    tex: Excerpt,
+    numbers: Collection[NumberBinding],
+    report: Callable[[Diagnostic], None],
+    *,
+    comma: bool = False,
 ) -> tuple[Meaning | None, str | None, NumberBinding | None]:
     """The meaning of a symbol, the source of given numbers, and its value, if they are there.
 
     `out` alone is of the value that stands in the formula, with a comma before its decimals where
-    the language of the text has one.
+    the language of the text has one; `numbers` are bound in it already.
     """
     keys = ("symbol", "unit", "value", "given", "out")
     values = read_pairs(braces, keys, "symbol-attribute", _SYMBOL_HELP)
@@ -142,7 +147,8 @@ def read_meaning(
         result = _RESULT.match(tex.text) or (_WITH_COMMA.match(tex.text) if comma else None)
     if result is not None and (not result[2].strip() or read_unit(result[2])):
         number_text = tex.slice(*result.span(1))
-        if number_text.span().text == number_text.text:  # else it stands in a macro
+        is_bound = any(n.text_span.contains(number_text.span()) for n in numbers)
+        if number_text.span().text == number_text.text and not is_bound:  # nor in a macro
             value, unit = number_text, plain_unit(result[2]) or unit
     is_number = value is not None and (result or _NUMBER.fullmatch(value.text)) is not None
     if value is not None and is_number and not {"out", "given"} <= {*values}:

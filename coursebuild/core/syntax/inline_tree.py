@@ -35,7 +35,6 @@ from coursebuild.core.syntax.other_tools import check_marks
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.spans import PositionedToken
 from coursebuild.core.text.diagnostics import diagnose
-from coursebuild.core.text.macros import expand_macros
 from coursebuild.core.text.numbers import find_unread
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
@@ -289,16 +288,16 @@ class _TokenReader:
         if not token.content.strip():
             self.report(diagnose("math-syntax", span, "the formula is empty"))
         tex, display = self.content.slice(*token.map), token.info == "display"
-        tex = expand_macros(tex, self.state.macros)
+        tex, numbers = self.state.read_formula(tex)
         if token.meta["braces"] is None:
-            return model.Math(span, tex, display)
-        braces, report = self.content.slice(*token.meta["braces"]), self.report
+            return model.Math(span, tex, display, numbers=numbers)
+        braces = self.content.slice(*token.meta["braces"])
         if not display:
             comma = self.state.has_decimal_comma
-            meaning = read_meaning(braces, tex, report, comma=comma)
-            return model.Math(span, tex, display, None, *meaning)
+            meaning = read_meaning(braces, tex, numbers, self.report, comma=comma)
+            return model.Math(span, tex, display, None, *meaning, numbers)
         label = self.state.take_label(braces, "eq")
-        return model.Math(span, tex, display, label)
+        return model.Math(span, tex, display, label, numbers=numbers)
 
     def _read_number(self, token: PositionedToken, shift: int = 0) -> model.NumberBinding:
         """The number of a token that counts from `shift`."""
@@ -337,7 +336,17 @@ class _TokenReader:
         return model.RawInline(span, html.text, find_media(html), find_forbidden(html))
 
     def _read_image(self, token: PositionedToken, span: Span) -> model.Image:
-        url, alt = str(token.attrs["src"]), alt_text(token.children or [])
+        url, shift = str(token.attrs["src"]), token.start + len("![")
+        numbers: list[model.NumberBinding] = []
+        for child in token.children or ():
+            if isinstance(child, PositionedToken) and child.type in _NUMBERS:
+                numbers.append(self._read_number(child, shift))
+            elif isinstance(child, PositionedToken) and child.type == "math" and child.map:
+                tex = self.content.slice(*(shift + at for at in child.map))
+                formula, numbers_of_formula = self.state.read_formula(tex)
+                child.content = formula.text
+                numbers += numbers_of_formula
+        alt = alt_text(token.children or [])
         label_end = token.start + 2 + len(token.content)
         place = self._find_destination(token.start + 1, label_end, token.end)
         diagnostic = check_scheme(url, place, image=True)
@@ -348,12 +357,7 @@ class _TokenReader:
             help = "say in the brackets what it shows, for readers who cannot see it"
             message = "the image has no alternative text"
             self.report(diagnose("image-alt", span, message, help=help))
-        numbers = tuple(
-            self._read_number(child, token.start + len("!["))
-            for child in token.children or ()
-            if isinstance(child, PositionedToken) and child.type in _NUMBERS
-        )
-        return model.Image(span, url, alt, str(token.attrs.get("title", "")), place, numbers)
+        return model.Image(span, url, alt, str(token.attrs.get("title", "")), place, (*numbers,))
 
     def _read_works(self, token: PositionedToken) -> Iterator[model.CitedWork]:
         at = token.start + 1

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from itertools import islice
 from typing import TypeVar
 
 from msgspec import Struct, field
 
-from coursebuild.core.model import LABEL_KINDS, Block, Footnote, FootnoteRef, Label
+from coursebuild.core.model import (
+    LABEL_KINDS,
+    Block,
+    Footnote,
+    FootnoteRef,
+    Label,
+    NumberBinding,
+)
 from coursebuild.core.model.course import Words
-from coursebuild.core.syntax.attributes import Anchors, read_pairs, value_text
+from coursebuild.core.syntax.attributes import Anchors, collapse_spaces, read_pairs, value_text
 from coursebuild.core.syntax.block_parser import References
 from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose, did_you_mean
+from coursebuild.core.text.macros import BEFORE_ARGUMENT, COMMAND, DEFINED, expand_macros
+from coursebuild.core.text.numbers import as_printed, scan_prose
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -21,6 +31,12 @@ T = TypeVar("T")
 _LABEL_ID = regex(rf"\{{#((?P<kind>{'|'.join(LABEL_KINDS)}):[\w-]+)(?=[\s}}])")
 
 _CALLOUT_LABEL = regex(r"\{#(([A-Za-z]+):[\w-]+)\}")
+_OUT = regex(r"\\out\{((?:[^\s{}]+\.py(?![^\s}]))?)([^{}]*)\}\{((?:[^{}]|\{[^{}]*\})+)\}")
+"""The script, the words and the number of what is bound in a formula."""
+_GAP = r"(?:\s|~|\{,\}|\\[,;:! ])*"
+_DIGIT_AFTER = regex(rf"{_GAP}\d")
+_LAST_SIGN = regex(rf"([\w.}}^]){_GAP}\Z")
+r"""What may take only the first sign of what follows, as `\sqrt` and `x_`, or be a part of it."""
 
 
 class ParsingState:
@@ -31,6 +47,7 @@ class ParsingState:
         self.lesson = lesson
         self.words = words
         self.macros = dict(words.macros)
+        self.can_bind_in_formulas = "out" not in self.macros
         self.has_decimal_comma = "," in words.decimal
         self.in_string = False
         """Whether what is read is in a string of a data text, such as JSON."""
@@ -57,6 +74,49 @@ class ParsingState:
         diagnostics = tuple(self.diagnostics[start:])
         del self.diagnostics[start:]
         return Parsed(value, diagnostics)
+
+    def read_formula(self, tex: Excerpt) -> tuple[Excerpt, tuple[NumberBinding, ...]]:
+        r"""A formula with what its macros stand for, and what `\out{words}{0.3}` binds in it.
+
+        A macro `\out` that the course or a formula above defines stays that macro.
+        """
+        parts, numbers, end = list[Excerpt](), list[NumberBinding](), 0
+        is_used = r"\out" in tex.text
+        if is_used and "out" in DEFINED.findall(tex.text):
+            self.can_bind_in_formulas = False
+        for command in COMMAND.finditer(tex.text) if is_used and self.can_bind_in_formulas else ():
+            if command[1] != "out" or command.start() < end:
+                continue
+            before = "".join(part.text for part in (*parts, tex.slice(end, command.start())))
+            is_group = _LAST_SIGN.search(before) is not None
+            use = _OUT.match(tex.text, command.start())
+            if use is None or not self._is_whole_number(tex, before, use):
+                continue  # no command of TeX, as typesetting tells
+            parts.append(tex.slice(end, command.start()))
+            end, place = use.end(), tex.span(*use.span())
+            script, words, number = use[1] or None, collapse_spaces(use[2]), tex.span(*use.span(3))
+            comma = self.has_decimal_comma
+            numbers.append(NumberBinding(place, use[3], number, script, comma=comma, words=words))
+            parts.append(tex.slice(use.start(3) - is_group, use.end(3) + is_group))
+        parts = [part for part in (*parts, tex.slice(end)) if part.text] or [tex]
+        return expand_macros(Excerpt.join(parts), self.macros), tuple(numbers)
+
+    def _is_whole_number(self, tex: Excerpt, before: str, use: re.Match[str]) -> bool:
+        """Whether a text is a number where it stands, and no part of one as the 1.2 of `1.2e-3`."""
+        number, after, last_sign = use[3], tex.text[use.end() :], _LAST_SIGN.search(before)
+        if last_sign is not None:
+            is_argument = BEFORE_ARGUMENT.search(before[: last_sign.start()])  # as in `\frac12`
+            if not is_argument and (last_sign[1].isdigit() or last_sign[1] == "."):
+                return False
+            before += "{"
+        if _DIGIT_AFTER.match(after) or tex.span(*use.span(3)).text != number:
+            return False  # of other text, an edit would lose the escapes
+        start, end = (len(text.replace("{,}", ",")) for text in (before, before + number))
+        plain_text = f"{before}{number}{after}".replace("{,}", ",")
+        text = as_printed(plain_text, self.has_decimal_comma)
+        digits = text[start:end].strip("+-\u2212.")  # a sign may stand before, a full stop behind
+        numbers = (n for n in scan_prose(text) if start <= n.end - 1 <= end)
+        return any(n.text.strip("+-\u2212.") == digits for n in numbers)
 
     def take_label(self, braces: Excerpt | None, kind: str) -> Label | None:
         """The label in braces, whose id nothing else may have; `None` for none, or a mistake."""

@@ -37,7 +37,6 @@ from coursebuild.core.syntax.recording import (
 )
 from coursebuild.core.syntax.spans import PositionedToken, normalize, trim
 from coursebuild.core.text.diagnostics import Parsed, diagnose
-from coursebuild.core.text.macros import expand_macros
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -259,7 +258,7 @@ class TextReader:
         start, end = text.text.index("$$") + 2, len(text.text)
         if token.info != "unclosed":
             end = text.text.rindex("$$")
-        tex = expand_macros(trim(text.slice(start, end), " \t\n"), self.state.macros)
+        tex, numbers = self.state.read_formula(trim(text.slice(start, end), " \t\n"))
         if token.info == "unclosed":
             help = "close it with `$$` on a line below, with no empty line before it"
             place, message = text.span(start - 2, start), "display math is never closed"
@@ -272,7 +271,7 @@ class TextReader:
             tex, after = Excerpt.join([tex, text.slice(*mark.span(1))]), mark.end()
         braces = LABEL.match(text.text, after)
         label = self.state.take_label(text.slice(*braces.span(1)) if braces else None, "eq")
-        return model.MathBlock(self.span(token), tex, label=label)
+        return model.MathBlock(self.span(token), tex, numbers, label=label)
 
     # -- containers
 

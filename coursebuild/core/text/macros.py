@@ -18,7 +18,7 @@ _REACH = 200
 """Characters before a macro in which a command is looked for."""
 _LONGEST = 20_000
 """Characters of a formula in which macros are replaced; a longer one is not typeset, either."""
-_DEFINED = regex(
+DEFINED = regex(
     r"\\(?:[egx]?def|let|(?:re)?newcommand|providecommand|DeclareMathOperator)(?![A-Za-z])\*?\s*\{?\s*"
     r"\\?([A-Za-z]+)"
 )
@@ -26,7 +26,7 @@ COMMAND = regex(r"\\(?:([A-Za-z]+)|.)", re.DOTALL)
 _SIGN = regex(r"\\(?:[A-Za-z]+|.)|.", re.DOTALL)
 PARAMETER = regex(r"(?<!\\)#([1-9])")
 _COMMAND_AT_END = regex(r"\\[A-Za-z]+\Z")
-_BEFORE_ARGUMENT = regex(
+BEFORE_ARGUMENT = regex(
     r"(?:[_^]|\\(?:acute|bar|bm|boldsymbol|breve|check|d?dot|grave|hat|math(?:bb|bf|cal|frak|it|rm|sf|tt)"
     r"|overline|tilde|underline|vec|widehat|widetilde)|\\[dt]?(?:binom|frac)\s*(?:\{[^{}]*\}|[^\s{}\\])?)\s*\Z"
 )
@@ -39,7 +39,7 @@ def expand_macros(tex: Excerpt, macros: Mapping[str, str]) -> Excerpt:
     What stands for a macro is where the macro begins, and an argument where it was. A macro without
     its arguments is left alone.
     """
-    own_names = _DEFINED.findall(tex.text) if macros else ()
+    own_names = DEFINED.findall(tex.text) if macros else ()
     at, left = 0, _MOST if macros else 0
     while left and len(tex.text) <= _LONGEST and (use := COMMAND.search(tex.text, at)):
         at = use.end()
@@ -53,7 +53,7 @@ def expand_macros(tex: Excerpt, macros: Mapping[str, str]) -> Excerpt:
             rest = split[1]
         if len(arguments) <= count:
             continue
-        if _BEFORE_ARGUMENT.search(before.text[-_REACH:]):
+        if BEFORE_ARGUMENT.search(before.text[-_REACH:]):
             body = f"{{{body}}}"
         places = ((at, tex.offset(use.start())) for at in range(len(body)))
         whole = Excerpt(tex.source, body, tuple(places) or ((0, tex.offset(at)),))

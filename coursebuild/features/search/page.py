@@ -172,6 +172,8 @@ class SectionReader:
 
     def _inline(self, inline: model.Inline) -> str:
         match inline:
+            case model.NumberBinding() if inline.is_in_formula:
+                return ""
             case model.Text() | CodeSpan() | model.NumberBinding():
                 return inline.text
             case model.Math():

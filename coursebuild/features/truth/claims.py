@@ -206,7 +206,7 @@ class _Counter:
             first = len(self.open)
             if isinstance(block, model.MathBlock):
                 source = None if block.label is None else block.label.source
-                self.formula(block.tex, source, block.span)
+                self.formula(block, source)
             elif isinstance(block, model.Table):
                 self.inlines(block.caption)
                 self.table(block)
@@ -265,7 +265,7 @@ class _Counter:
                     if inline.value is not None:
                         self.number(inline.value)
                         source = None
-                    self.formula(inline.tex, source, inline.span)
+                    self.formula(inline, source)
                 case model.Image():
                     for bound in inline.numbers:
                         self.number(bound)
@@ -295,8 +295,11 @@ class _Counter:
         claims = (_claim(part, number.text_span, unit) for part in numbers)
         self.give(number.source, mark, claims)
 
-    def formula(self, tex: Excerpt, source: str | None, span: Span) -> None:
-        """Add the claims of a formula."""
+    def formula(self, formula: model.Math | model.MathBlock, source: str | None) -> None:
+        """Add the claims of a formula, but for what is bound in it."""
+        tex = formula.tex
+        for number in formula.numbers:
+            self.number(number)
         if source is None and _MAY_CLAIM.search(tex.text) is None:
             return
         comparisons = self.comparisons.get(tex.span().start, ())
@@ -312,10 +315,12 @@ class _Counter:
                 is_numeral = source is not None and side.is_numeric
                 if is_numeral or _is_claim(side, tex.text):
                     claims += _side_claims(side, tex, self.comma)
+        bound = [number.text_span for number in formula.numbers]
+        claims = [c for c in claims if not any(map(c.span.contains, bound))]
         if source is None:
             self.open += claims
         else:
-            self.give(source, Span(span.source, tex.span().end, span.end), claims)
+            self.give(source, Span(tex.source, tex.span().end, formula.span.end), claims)
 
 
 def find_numbers(text: str, comma: bool = False) -> Iterator[Number]:

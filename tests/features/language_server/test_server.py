@@ -269,6 +269,13 @@ def test_a_number_that_is_printed_twice_has_an_action_for_each_place(editor: Edi
         '`{out="after"}`',
         '`{out="at"}`',
     ]
+    formula = twice.replace("`0.002`{out}", r"$\frac{\out{}{0.002}}{2}$")
+    editor.write(FIRST_LESSON, formula)
+    editor.until(FIRST_LESSON, "output-drift", "output-ambiguous")
+    assert "after 0.002 s" in editor.hover_text(FIRST_LESSON, r"$\frac{\out{}{0.0|02}}")
+    fixes = editor.actions(FIRST_LESSON, r"\out{}{0.0|02}").values()
+    edited_texts = [editor.apply_edits(fix.edit.changes)[FIRST_LESSON] for fix in fixes]
+    assert edited_texts == [formula.replace("{}", f"{{{words}}}") for words in ("after", "at")]
 
 
 def test_all_mistakes_of_a_file_are_fixed_together(editor: Editor) -> None:
