@@ -212,19 +212,19 @@ def _with_empty_line(code: Excerpt) -> Excerpt:
     return Excerpt(code.source, code.text + "\n", code.pieces)
 
 
-def walk_inlines(inlines: Iterable[Inline]) -> Iterator[Inline]:
-    """Every inline in order, a container before its content."""
+def walk_inlines(inlines: Iterable[Inline], *, numbers: bool = True) -> Iterator[Inline]:
+    """Every inline in order, a container before its content, a formula before its `numbers`."""
     nodes: list[Inline] = []
-    _collect(inlines, nodes)
+    _collect(inlines, numbers, nodes)
     return iter(nodes)
 
 
-def _collect(inlines: Iterable[Inline], nodes: list[Inline]) -> None:
+def _collect(inlines: Iterable[Inline], numbers: bool, nodes: list[Inline]) -> None:
     for inline in inlines:
         nodes.append(inline)
         if isinstance(inline, _INLINE_CONTAINERS):
-            _collect(inline.children, nodes)
-        elif isinstance(inline, Math):
+            _collect(inline.children, numbers, nodes)
+        elif numbers and isinstance(inline, Math):
             nodes += (*inline.numbers, *([inline.value] if inline.value else ()))
 
 

@@ -181,7 +181,7 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
     stretch that Markdown changed (entities, escapes) stands for all of itself.
     """
     stretches: list[MappedText] = []
-    for inline in model.walk_inlines(cell.children):
+    for inline in model.walk_inlines(cell.children, numbers=False):
         span = inline.span
         match inline:
             case model.Text():
@@ -193,7 +193,7 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
                 if len(markdown) - 2 * edge == len(text) + 2:
                     edge += 1
                 span = Span(span.source, span.start + edge, span.end - edge)
-            case model.NumberBinding() if not inline.is_in_formula:
+            case model.NumberBinding():
                 text, span = inline.text, inline.text_span
             case model.Math():
                 stretches.append(_formula_text(inline.tex))

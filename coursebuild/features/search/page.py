@@ -168,12 +168,10 @@ class SectionReader:
 
     def text(self, inlines: Iterable[model.Inline]) -> str:
         """Return the text of inlines, as the search has it."""
-        return "".join(map(self._inline, model.walk_inlines(inlines)))
+        return "".join(map(self._inline, model.walk_inlines(inlines, numbers=False)))
 
     def _inline(self, inline: model.Inline) -> str:
         match inline:
-            case model.NumberBinding() if inline.is_in_formula:
-                return ""
             case model.Text() | CodeSpan() | model.NumberBinding():
                 return inline.text
             case model.Math():

@@ -143,6 +143,7 @@ def test_cells_are_numbers_as_people_write_them() -> None:
         "| Euler | 5.51·10⁻⁴ | 2 |",
         "| Euler | $5.5\\cdot10^{-4}$ | 2.0 |",
         "| Euler | 5.5 × 10^-4 | 2.00 |",
+        "| Euler | 5.51·10⁻⁴ | $\\out{}{2.0}$ |",
     ):
         assert compare(table(EDITED_HEAD + row), DIGITS, printed).status == "verified", row
     for row in (
@@ -151,6 +152,8 @@ def test_cells_are_numbers_as_people_write_them() -> None:
         "| Euler | 5.5e-04 | 3 |",
     ):
         assert compare(table(EDITED_HEAD + row), DIGITS, printed).status == "drift", row
+    bound = table(EDITED_HEAD + "| Euler | $E = 2.0${out} | 3 |")
+    assert compare(bound, DIGITS, "Euler E = 2.0 3\n").status == "verified"
     row = "| Euler | 5.51·10⁻⁴ | $2.5\\times10^{-3}$ |"
     assert table_after(row, "Euler -0.123 1.5e12\n", DIGITS) == (
         "| Euler | -1.23·10⁻¹ | $1.5\\times10^{12}$ |"
