@@ -198,8 +198,8 @@ def profile_text(
         return f"{most}; the verdict rests on errors, not on time"
     if cost is not None and not cost.low / _ALIKE <= after / before <= cost.high * _ALIKE:
         return f"{most}; which the verdict rests on is not known: other work disturbed the timers"
-    longer, more = rival.step / own_profile.step, rival.steps / own_profile.steps
-    if abs(math.log(longer)) < min(math.log(_ALIKE), abs(math.log(more))):
+    step_ratio, count_ratio = rival.step / own_profile.step, rival.steps / own_profile.steps
+    if abs(math.log(step_ratio)) < min(math.log(_ALIKE), abs(math.log(count_ratio))):
         steps = f"{own_profile.steps} → {rival.steps}"
         return f"{most}; the verdict rests on the number of steps: {steps} under {rival.name}"
     sign = math.copysign(1.0, after - before)

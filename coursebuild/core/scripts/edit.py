@@ -336,12 +336,12 @@ def _update_table(
     return Edit(whole, replace_ranges(whole.text, ranges))
 
 
-def _rewrite(number: BoundText, written: str, old: str, new: str) -> str | None:
+def _rewrite(number: BoundText, source_text: str, old: str, new: str) -> str | None:
     """A new number as the old one is written; `None` if that is not how it would be written."""
     if number.text.replace(MINUS, "-") != old:
         return None
     # The minus signs of the old number stay: before it, and in its exponent.
-    halves = (re.split("(?=[eE])", half) for half in (written, number.as_written(new)))
+    halves = (re.split("(?=[eE])", half) for half in (source_text, number.as_written(new)))
     parts = zip_longest(*halves, fillvalue="")
     return "".join(part.replace("-", MINUS) if MINUS in like else part for like, part in parts)
 

@@ -47,6 +47,7 @@ from coursebuild.core.text.quantities import (
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
+_TEX_COMMA = regex(r"\{,\}")
 _RUN = regex(r"\s{2,}|(?<![0-9])[^\S ]|[^\S ](?![0-9])")
 """What is one space in a cell; not what may part thousands."""
 _SPACED_PAIR = regex(r"[0-9] [0-9]{3}(?![0-9])")
@@ -217,13 +218,13 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
 
 
 def _formula_text(tex: Excerpt) -> MappedText:
-    """A formula; what a macro stands for stands where its name does."""
+    """A formula; what a macro stands for stands where its name does, and `{,}` is a comma."""
     starts = [tex.offset(at) for at in range(len(tex.text))]
     names = (COMMAND.match(tex.source.text, start) for start in starts)
     ends = [
         start + 1 if name is None else name.end() for start, name in zip(starts, names, strict=True)
     ]
-    return MappedText(tex.text, starts, ends)
+    return MappedText(tex.text, starts, ends).substitute(_TEX_COMMA, ",")
 
 
 def cell_matches(recorded: Number, printed: Number, comparison: model.Comparison) -> bool:

@@ -298,11 +298,11 @@ def _write_list(directive: Directive, context: LessonContext) -> str:
     """Return the texts of a part of the course as a list of links."""
     caption = directive.options.get("caption", "").strip("\"'")
     lines = [f"**{caption}**\n"] if caption else []
-    shown = {context.path}
+    known_paths = {context.path}
     for _, title, target, paths in read_tree(directive.text, context.path, context.files):
-        new = [context.targets.get(stem_of(path), "") for path in paths if path not in shown]
+        new = [context.targets.get(stem_of(path), "") for path in paths if path not in known_paths]
         lines += (f"- {write_link(title, address)}" for address in new)
-        shown.update(paths)
+        known_paths.update(paths)
         lines += [f"- [{title or target}]({target})"] if "://" in target else []
     return "\n".join(lines)
 

@@ -88,7 +88,7 @@ def dedent_components(text: str) -> str:
 
     Indentation makes no code in MDX.
     """
-    closed = {*re.findall(r"</([A-Za-z][\w.]*)>", text)}
+    element_names = {*re.findall(r"</([A-Za-z][\w.]*)>", text)}
     lines, holders, fence = list[str](), [("", 0)], ""
     opening: tuple[str, int] | None = None
     at = end = 0  # of the line, and of the last tag
@@ -107,7 +107,7 @@ def dedent_components(text: str) -> str:
                 fence = ""
         elif not fence and name and f"</{name}>" in words and f"<{name}" not in words:
             holders.pop()
-        elif not fence and (tag := _OPENING.match(text, at)) and tag["name"] in closed:
+        elif not fence and (tag := _OPENING.match(text, at)) and tag["name"] in element_names:
             opening, end = (tag["name"], margin), tag.end()
         at += len(line) + 1
     return "\n".join(lines)

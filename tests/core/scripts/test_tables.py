@@ -170,6 +170,13 @@ def test_a_decimal_comma_stays_in_a_table_of_its_language() -> None:
     assert edit.text == "0,82 | −3,5e-03"
     assert compare(german, EXACT, "a 0.5 0.71 -2.5e-03\n").status == "verified"
     assert compare(recording, EXACT, "a 0.5 0.71 -2.5e-03\n").status == "drift"
+    recording = table(EDITED_HEAD + "| 0.5 | $0{,}71$ | −2,5e-03 |")
+    assert isinstance(recording.body, Table)
+    german = replace(recording, body=replace(recording.body, comma=True))
+    assert compare(german, EXACT, "a 0.5 0.71 -2.5e-03\n").status == "verified"
+    edit = update_body(german, EXACT, "a 0.5 0.82 -3.5e-03\n")
+    assert isinstance(edit, Edit)
+    assert edit.text == "0{,}82$ | −3,5e-03"
 
 
 def test_a_number_that_a_macro_moves_or_shows_twice_is_replaced_once_or_not_at_all() -> None:
