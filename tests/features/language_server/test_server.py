@@ -269,6 +269,8 @@ def test_a_number_that_is_printed_twice_has_an_action_for_each_place(editor: Edi
         '`{out="after"}`',
         '`{out="at"}`',
     ]
+    editor.write(FIRST_LESSON, FALL)
+    editor.until(FIRST_LESSON)
     formula = twice.replace("`0.002`{out}", r"$\frac{\out{}{0.002}}{2}$")
     editor.write(FIRST_LESSON, formula)
     editor.until(FIRST_LESSON, "output-drift", "output-ambiguous")
