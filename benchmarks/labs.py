@@ -107,6 +107,7 @@ LESSON = """## {model}
              "traces": [{{"label": "z", "expr": "lib.bodyPos(1)[2]"}}]}}]}}
 ```
 """
+WORKER_FILE = "**/worker.*.js"
 NO_TAPE = (
     "{range:{start:0,end:0,marks:[],touches:[]},isPast:false,before:()=>null,"
     "clear(){},after(){},event(){},mark(){},cut(){}}"
@@ -367,11 +368,12 @@ def tape_cost(browser: Any, url: str, rounds: int) -> str:
         )
         page = context.new_page()
         if not has_tape:
-            page.route("**/lab-worker.*.js", leave_out_tape)
+            page.route(WORKER_FILE, leave_out_tape)
         page.goto(url, wait_until="networkidle")
         page.locator(".lab").first.scroll_into_view_if_needed()
         page.wait_for_selector(".lab-play", timeout=60_000)
-        starts[has_tape].append(first_frame(page))
+        with page.expect_request(WORKER_FILE):  # else the tape would have been left in
+            starts[has_tape].append(first_frame(page))
         context.close()
     taped, plain = (statistics.median(times[1:]) for times in starts.values())
     return f"  first moving frame {taped:.0f} ms with the tape, {plain:.0f} ms without (medians)"
