@@ -139,8 +139,18 @@ def _judge_rival(report: ScenarioReport, number: int, starts: Starts) -> tuple[s
     if not resolved and (baseline.seen is None or report.least_seen >= 1):
         text = "no setting can be called better: the reference resolves no error of "
         return f"{text}{rival.name}, or of the scene's own setting", False
+    quantity = quantity_of(report)
+    if quantity.name == "seen" and rival.step_error is not None:
+        quantity = replace(STEPPED, least=report.least_seen)
+    value = quantity.value_of(rival)
+    is_vague = not resolved or (value is not None and value <= quantity.least)
+
+    def gain(starts: Sequence[Mapping[Column, float]]) -> str:
+        text = _gain_text(starts, figure, is_least=is_vague)
+        return text + (_AS_FAR if is_vague and " less" not in text else "")
+
     price, is_cheap = _price(rival), _is_cheap(rival)
-    claim = f"{rival.name} {price} and {_gain_text([own_ratios], figure)}"
+    claim = f"{rival.name} {price} and {gain([own_ratios])}"
     if not is_cheap and min(own_ratios.values()) > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, which is within what such runs differ by", False
     nearby, elsewhere = starts(number), "from starts nearby"
@@ -155,14 +165,7 @@ def _judge_rival(report: ScenarioReport, number: int, starts: Starts) -> tuple[s
     if limit := stray_timestep(report, rival):
         reason = f"leaves the motion of small steps at some timesteps beyond {limit}"
         return f"{none}{claim} here, but {rival.setting.integrator} {reason}", False
-    quantity = quantity_of(report)
-    if quantity.name == "seen" and rival.step_error is not None:
-        quantity = replace(STEPPED, least=report.least_seen)
-    value = quantity.value_of(rival)
-    is_vague = not resolved or (value is not None and value <= quantity.least)
-    gain = _gain_text(everywhere, figure, is_least=is_vague)
-    text = f"{rival.name} is better: it {price} and {gain}"
-    return text + (_AS_FAR if is_vague and " less" not in gain else ""), True
+    return f"{rival.name} is better: it {price} and {gain(everywhere)}", True
 
 
 _AS_FAR = ", as far as the reference resolves"

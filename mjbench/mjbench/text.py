@@ -82,7 +82,7 @@ def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -
         yield ""
         yield from plot_lines(chart, style.width)
     yield from profile_lines(report.profile, report.profile_text, style)
-    yield from _stable(report.stable, style)
+    yield from _stable(report.stable, style, "theory at rest")
     yield from _orders(report.orders, style)
     figures: dict[tuple[str, str], list[str]] = {}
     for line in report.figures:
@@ -158,7 +158,7 @@ def _orders(orders: Sequence[OrderRow], style: Style) -> Iterator[str]:
         yield from fitted_table(columns, style.width)
 
 
-def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
+def _stable(rows: Sequence[StableRow], style: Style, theory: str = "theory") -> Iterator[str]:
     if not rows:
         return
     yield ""
@@ -167,7 +167,7 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("bounded", [row.shown for row in rows]),
         ("near small steps", [reach_text(row.near, row.searched) for row in rows]),
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
-        ("theory", [_theory(row) for row in rows]),
+        (theory, [_theory(row) for row in rows]),
     ]
     yield from fitted_table(columns, style.width)
     reasons: dict[str, list[str]] = {}
