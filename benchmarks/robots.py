@@ -116,7 +116,8 @@ def _measure(model: Path, report: Path, minutes: int, *, full: bool) -> bool:
         for line in _lines(scene):
             print(f"  {line}", flush=True)
     if done.status:
-        print(f"  not measured: {done.last_line()}", flush=True)
+        share = "not all of it is" if done.output else "not"
+        print(f"  {share} measured: {done.last_line()}", flush=True)
     return not done.status and not failures
 
 

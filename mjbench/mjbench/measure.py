@@ -23,6 +23,7 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 
+from mjbench.detector import pair_of
 from mjbench.problem import STANDARD, Array, Integrator, Motion, Reference, Sizes
 from mjbench.reports import scene_report
 from mjbench.rotations import angular_distance
@@ -335,7 +336,7 @@ def friction_holds(model: Any, scene: Scene, states: EngineStates, sticks: Stick
     for data, pairs in zip(_samples(model, scene, states), sticks, strict=False):
         loads = {pair: np.zeros(2) for pair in pairs}  # friction over its coefficient, and pressure
         for number, contact in enumerate(data.contact[: data.ncon]):
-            pair = (int(contact.geom[0]), int(contact.geom[1]))
+            pair = pair_of(contact)
             if pair in loads:
                 mujoco.mj_contactForce(model, data, number, force)
                 friction = force[1 : contact.dim] / contact.friction[: contact.dim - 1]
@@ -373,7 +374,7 @@ def surface_speeds(model: Any, scene: Scene, states: EngineStates) -> list[dict[
         least: dict[Pair, float] = {}
         for contact in touching_contacts(data):
             if contact.dim >= 3:  # with friction
-                pair = (int(contact.geom[0]), int(contact.geom[1]))
+                pair = pair_of(contact)
                 _, speed = contact_speeds(model, data, contact)
                 least[pair] = min(speed, least.get(pair, math.inf))
         least_speeds.append(least)
@@ -391,7 +392,7 @@ def touching_contacts(data: Any) -> list[Any]:
 
 def contact_speeds(model: Any, data: Any, contact: Any) -> tuple[float, float]:
     """The speeds (m/s) with which two geoms part, and slide along each other, at a contact."""
-    first, second = (int(geom) for geom in contact.geom)
+    first, second = pair_of(contact)
     relative = _velocity(model, data, second, contact.pos)
     relative = relative - _velocity(model, data, first, contact.pos)
     normal = contact.frame[:3]
