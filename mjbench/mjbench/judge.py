@@ -149,7 +149,8 @@ def _judge_rival(report: ScenarioReport, number: int, starts: Starts) -> tuple[s
         text = _gain_text(starts, figure, is_least=is_vague)
         return text + (_AS_FAR if is_vague and " less" not in text else "")
 
-    price, is_cheap = _price(rival), _is_cheap(rival)
+    price, cost = _price(rival), rival.cost
+    is_cheap = cost is not None and cost.value <= 1 - _WORTH_SAYING and cost.high < 1
     claim = f"{rival.name} {price} and {gain([own_ratios])}"
     if not is_cheap and min(own_ratios.values()) > 1 - _WORTH_SAYING:
         return f"{none}{claim} here, which is within what such runs differ by", False
@@ -200,11 +201,6 @@ def _price(row: WorkPrecisionRow) -> str:
     if cost is None or cost.low <= 1 <= cost.high or abs(cost.value - 1) < 0.05:  # two digits: 1
         return "takes about as long"
     return f"takes {number_text(cost.value)} {'of the time' if cost.value < 1 else 'times as long'}"
-
-
-def _is_cheap(row: WorkPrecisionRow) -> bool:
-    """Whether it costs so much less that it is worth saying."""
-    return row.cost is not None and row.cost.value <= 1 - _WORTH_SAYING and row.cost.high < 1
 
 
 def _describe_rival(report: ScenarioReport) -> str:

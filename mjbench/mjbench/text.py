@@ -148,7 +148,7 @@ def _error(row: WorkPrecisionRow, name: str, least: float) -> str:
 
 
 def _orders(orders: Sequence[OrderRow], style: Style) -> Iterator[str]:
-    rows = [row for row in orders if row.has_orders]
+    rows = [row for row in orders if row.position or row.attitude or row.velocity]
     if rows:
         yield ""
         columns = [("order of", [row.integrator for row in rows])]
