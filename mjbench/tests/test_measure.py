@@ -90,8 +90,8 @@ def test_an_order_is_fitted_only_where_errors_lie_on_a_line() -> None:
     assert fit_order(steps, bent, 0.0) is None
     wavy = [h**2 * (1.3 if n % 2 else 1) for n, h in enumerate(steps)]
     assert fit_order(steps, wavy, 0.0) is None
-    between = [h**1.5 for h in steps]  # no method has such an order, on however straight a line
-    assert fit_order(steps, between, 0.0) is None
+    fraction = [h**1.5 for h in steps]  # no method has such an order, on however straight a line
+    assert fit_order(steps, fraction, 0.0) is None
     parted = [0.01 * h**0.07 for h in steps]  # as large as the part of the motion that is lost
     assert fit_order(steps, parted, 0.0) is None
     shaken = [h**2 * (1.05 if n % 2 else 1) for n, h in enumerate(steps)]
