@@ -334,7 +334,8 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     lines = [speed, error, better, stability_text(report)]
     if report.horizon < report.duration * (1 - 1e-9):
         missing.append(f"the motion beyond {seconds_text(report.horizon, 3)}")
-    if report.parts is None and row.parted is None and row.status == "ok":
+    is_told = any("errors apart" in names for names in failures.values())
+    if report.parts is None and row.parted is None and row.status == "ok" and not is_told:
         missing.append("the error was not taken apart")
     if missing:
         lines.append("not known: " + "; ".join(missing))
