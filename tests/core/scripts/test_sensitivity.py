@@ -53,8 +53,7 @@ def measure(
         document("", "content/lessons/1.1-a.md"), comparison=comparison, filters=filters
     )
     finer_runs = [run(text) for text in finer]
-    trace = replace(TRACE, is_perturbed=True)
-    shifted_runs = [replace(run(text), trace=trace) for text in shifted]
+    shifted_runs = [run(text) for text in shifted]
     return sensitivity(
         *(sample_course, "examples/a.py", "1.1", [block], run(printed)),
         *(runs, finer_runs, shifted_runs),
