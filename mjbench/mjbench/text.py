@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 
+from mjbench.columns import rounded_text
 from mjbench.profile import profile_lines
 from mjbench.reports import Interval
 from mjbench.reports.charts import ON_FRONT, plot_lines
@@ -23,6 +24,7 @@ from mjbench.reports.limits import reach_text
 from mjbench.reports.model_report import BatchCost, CaseReport, EngineReport, SceneReport
 from mjbench.reports.records import Departure
 from mjbench.reports.scene_report import (
+    FLOORS,
     OrderRow,
     ScenarioReport,
     StableRow,
@@ -206,13 +208,19 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
     lines = [style.strong(report.model), f"  {report.machine.text}"]
     for scenario in report.scenarios:
         rows = scenario.rows
-        names = [f"{row.title}, {row.bits} bits" if row.bits else row.title for row in rows]
-        costs = ["; ".join(map(_cost, row.costs)) for row in rows]
+        bits = [f"{row.bits} bits" if row.bits else "" for row in rows]
+        devices = ["" if row.device == "cpu" else row.device for row in rows]
+        parts = zip([row.title for row in rows], bits, devices, strict=True)
+        names = [", ".join(filter(None, part)) for part in parts]
+        rates = ["; ".join(map(_rate, row.costs)) for row in rows]
+        places = [[pair[0] for pair in (row.position, row.attitude) if pair] for row in rows]
+        least = FLOORS * scenario.floor * (1 + 1e-9)
+        errors = [max(place, default=None) for place in places]
         columns = [
             ("engine", names),
-            ("device", [row.device for row in rows]),
+            ("errs by", ["" if e is None else f"{'< ' * (e <= least)}{e:.2g}" for e in errors]),
             ("from MuJoCo", ["" if r.apart is None else f"{r.apart:.2g}" for r in rows]),
-            ("a step by number of worlds", costs),
+            ("steps a second, by number of worlds", rates),
         ]
         lines += ["", f"  {style.strong(scenario.name)}: {scenario.title}"]
         setting = f"{setting_text(scenario.setting)}, over {seconds_text(scenario.duration)}"
@@ -224,9 +232,9 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
     return printable("\n".join(lines) + "\n")
 
 
-def _cost(cost: BatchCost) -> str:
+def _rate(cost: BatchCost) -> str:
     time = cost.seconds
-    return f"{cost.worlds}: {cost.remark if time is None else seconds_text(time.value, 3)}"
+    return f"{cost.worlds}: {cost.remark if time is None else rounded_text(1 / time.value, 3)}"
 
 
 def _lost(status: str, reasons: Iterable[str]) -> str:
