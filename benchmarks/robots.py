@@ -115,8 +115,8 @@ def _measure(model: Path, report: Path, minutes: int, *, full: bool) -> bool:
         failures = scene["failures"]
         for line in _lines(scene):
             print(f"  {line}", flush=True)
-    if done.status:
-        print(f"  not measured: {done.last_line()}", flush=True)
+    if done.status and (reason := done.last_line()):
+        print(f"  {'not all of it is' if done.output else 'not'} measured: {reason}", flush=True)
     return not done.status and not failures
 
 

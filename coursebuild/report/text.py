@@ -268,7 +268,7 @@ def _row_text(row: Doubt | Flip) -> str:
                     f"half the timestep: {row.halved}, a quarter: {row.quartered}"
                 )
                 if row.sampled:
-                    measured_values.append(f"looked for at every step: known to {row.sampled}")
+                    measured_values.append(f"a part of a step later off by {row.sampled}")
             text += f", print {row.instead}" if row.instead else ""
             text += f"  ({'; '.join(measured_values)})"
             is_allowed = row.repeat < row.digits and not row.compared

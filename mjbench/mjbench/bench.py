@@ -40,7 +40,7 @@ from mjbench.pruning.reachability import possible_pairs
 from mjbench.reports import PartFailure
 from mjbench.reports.model_report import SceneCard, SceneReport
 from mjbench.reports.scene_report import ScenarioReport, SweepReport
-from mjbench.scene import ExactMotion, Scene, SceneError, scenes
+from mjbench.scene import ExactMotion, Scene, SceneError, element_names, scenes
 from mjbench.simulation import silent, simulate
 from mjbench.sweep import drawn_models, measure_sweep
 from mjbench.work_precision import measure_scenario
@@ -201,10 +201,7 @@ def _with_task(
     model: Any, declarations: Declarations, task: str, loop: Loop | None
 ) -> Declarations:
     kinds = ("sensor", "site", "body")
-    names = {
-        kind: {str(getattr(model, kind)(n).name) for n in range(int(getattr(model, f"n{kind}")))}
-        for kind in kinds
-    }
+    names = {kind: element_names(model, kind) for kind in kinds}
     kind, _, name = task.rpartition(":")
     kind = kind or next((kind for kind in kinds if name in names[kind]), "")
     if name not in names.get(kind, ()):

@@ -264,7 +264,7 @@ def _style() -> Style:
 
 
 def _show(arguments: argparse.Namespace) -> int:
-    """Show a report of any kind; what follows from its figures is derived anew."""
+    """Show a report of any kind."""
     report = _read(arguments.report, read_report)
     if arguments.html is None:
         reports = report if isinstance(report, tuple) else (report,)

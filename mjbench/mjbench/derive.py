@@ -81,7 +81,10 @@ def derive_scenario(report: ScenarioReport, starts: Starts) -> ScenarioReport:
             replace(quantity, resolved=quantity.is_resolved(rows)) for quantity in present
         ),
         main="" if main is None else main.name,
-        cut_short=_is_cut_short(report),
+        cut_short=any(
+            math.isclose(row.searched[1], report.duration / FEWEST_STEPS, rel_tol=1e-9)
+            for row in stable
+        ),
     )
     if main is not None and report.own_row is not None:
         report = replace(report, rows=mark_luck(rows, largest_of(stable), main))
@@ -168,11 +171,6 @@ def derive_profile(report: ScenarioReport, profile: tuple[PhaseProfile, ...]) ->
     rival_profile = next((p for p in profile if rival is report.rows[p.row]), None)
     text = profile_text(profile[0], rival_profile, None if rival is None else rival.cost)
     return replace(report, profile=profile, profile_text=text)
-
-
-def _is_cut_short(report: ScenarioReport) -> bool:
-    longest = report.duration / FEWEST_STEPS
-    return any(math.isclose(row.searched[1], longest, rel_tol=1e-9) for row in report.stable)
 
 
 def derive_case(report: CaseReport) -> CaseReport:

@@ -169,6 +169,11 @@ def judge(
     return RunJudgement(worst, tuple(text for _, text in symptoms))
 
 
+def pair_of(contact: Any) -> tuple[int, int]:
+    """The numbers of the two geoms that touch in a contact; -1 for what is none."""
+    return int(contact.geom[0]), int(contact.geom[1])
+
+
 def pair_names(model: Any, pair: tuple[int, int]) -> str:
     """What the two bodies are called that two geoms belong to."""
     return " and ".join(_body_of(model, geom) for geom in pair)

@@ -19,6 +19,7 @@ import numpy as np
 from mjbench.declarations import DURATION, MOST_STEPS, DeclaredScenario, Place
 from mjbench.loop import Loop, close_loop, step, time_left
 from mjbench.problem import Array
+from mjbench.scene import element_names
 from mjbench.simulation import advance, without_sleep
 
 SEEDS, QUICK_SEEDS = (1, 2, 3), (1, 2)
@@ -98,7 +99,7 @@ def _most_steps(model: Any, data: Any, *, quick: bool) -> float:
 def _begin(model: Any) -> tuple[int | None, str, Any]:
     """The keyframe to begin in, what that is called, and `mjData` of it."""
     data = mujoco.MjData(model)
-    names = [str(model.key(number).name) for number in range(int(model.nkey))]
+    names = element_names(model, "key")
     if names:
         number = names.index("home") if "home" in names else 0
         mujoco.mj_resetDataKeyframe(model, data, number)

@@ -114,8 +114,7 @@ def judge_setting(report: ScenarioReport, starts: Starts) -> RowVerdict:
         text = f"nothing can be said of the scene's own setting: {row.lucky}"
         return RowVerdict(None, text + remark)
     if row.dominated_by is None:
-        text = "no other setting that was measured is cheaper without being less accurate"
-        return RowVerdict(None, (_describe_rival(report) or text) + remark)
+        return RowVerdict(None, _describe_rival(report) + remark)
     text, is_better = _judge_rival(report, row.dominated_by, starts)
     return RowVerdict(row.dominated_by if is_better else None, text + remark)
 
@@ -130,19 +129,27 @@ def _judge_rival(report: ScenarioReport, number: int, starts: Starts) -> tuple[s
     """What is said of a row that is better here, and whether it is better."""
     baseline, rival = next(r for r in report.rows if r.own), report.rows[number]
     figure, none = report.figure, "no difference that holds: "
-    own_ratios = row_ratios(report, baseline, rival)
-    if baseline.setting.cone == rival.setting.cone:  # the model errs alike under both
-        own_ratios.pop(("contact_model", WHOLE), None)
+    own_ratios = _ratios(report, baseline, rival)
     pair = [columns_of(row, report.contact_model) for row in (baseline, rival)]
     leasts = leasts_of(report)
     resolved = [c for c in own_ratios if max(pair[0][c], pair[1][c]) > leasts[c[0]] * (1 + 1e-9)]
     if not resolved and (baseline.seen is None or report.least_seen >= 1):
         text = "no setting can be called better: the reference resolves no error of "
         return f"{text}{rival.name}, or of the scene's own setting", False
-    price, is_cheap = _price(rival), _is_cheap(rival)
-    claim = f"{rival.name} {price} and {_gain_text([own_ratios], figure)}"
-    if not is_cheap and min(own_ratios.values()) > 1 - _WORTH_SAYING:
-        return f"{none}{claim} here, which is within what such runs differ by", False
+    quantity = quantity_of(report)
+    if quantity.name == "seen" and rival.step_error is not None:
+        quantity = replace(STEPPED, least=report.least_seen)
+    value = quantity.value_of(rival)
+    is_vague = not resolved or (value is not None and value <= quantity.least)
+
+    def gain(starts: Sequence[Mapping[Column, float]]) -> str:
+        text = _gain_text(starts, figure, is_least=is_vague)
+        return text + (_AS_FAR if is_vague and " less" not in text else "")
+
+    if not _is_notable(min(own_ratios.values()), rival):
+        return _describe_rival(report), False
+    price = _price(rival)
+    claim = f"{rival.name} {price} and {gain([own_ratios])}"
     nearby, elsewhere = starts(number), "from starts nearby"
     elsewhere += " or with drawn parameters" if report.drawn else ""
     if nearby is None:
@@ -150,22 +157,34 @@ def _judge_rival(report: ScenarioReport, number: int, starts: Starts) -> tuple[s
     everywhere = [own_ratios, *nearby]
     if worse := worse_texts(report, baseline, everywhere):
         return f"{none}{claim} here, but {elsewhere} {worse[0]}", False
-    if not is_cheap and _gain(everywhere).high > 1 - _WORTH_SAYING:
+    if not _is_notable(_gain(everywhere).high, rival):
         return f"{none}{claim} here, but is no better {elsewhere}", False
     if limit := stray_timestep(report, rival):
         reason = f"leaves the motion of small steps at some timesteps beyond {limit}"
         return f"{none}{claim} here, but {rival.setting.integrator} {reason}", False
-    quantity = quantity_of(report)
-    if quantity.name == "seen" and rival.step_error is not None:
-        quantity = replace(STEPPED, least=report.least_seen)
-    value = quantity.value_of(rival)
-    is_vague = not resolved or (value is not None and value <= quantity.least)
-    gain = _gain_text(everywhere, figure, is_least=is_vague)
-    text = f"{rival.name} is better: it {price} and {gain}"
-    return text + (_AS_FAR if is_vague and " less" not in gain else ""), True
+    return f"{rival.name} is better: it {price} and {gain(everywhere)}", True
 
 
 _AS_FAR = ", as far as the reference resolves"
+
+
+def _ratios(
+    report: ScenarioReport, baseline: WorkPrecisionRow, rival: WorkPrecisionRow
+) -> dict[Column, float]:
+    """How many times as large the errors of a rival are as the own ones, where they may differ."""
+    ratios = row_ratios(report, baseline, rival)
+    if baseline.setting.cone == rival.setting.cone:  # the model errs alike under both
+        ratios.pop(("contact_model", WHOLE), None)
+    return ratios
+
+
+def _is_notable(ratio: float, rival: WorkPrecisionRow) -> bool:
+    """Whether a rival costs so much less, or has such a part of an error, that it is worth saying.
+
+    What is no more is within what such runs differ by.
+    """
+    most, cost = 1 - _WORTH_SAYING, rival.cost
+    return ratio <= most or (cost is not None and cost.value <= most and cost.high < 1)
 
 
 def _gain(starts: Sequence[Mapping[Column, float]]) -> Spread:
@@ -199,16 +218,11 @@ def _price(row: WorkPrecisionRow) -> str:
     return f"takes {number_text(cost.value)} {'of the time' if cost.value < 1 else 'times as long'}"
 
 
-def _is_cheap(row: WorkPrecisionRow) -> bool:
-    """Whether it costs so much less that it is worth saying."""
-    return row.cost is not None and row.cost.value <= 1 - _WORTH_SAYING and row.cost.high < 1
-
-
 def _describe_rival(report: ScenarioReport) -> str:
-    """The cheapest setting that would be better by one number, and why it is not; empty if none."""
+    """The cheapest setting that would be better by one number, and why it is not."""
     row, baseline = _cheapest_rival(report), report.own_row
     if row is None or baseline is None:
-        return ""
+        return "no other setting that was measured is cheaper without being less accurate"
     own_ratios = row_ratios(report, baseline, row)
     worse = worse_texts(report, baseline, [own_ratios])
     if row.lucky or not worse:
@@ -238,8 +252,10 @@ def rival_row(report: ScenarioReport) -> WorkPrecisionRow | None:
     baseline = report.own_row
     if baseline is None or baseline.status != "ok" or baseline.parted is not None:
         return None
-    if baseline.dominated_by is not None:
-        return report.rows[baseline.dominated_by]
+    number = baseline.dominated_by
+    row = None if number is None else report.rows[number]
+    if row is not None and _is_notable(min(_ratios(report, baseline, row).values()), row):
+        return row
     return _cheapest_rival(report)
 
 
@@ -335,7 +351,8 @@ def five_lines(report: ScenarioReport) -> tuple[str, ...]:
     lines = [speed, error, better, stability_text(report)]
     if report.horizon < report.duration * (1 - 1e-9):
         missing.append(f"the motion beyond {seconds_text(report.horizon, 3)}")
-    if report.parts is None and row.parted is None and row.status == "ok":
+    is_told = any("errors apart" in names for names in failures.values())
+    if report.parts is None and row.parted is None and row.status == "ok" and not is_told:
         missing.append("the error was not taken apart")
     if missing:
         lines.append("not known: " + "; ".join(missing))

@@ -65,6 +65,11 @@ class FixedState(Struct, frozen=True, eq=False):
     touches: bool = False
     """Whether contacts, limits or dry friction act in it."""
 
+    @property
+    def step(self) -> float:
+        """The step of differences about it."""
+        return _NEAR_STEP if self.touches else _STEP
+
 
 def _converged(model: Any, integrator: Integrator, timestep: float) -> Any:
     """A copy of a model that is awake and whose solver goes to its end: differences are smooth."""
@@ -123,7 +128,7 @@ def _step_derivative(model: Any, data: Any, state: FixedState) -> Array:
     _set(model, data, state, np.zeros(len(units)))
     advance(model, data)
     following = _state_of(data)
-    return _derivative(after, units, _NEAR_STEP if state.touches else _STEP)
+    return _derivative(after, units, state.step)
 
 
 def find_rest(model: Any, scenario: Scenario) -> FixedState | None:
@@ -180,16 +185,14 @@ def _accelerations(model: Any, data: Any, state: FixedState, change: Array | Non
 
 
 def _force_derivative(model: Any, data: Any, state: FixedState) -> Array:
-    step = _NEAR_STEP if state.touches else _STEP
-    return _derivative(lambda x: _accelerations(model, data, state, x), _units(model), step)
+    return _derivative(lambda x: _accelerations(model, data, state, x), _units(model), state.step)
 
 
 def _is_kinked(model: Any, data: Any, state: FixedState, derivative: Array) -> bool:
     """Whether forces differ from their derivative by a part of it, in some direction."""
-    step = _NEAR_STEP if state.touches else _STEP
     middle = _accelerations(model, data, state)
     for way in np.random.default_rng(4).normal(size=(_WAYS, len(_units(model)))):
-        change = step * way * _units(model)
+        change = state.step * way * _units(model)
         expected = derivative @ change
         for side in (1.0, -1.0):
             gap = _accelerations(model, data, state, side * change) - middle - side * expected

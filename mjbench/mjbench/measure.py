@@ -5,8 +5,8 @@
 2. No error is given below ten times the floor, by which the reference itself may be off.
 3. An order is the slope where the error is over a hundred floors and under 0.1: nearer to the floor
    rounding is measured, beyond 0.1 the asymptotic law does not hold yet. It is given only where
-   those errors lie on a line, in a logarithmic plot. Where slopes still tend somewhere, the
-   interval holds that limit too.
+   those errors lie on a line, in a logarithmic plot, whose slope may be a whole number: else the
+   law does not hold yet. Where slopes still tend somewhere, the interval holds that limit too.
 4. In the reference, two geoms stick to each other between two samples where a point in which they
    touch hardly moves along the surface, at both of them. A body that rolls sticks too. In another
    run the speed of that point along the surface, added up over the same time, is creep: by the
@@ -23,6 +23,7 @@ from typing import Any, TypeAlias
 import mujoco
 import numpy as np
 
+from mjbench.detector import pair_of
 from mjbench.problem import STANDARD, Array, Integrator, Motion, Reference, Sizes
 from mjbench.reports import scene_report
 from mjbench.rotations import angular_distance
@@ -42,8 +43,9 @@ _BEYOND = 2.0
 """How many times the last change of slopes their limit may be beyond the last slope."""
 _UNCERTAIN, _BENT = 0.25, 0.25
 """The widest half interval of an order, and the largest bend, with which it is given."""
-_LEAST_ORDER = 0.5
-"""Errors that fall more slowly are those of a motion that is lost in a fast part of the whole."""
+_LEAST_ORDER, _LAST_DIGIT = 0.5, 0.005
+"""Errors that fall more slowly are those of a motion that is lost in a fast part of the whole; half
+of the last digit of an order as it is told."""
 
 _ZERO_SIZES, _UNIT_SIZES = Sizes(0.0, 0.0, 0.0), Sizes(1.0, 1.0, 1.0)
 
@@ -118,7 +120,8 @@ def fit_order(
         uncertainty = max(uncertainty, abs(slope - finest) + _BEYOND * abs(finer - finest))
     fit = scene_report.FittedOrder(slope, uncertainty, float(np.ptp(slopes)))
     is_line = fit.uncertainty <= _UNCERTAIN and fit.bend <= _BENT
-    return fit if is_line and fit.value > _LEAST_ORDER else None
+    is_whole = abs(slope - round(slope)) <= max(fit.uncertainty, fit.bend) + _LAST_DIGIT
+    return fit if is_line and is_whole and fit.value > _LEAST_ORDER else None
 
 
 def fit_orders(
@@ -333,7 +336,7 @@ def friction_holds(model: Any, scene: Scene, states: EngineStates, sticks: Stick
     for data, pairs in zip(_samples(model, scene, states), sticks, strict=False):
         loads = {pair: np.zeros(2) for pair in pairs}  # friction over its coefficient, and pressure
         for number, contact in enumerate(data.contact[: data.ncon]):
-            pair = (int(contact.geom[0]), int(contact.geom[1]))
+            pair = pair_of(contact)
             if pair in loads:
                 mujoco.mj_contactForce(model, data, number, force)
                 friction = force[1 : contact.dim] / contact.friction[: contact.dim - 1]
@@ -371,7 +374,7 @@ def surface_speeds(model: Any, scene: Scene, states: EngineStates) -> list[dict[
         least: dict[Pair, float] = {}
         for contact in touching_contacts(data):
             if contact.dim >= 3:  # with friction
-                pair = (int(contact.geom[0]), int(contact.geom[1]))
+                pair = pair_of(contact)
                 _, speed = contact_speeds(model, data, contact)
                 least[pair] = min(speed, least.get(pair, math.inf))
         least_speeds.append(least)
@@ -389,7 +392,7 @@ def touching_contacts(data: Any) -> list[Any]:
 
 def contact_speeds(model: Any, data: Any, contact: Any) -> tuple[float, float]:
     """The speeds (m/s) with which two geoms part, and slide along each other, at a contact."""
-    first, second = (int(geom) for geom in contact.geom)
+    first, second = pair_of(contact)
     relative = _velocity(model, data, second, contact.pos)
     relative = relative - _velocity(model, data, first, contact.pos)
     normal = contact.frame[:3]

@@ -26,6 +26,7 @@ from mjbench.detector import (
     driving_force,
     has_bad_state,
     pair_names,
+    pair_of,
     thickness,
     update_peaks,
 )
@@ -200,7 +201,7 @@ def _initial_overlaps(model: Any, data: Any, half_thickness: Array) -> str:
     mujoco.mj_fwdPosition(model, data)
     depths: dict[str, float] = {}
     for contact in data.contact[: data.ncon]:
-        pair, depth = (int(contact.geom[0]), int(contact.geom[1])), -float(contact.dist)
+        pair, depth = pair_of(contact), -float(contact.dist)
         if min(pair) >= 0 and depth > _OVERLAP * half_thickness[list(pair)].min():
             names = pair_names(model, pair)
             depths[names] = max(depth, depths.get(names, 0.0))

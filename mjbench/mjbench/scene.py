@@ -132,7 +132,7 @@ def scenes(model: Any, declarations: Declarations, *, quick: bool = False) -> tu
     scenarios = declarations.scenarios
     if not scenarios:
         place = Place(declarations.path)
-        names = keyframe_scenarios([str(model.key(key).name) for key in range(int(model.nkey))])
+        names = keyframe_scenarios(element_names(model, "key"))
         titles = [f"from the keyframe {name}" for name in names]
         scenarios = tuple(
             DeclaredScenario(name, title, key, table=place)
@@ -147,7 +147,7 @@ def _check_fit(declarations: Declarations, model: Any) -> None:
     """Check that a model has what scenarios name; a `SceneError` where it does not."""
     step = float(model.opt.timestep)
     for scenario in declarations.scenarios:
-        names = [str(model.key(number).name) for number in range(int(model.nkey))]
+        names = element_names(model, "key")
         keyframes = names if isinstance(scenario.keyframe, str) else range(len(names))
         if scenario.keyframe is not None and scenario.keyframe not in keyframes:
             message = f"the model has no keyframe `{scenario.keyframe}`"
@@ -172,23 +172,25 @@ def _check_fit(declarations: Declarations, model: Any) -> None:
         follow = max(map(len, (scenario.controls, *scenario.poses.values())))
         if follow > 1 and scenario.hold is None:
             raise SceneError("`hold` is missing: commands follow each other", scenario.table)
-        bodies = {str(model.body(n).name): n for n in range(1, int(model.nbody))}
+        bodies = element_names(model, "body")
         for field, names in (
             ("push", [p.body for p in scenario.push]),
             ("poses", [*scenario.poses]),
         ):
             for name in names:
-                if name not in bodies:
+                if name not in bodies[1:]:
                     raise SceneError(f"the model has no body `{name}`", scenario.place(field))
-                if field == "poses" and model.body_mocapid[bodies[name]] < 0:
+                if field == "poses" and model.body(name).mocapid[0] < 0:
                     raise SceneError(f"`{name}` is no mocap body", scenario.place(field))
         quantity = scenario.observable
-        if quantity is not None:
-            things = getattr(model, quantity.kind)
-            numbers = range(int(getattr(model, f"n{quantity.kind}")))
-            if quantity.name not in {str(things(number).name) for number in numbers}:
-                message = f"the model has no {quantity.kind} `{quantity.name}`"
-                raise SceneError(message, scenario.place("measure"))
+        if quantity is not None and quantity.name not in element_names(model, quantity.kind):
+            message = f"the model has no {quantity.kind} `{quantity.name}`"
+            raise SceneError(message, scenario.place("measure"))
+
+
+def element_names(model: Any, kind: str) -> list[str]:
+    """The names of all elements of a kind, such as `body`, by their number; "" without one."""
+    return [str(getattr(model, kind)(n).name) for n in range(int(getattr(model, f"n{kind}")))]
 
 
 def _scene(

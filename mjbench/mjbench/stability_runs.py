@@ -104,11 +104,6 @@ def kept_motion(model: Any, pilot: Pilot, reference: EngineStates) -> KeptMotion
     return KeptMotion(states, units, horizon_error_text(far))
 
 
-def step_count(span: float, timestep: float) -> int:
-    """Steps that make up a span, both in s."""
-    return math.ceil(span / timestep * (1 - 1e-12))
-
-
 def run_trial(
     setup: Setup, model: Any, span: float, motion: KeptMotion | None = None, *, start: int = 0
 ) -> StabilityTrial:
@@ -125,7 +120,7 @@ def run_trial(
         data.act[:] += NEARBY * (-1) ** start
     model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
     timestep = float(model.opt.timestep)
-    steps = step_count(span, timestep)
+    steps = math.ceil(span / timestep * (1 - 1e-12))
     interval = max(2, steps // _LOOKS)
     holds = setup.scenario.holds(span)
     commands = {min(math.ceil(begin / timestep - 1e-9), steps): new for begin, _, new in holds}

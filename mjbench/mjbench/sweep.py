@@ -22,6 +22,7 @@ from msgspec.structs import replace
 
 from mjbench.costs import Clock, scenario_job, time_jobs
 from mjbench.declarations import DeclaredScenario, DeclaredSweep, SweepValue, Variation
+from mjbench.detector import pair_of
 from mjbench.measure import (
     Pair,
     contact_speeds,
@@ -322,7 +323,7 @@ def _follow_hits(
     """Note what happened to hits in a step, and add new ones; the pairs that touch now."""
     current: dict[Pair, _Hit] = {}
     for contact in touching_contacts(data):
-        pair = (int(contact.geom[0]), int(contact.geom[1]))
+        pair = pair_of(contact)
         hit = previous.get(pair) or current.get(pair)
         if hit is None:
             hit = _Hit(-contact_speeds(model, data, contact)[0], contact)

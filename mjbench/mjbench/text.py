@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TypeAlias
 
+from mjbench.columns import rounded_text
 from mjbench.profile import profile_lines
 from mjbench.reports import Interval
 from mjbench.reports.charts import ON_FRONT, plot_lines
@@ -23,6 +24,7 @@ from mjbench.reports.limits import reach_text
 from mjbench.reports.model_report import BatchCost, CaseReport, EngineReport, SceneReport
 from mjbench.reports.records import Departure
 from mjbench.reports.scene_report import (
+    FLOORS,
     OrderRow,
     ScenarioReport,
     StableRow,
@@ -82,7 +84,7 @@ def scenario_lines(report: ScenarioReport, style: Style, *, plot: bool = True) -
         yield ""
         yield from plot_lines(chart, style.width)
     yield from profile_lines(report.profile, report.profile_text, style)
-    yield from _stable(report.stable, style)
+    yield from _stable(report.stable, style, "theory at rest")
     yield from _orders(report.orders, style)
     figures: dict[tuple[str, str], list[str]] = {}
     for line in report.figures:
@@ -148,7 +150,7 @@ def _error(row: WorkPrecisionRow, name: str, least: float) -> str:
 
 
 def _orders(orders: Sequence[OrderRow], style: Style) -> Iterator[str]:
-    rows = [row for row in orders if row.has_orders]
+    rows = [row for row in orders if row.position or row.attitude or row.velocity]
     if rows:
         yield ""
         columns = [("order of", [row.integrator for row in rows])]
@@ -158,7 +160,7 @@ def _orders(orders: Sequence[OrderRow], style: Style) -> Iterator[str]:
         yield from fitted_table(columns, style.width)
 
 
-def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
+def _stable(rows: Sequence[StableRow], style: Style, theory: str = "theory") -> Iterator[str]:
     if not rows:
         return
     yield ""
@@ -167,7 +169,7 @@ def _stable(rows: Sequence[StableRow], style: Style) -> Iterator[str]:
         ("bounded", [row.shown for row in rows]),
         ("near small steps", [reach_text(row.near, row.searched) for row in rows]),
         ("nothing goes through", [reach_text(row.through, row.searched) for row in rows]),
-        ("theory", [_theory(row) for row in rows]),
+        (theory, [_theory(row) for row in rows]),
     ]
     yield from fitted_table(columns, style.width)
     reasons: dict[str, list[str]] = {}
@@ -206,13 +208,19 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
     lines = [style.strong(report.model), f"  {report.machine.text}"]
     for scenario in report.scenarios:
         rows = scenario.rows
-        names = [f"{row.title}, {row.bits} bits" if row.bits else row.title for row in rows]
-        costs = ["; ".join(map(_cost, row.costs)) for row in rows]
+        bits = [f"{row.bits} bits" if row.bits else "" for row in rows]
+        devices = ["" if row.device == "cpu" else row.device for row in rows]
+        parts = zip([row.title for row in rows], bits, devices, strict=True)
+        names = [", ".join(filter(None, part)) for part in parts]
+        rates = ["; ".join(map(_rate, row.costs)) for row in rows]
+        places = [[pair[0] for pair in (row.position, row.attitude) if pair] for row in rows]
+        least = FLOORS * scenario.floor * (1 + 1e-9)
+        errors = [max(place, default=None) for place in places]
         columns = [
             ("engine", names),
-            ("device", [row.device for row in rows]),
+            ("errs by", ["" if e is None else f"{'< ' * (e <= least)}{e:.2g}" for e in errors]),
             ("from MuJoCo", ["" if r.apart is None else f"{r.apart:.2g}" for r in rows]),
-            ("a step by number of worlds", costs),
+            ("steps a second, by number of worlds", rates),
         ]
         lines += ["", f"  {style.strong(scenario.name)}: {scenario.title}"]
         setting = f"{setting_text(scenario.setting)}, over {seconds_text(scenario.duration)}"
@@ -224,9 +232,9 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
     return printable("\n".join(lines) + "\n")
 
 
-def _cost(cost: BatchCost) -> str:
+def _rate(cost: BatchCost) -> str:
     time = cost.seconds
-    return f"{cost.worlds}: {cost.remark if time is None else seconds_text(time.value, 3)}"
+    return f"{cost.worlds}: {cost.remark if time is None else rounded_text(1 / time.value, 3)}"
 
 
 def _lost(status: str, reasons: Iterable[str]) -> str:

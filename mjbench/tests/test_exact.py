@@ -105,6 +105,24 @@ def test_quantities_of_theory_are_measured_by_their_formula(folder: Path) -> Non
     assert "loudest" in message
 
 
+DOUBLE = """\
+<mujoco>
+  <worldbody><body><joint name="j" axis="0 1 0"/><geom size=".01" pos="0 0 -1" mass="1"/>
+    <body pos="0 0 -1"><joint axis="0 1 0"/><geom size=".01" pos="0 0 -1" mass="1"/></body>
+  </body></worldbody>
+  <sensor><jointpos name="angle" joint="j"/></sensor>
+</mujoco>
+"""
+
+
+def test_where_small_steps_do_not_agree_what_is_expected_is_left_open(folder: Path) -> None:
+    write(folder / "ball.xml", DOUBLE)
+    toml = "[[scenario]]\nname = 'swing'\nqpos = [2, 0.5]\nduration = 9\nmeasure = 'sensor:angle'\n"
+    toml += "timesteps = [0.003]\nsample = 0.3\nsearch = [0.1, 0.2]\nexpected = { last = 1.5 }\n"
+    (line, *_) = report(folder, toml=toml).figures
+    assert line.source.startswith("as declared; small steps tell no more than ")
+
+
 BOUNCE = """\
 <mujoco>
   <option timestep="0.002" cone="elliptic"/>

@@ -134,22 +134,26 @@ def test_what_does_not_fit_the_model_is_told(text: str, message: str) -> None:
     assert message in caught.value.message
 
 
-def test_a_controller_is_pushed_and_still_commands(tmp_path: Path) -> None:
+@pytest.fixture
+def puck(tmp_path: Path) -> Path:
+    file = tmp_path / "puck.xml"
+    file.write_text(PUCK)
+    file.with_suffix(".toml").write_text(BEGIN + PUSH)
+    return file
+
+
+def test_a_controller_is_pushed_and_still_commands(puck: Path) -> None:
     from mjbench.bench import compile_subject, read_subject
     from mjbench.host import LocalHost
     from mjbench.loop import read_loop
 
-    (tmp_path / "puck.xml").write_text(PUCK)
-    (tmp_path / "puck.toml").write_text(BEGIN + PUSH)
-    policy = tmp_path / "policy.py"
+    policy = puck.with_name("policy.py")
     policy.write_text(
         "period = 0.02\ndef control(model, data):\n    return [1 - data.qvel[1], 0]\n"
     )
     loop = read_loop(policy, None, 0.0, 0.0)
-    host = LocalHost(tmp_path, lambda _: None)
-    compiled_model = compile_subject(
-        read_subject(tmp_path / "puck.xml"), host, quick=True, loop=loop
-    )
+    host = LocalHost(puck.parent, lambda _: None)
+    compiled_model = compile_subject(read_subject(puck), host, quick=True, loop=loop)
     scenario = compiled_model.scenarios[0].scenario
     run = simulate(Setup(scenario=scenario), compiled_model.model)
     assert run.states.qvel[-1, 0] == pytest.approx(0.5, abs=1e-12), "pushed"
@@ -159,12 +163,8 @@ def test_a_controller_is_pushed_and_still_commands(tmp_path: Path) -> None:
     assert any(inputs.controls[0] and any(inputs.forces) for inputs, _ in holds)
 
 
-def test_who_does_not_know_pushes_says_so(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "puck.xml").write_text(PUCK)
-    (tmp_path / "puck.toml").write_text(BEGIN + PUSH)
-    assert main(["diet", str(tmp_path / "puck.xml"), "--quick"]) == 1
+def test_who_does_not_know_pushes_says_so(puck: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["diet", str(puck), "--quick"]) == 1
     assert "the diet does not know what pushes and poses need" in capsys.readouterr().err
-    assert main([str(tmp_path / "puck.xml"), "--engines", "mujoco", "--quick"]) in (1, 2)
+    assert main([str(puck), "--engines", "mujoco", "--quick"]) in (1, 2)
     assert "without pushes and poses" in capsys.readouterr().err

@@ -137,6 +137,7 @@ def test_what_was_recorded_is_on_its_pages_and_in_the_lesson(built_course: Folde
     assert len(names) == 4 and all(lesson.count(f'id="{name}"') == 1 for name in names)
     anchors = re.findall(r'id="(measured[^"]*)"', page)
     assert anchors == ["measured", "measured-swing", "measured-awkward"]
+    assert '<p class="remark">' not in re.sub(r"(?s)<details.*?</details>", "", page), "all folds"
     assert "1.2" in page.split('id="used"')[1], "the lesson uses the model"
 
 

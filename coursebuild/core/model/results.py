@@ -138,7 +138,6 @@ class Trace(Struct, frozen=True, rename={"is_perturbed": "moved"}):
     """Of such a run, for each `MjData`, separated by blanks: its number in the order of first use,
     the length of `qpos`, the sizes that |qpos| and |qvel| are compared by (at least the largest
     since its simulation began), and the final `qpos` and `qvel`, as hexadecimal numbers."""
-    timesteps: tuple[float, ...] = ()  # of a run with shifted steps, s
     effects: tuple[Effect, ...] = ()
     """What it wrote outside its temporary folder and what it connected to, once for each line."""
     sought: tuple[str, ...] = ()

@@ -151,7 +151,6 @@ def read_records(records: bytes, root: str, script: str) -> Trace:
         effects=tuple(effects),
         is_perturbed=bool(values_by_kind["p"]),
         states=tuple(values_by_kind["s"]),
-        timesteps=tuple(map(float.fromhex, values_by_kind["h"])),
         sought=tuple(sought),
         existence=answers("e"),
         statuses=answers("t"),

@@ -146,13 +146,11 @@ class ShiftedSteps:
         owner, last_time = self._last_times.get(id(data), (None, 0.0))
         if owner is not None and owner() is data and data.time >= last_time:
             return
-        timestep, time = float(model.opt.timestep), data.time
-        model = copy.copy(model)  # threads may share it
-        model.opt.timestep = self._part * timestep
+        model, time = copy.copy(model), data.time  # threads may share the model
+        model.opt.timestep *= self._part
         self._step(model, data)
         data.time = time
         mujoco_tracing.active_tracer().note("p")
-        mujoco_tracing.active_tracer().note(f"h{timestep.hex()}")
 
     def _after(self, args: tuple[Any, ...], keywords: Mapping[str, Any], result: Any) -> None:
         data = model_and_data(args, keywords)[1]

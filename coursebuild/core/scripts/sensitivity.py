@@ -9,10 +9,10 @@
    timesteps give two changes, of which each says what the error of a method of first order is; the
    larger one counts. Where the second is not clearly the smaller one, the values do not tend
    anywhere yet, however near the first two happen to lie: then ten times the larger one counts.
-   A time that a script finds by looking at every step is right to a timestep only, and no shorter
-   steps within its own show that. It is told by runs that look a part of a timestep later: they
-   print it alike, or exactly a timestep more or less, where a state would change little by little
-   and a time that was chosen beforehand not at all.
+   A time that a script finds by looking at every step is right to a timestep only, and what it
+   computes of that no better; no shorter steps within its own show that. It is told by runs that
+   look a part of a timestep later: they print it alike, or all off by as much, where a state would
+   change little by little and a time that was chosen beforehand not at all.
 3. The final states of a pair of runs, which began in opposite directions, show how fast states
    part: relative to the largest positions and velocities since the simulation began, not to those
    that it happens to end with.
@@ -84,8 +84,8 @@ class Doubt(Struct, frozen=True):
     """The text printed in its place with half the timestep; empty where not known."""
     quartered: str
     sampled: str
-    """The timestep to which it is known, s, as a time that was looked for at every step; empty for
-    other numbers."""
+    """How far it is off where the script looks a part of a timestep later, as what is looked for at
+    every step; empty for other numbers."""
     instead: str
     """The number with only the digits that repeat and converge; empty if none does, or a count."""
     compared: bool
@@ -187,11 +187,6 @@ class _RunsByKind(Struct, frozen=True):
     finer: Sequence[ScriptRun] = ()
     shifted: Sequence[ScriptRun] = ()
 
-    @property
-    def timesteps(self) -> set[float]:
-        """Those of the simulations that are shifted, s."""
-        return {h for run in self.shifted if run.trace is not None for h in run.trace.timesteps}
-
 
 def is_worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
     """Whether runs of a script with moved states can show anything."""
@@ -254,38 +249,28 @@ def _find_doubts(
         )
         finer_end = len(runs.moved) + len(runs.finer)
         start_values, finer = values[: len(runs.moved)], values[len(runs.moved) : finer_end]
-        tick = _sampling_step(printed, finer, values[finer_end:], runs.timesteps)
+        tick = _sampling_step(printed, values[finer_end:])
         if tick or any(value != printed for value in values[:finer_end]):
             yield from _judge_number(
                 first_change.span, (recorded, printed), start_values, finer, tick, comparison
             )
 
 
-def _sampling_step(
-    printed: str, finer: Sequence[str], shifted: Sequence[str], timesteps: Iterable[float]
-) -> Decimal | None:
-    """The timestep to which a time is known that was looked for at every step, as printed.
+def _sampling_step(printed: str, shifted: Sequence[str]) -> Decimal | None:
+    """How far a number is off, as printed, where a script looks a part of a timestep later.
 
-    In s or in ms. `None` where a number is none: then runs with shorter steps, or with steps that
-    are shifted, change it by anything else than whole timesteps, or not at all.
+    `None` where it is not, or each part of a timestep moves it by another distance, as a state.
     """
-    values = (*finer, *shifted)
-    number, numbers = only_number(printed), [n for v in values if (n := only_number(v)) is not None]
-    if number is None or len(numbers) < len(values) or not shifted:
+    number = only_number(printed)
+    numbers = [n for value in shifted if (n := only_number(value)) is not None]
+    if number is None or not numbers or len(numbers) < len(shifted):
         return None
     if not all(n.is_finite for n in (number, *numbers)):
         return None
-    unit_printed = unit(number.place)
-    changes = [difference(number.value, n.value) for n in numbers]
-    for tick in (Decimal(repr(h)) * scale for h in timesteps for scale in (1, 1000) if h > 0):
-        whole = [round(change / tick) for change in changes]
-        is_whole = all(
-            abs(change - count * tick) < unit_printed
-            for change, count in zip(changes, whole, strict=True)
-        )
-        if unit_printed < tick and is_whole and max(whole[len(finer) :]) == 1:
-            return tick
-    return None
+    distances = {difference(number.value, n.value) for n in numbers} - {Decimal(0)}
+    # What moves on by two units in a whole timestep is on its way after a part of it.
+    is_step = len(distances) == 1 and min(distances) >= 2 * unit(number.place)
+    return min(distances) if is_step else None
 
 
 def _judge_number(

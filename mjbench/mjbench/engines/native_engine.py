@@ -10,7 +10,7 @@ from mujoco import rollout
 
 from mjbench.engines.engine_trial import Engine, Variant
 from mjbench.problem import Array
-from mjbench.simulation import STATE, full_state
+from mjbench.simulation import STATE, full_state, runnable
 
 _PHYSICS = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
 
@@ -19,7 +19,7 @@ class _OneWorld:
     """A world that `mj_step` simulates."""
 
     def __init__(self, model: Any, data: Any, velocities: Array, _: Variant) -> None:
-        self._model, self._data = _without_reset(model), data
+        self._model, self._data = runnable(model), data
         data.qvel[:] = velocities[0]
         self._beginning = full_state(model, data)
 
@@ -40,7 +40,7 @@ class _ThreadedWorlds:
     """Worlds that `mujoco.rollout` simulates, each from where it was."""
 
     def __init__(self, model: Any, data: Any, velocities: Array, variant: Variant) -> None:
-        self._model = _without_reset(model)
+        self._model = runnable(model)
         self._pool = rollout.Rollout(nthread=variant.threads)
         self._datas = [mujoco.MjData(model) for _ in range(max(1, variant.threads))]
         states = []
@@ -69,12 +69,6 @@ class _ThreadedWorlds:
     def state(self) -> tuple[Array, Array]:
         mujoco.mj_setState(self._model, self._scratch, self._states[0], _PHYSICS)
         return self._scratch.qpos.copy(), self._scratch.qvel.copy()
-
-
-def _without_reset(model: Any) -> Any:
-    """The model, in which a state that blew up stays visible."""
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return model
 
 
 ENGINES = {

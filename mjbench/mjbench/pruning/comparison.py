@@ -26,6 +26,7 @@ from mjbench.declarations import Declarations, DeclaredScenario, Place
 from mjbench.detector import Passages, Peaks, RunJudgement, judge, update_peaks
 from mjbench.pilot import NUDGE, nudges
 from mjbench.problem import Array, Scenario, Setup
+from mjbench.rotations import angular_distance
 from mjbench.scene import Scene, SceneError, scenes
 from mjbench.simulation import (
     STATE,
@@ -340,10 +341,7 @@ class _Gauge:
     def look(self, data: Any, variant_data: Any) -> None:
         """Compare places, attitudes and sensors now."""
         places = np.linalg.norm(data.xpos[self._bodies] - variant_data.xpos, axis=1)
-        first, second = data.xquat[self._bodies], variant_data.xquat
-        signs = np.copysign(1.0, np.einsum("ij,ij->i", first, second))  # q and -q turn alike
-        chords = np.linalg.norm(first - signs[:, None] * second, axis=1)
-        turns = 4 * np.arcsin(np.minimum(chords / 2, 1.0))
+        turns = angular_distance(data.xquat[self._bodies], variant_data.xquat)
         for gaps, size, unit in ((places, self._length, "m"), (turns, self._angle, "rad")):
             worst = int(gaps.argmax())  # of NaN, if there is one, which is no place
             gap = math.inf if math.isnan(gaps[worst]) else float(gaps[worst])

@@ -205,13 +205,6 @@ def find_separate(model: Any, pairs: Iterable[Pair]) -> frozenset[Pair]:
     return frozenset(pair for pair in pairs if reach.are_separate(*pair))
 
 
-def mesh_vertices(model: Any, mesh: int) -> Vector:
-    """The vertices (n, 3) of a mesh, in its own frame, m."""
-    first = int(model.mesh_vertadr[mesh])
-    vertices: Vector = model.mesh_vert[first : first + int(model.mesh_vertnum[mesh])]
-    return vertices.astype(np.float64)
-
-
 def hull_distance(model: Any, variant: Any, geom: int) -> float:
     """How far the surface of a mesh's hull is, at most, from that of a shape in its place, m.
 
@@ -256,6 +249,7 @@ def _extent(model: Any, geom: int, directions: Vector) -> Vector:
         case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
             reach = np.linalg.norm(local * size, axis=1)
         case _:
-            vertices = mesh_vertices(model, int(model.geom_dataid[geom]))
-            reach = (local @ vertices.T).max(axis=1)
+            mesh = model.mesh(int(model.geom_dataid[geom]))
+            first, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
+            reach = (local @ model.mesh_vert[first : first + count].T).max(axis=1)
     return np.asarray(directions @ model.geom_pos[geom] + reach)

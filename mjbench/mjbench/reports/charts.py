@@ -90,24 +90,25 @@ def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
     levels = [level for level in chart.levels if level.y > 0]
     heights = [math.log10(level.y) for level in levels]
     near = [y for y in heights if min(errors) - 1 <= y <= max(errors) + 1]
-    x = _Axis([math.log10(point.x) for _, point in places], min(_WIDTH, width - 12))
-    y = _Axis([*errors, *near], _HEIGHT)
-    rows = [[" "] * x.cells for _ in range(y.cells)]
+    columns = min(_WIDTH, width - 12)
+    x = Axis([math.log10(point.x) for _, point in places], columns - 1)
+    y = Axis([*errors, *near], _HEIGHT - 1)
+    rows = [[" "] * columns for _ in range(_HEIGHT)]
     for level in near:
-        rows[y.cell(level)] = ["·"] * x.cells
-    for number, point in sorted(places, key=_order):
-        row = y.cells - 1 if not point.y else y.cell(math.log10(point.y))
+        rows[round(y.at(level))] = ["·"] * columns
+    for number, point in sorted(places, key=lambda place: (place[1].ringed, place[1].full)):
+        row = _HEIGHT - 1 if not point.y else round(y.at(math.log10(point.y)))
         letter = _LETTERS[number % len(_LETTERS)]
         mark = _LOST if point.y is None else letter if point.full else letter.lower()
-        rows[row][x.cell(math.log10(point.x))] = _OWN if point.ringed else mark
+        rows[row][round(x.at(math.log10(point.x)))] = _OWN if point.ringed else mark
     yield f"{chart.axes[1]}"
-    ticks = y.ticks()
-    for number in reversed(range(y.cells)):
+    ticks = {round(at): text for at, text in y.ticks()}
+    for number in reversed(range(_HEIGHT)):
         yield f"{ticks.get(number, ''):>9} │{''.join(rows[number])}".rstrip()
-    yield f"{'':>9} └{'─' * x.cells}"
-    axis = [" "] * (x.cells + 8)
-    for number, text in x.ticks().items():
-        axis[number : number + len(text)] = text
+    yield f"{'':>9} └{'─' * columns}"
+    axis = [" "] * (columns + 8)
+    for at, text in x.ticks():
+        axis[round(at) : round(at) + len(text)] = text
     yield f"{'':>11}{''.join(axis)}".rstrip()
     yield f"{'':>11}{chart.axes[0]}"
     names = [f"{_LETTERS[line.number % len(_LETTERS)]} {line.name}" for line in chart.lines]
@@ -121,26 +122,23 @@ def plot_lines(chart: Chart, width: int = 80) -> Iterator[str]:
         yield f"dotted: {', '.join(texts)}"
 
 
-def _order(place: tuple[int, ChartPoint]) -> tuple[bool, bool]:
-    return place[1].ringed, place[1].full
+class Axis:
+    """A logarithmic axis: places of decimal logarithms, from 0 to its length."""
 
+    def __init__(self, values: list[float], length: float, margin: float = 0.0) -> None:
+        self.low = min(values) - margin
+        self.span = max(max(values) + margin - self.low, 0.3)
+        self.length = length
 
-class _Axis:
-    """Places of logarithms in cells."""
+    def at(self, value: float) -> float:
+        """The place of a logarithm."""
+        return (value - self.low) / self.span * self.length
 
-    def __init__(self, values: list[float], cells: int) -> None:
-        self.low, high = min(values), max(values)
-        self.span = max(high - self.low, 0.3)
-        self.cells = cells
-
-    def cell(self, value: float) -> int:
-        return round((value - self.low) / self.span * (self.cells - 1))
-
-    def ticks(self) -> dict[int, str]:
-        """Texts of powers of ten, or where there are none, of both ends."""
+    def ticks(self) -> list[tuple[float, str]]:
+        """Places and texts of powers of ten, or where there are none, of both ends."""
         first, last = math.ceil(self.low - 1e-9), math.floor(self.low + self.span + 1e-9)
         if last - first >= 1:
             powers = range(first, last + 1, 1 + (last - first) // 6)
-            return {self.cell(float(n)): f"{10.0**n:g}" for n in powers}
+            return [(self.at(n), f"{10.0**n:g}") for n in powers]
         ends = (self.low, self.low + self.span)
-        return {self.cell(end): f"{10.0**end:.2g}" for end in ends}
+        return [(self.at(end), f"{10.0**end:.2g}") for end in ends]

@@ -6,9 +6,7 @@ import math
 from collections.abc import Iterator
 from html import escape
 
-from msgspec import Struct
-
-from mjbench.reports.charts import Chart, ChartLine, ChartPoint
+from mjbench.reports.charts import Axis, Chart, ChartLine, ChartPoint
 from mjbench.reports.model_report import SceneReport
 from mjbench.reports.scene_report import ScenarioReport
 from mjbench.reports.terminal import Style
@@ -58,8 +56,8 @@ def chart_svg(chart: Chart) -> str:
     if not errors:
         return ""
     works = [math.log10(point.x) for point in points]
-    x = _Scale(min(works) - 0.1, max(works) + 0.1, _LEFT, _RIGHT)
-    y = _Scale(min(errors) - 0.3, max(errors) + 0.3, _BOTTOM, _TOP)
+    x = Axis(works, _RIGHT - _LEFT, 0.1)
+    y = Axis(errors, _BOTTOM - _TOP, 0.3)
     parts = [
         f'<svg viewBox="0 0 650 {420 + 18 * len(chart.lines)}" role="img">',
         f"<title>{escape(chart.title)}</title><desc>{escape(chart.text)}</desc>",
@@ -77,18 +75,6 @@ def chart_svg(chart: Chart) -> str:
     return "".join([*parts, title, "</svg>"])
 
 
-class _Scale(Struct, frozen=True):
-    """Places of decimal logarithms."""
-
-    low: float
-    high: float
-    start: float
-    end: float
-
-    def at(self, value: float) -> float:
-        return self.start + (value - self.low) / (self.high - self.low) * (self.end - self.start)
-
-
 def _path(d: str, colour: str, look: str = "") -> str:
     return f'<path d="{d}" fill="none" stroke="{colour}"{look}/>'
 
@@ -97,22 +83,20 @@ def _text(x: float, y: float, text: str, anchor: str = "start") -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{escape(text)}</text>'
 
 
-def _grid(chart: Chart, x: _Scale, y: _Scale) -> Iterator[str]:
-    for power in range(math.ceil(y.low), math.floor(y.high) + 1):
-        at = y.at(power)
-        yield _path(f"M{_LEFT} {at:.1f}H{_RIGHT}", "#ccc")
-        yield _text(_LEFT - 6, at + 4, f"{10.0**power:g}", "end")
+def _grid(chart: Chart, x: Axis, y: Axis) -> Iterator[str]:
+    for up, text in y.ticks():
+        yield _path(f"M{_LEFT} {_BOTTOM - up:.1f}H{_RIGHT}", "#ccc")
+        yield _text(_LEFT - 6, _BOTTOM - up + 4, text, "end")
     for level in chart.levels:
-        at = y.at(math.log10(level.y))
+        at = _BOTTOM - y.at(math.log10(level.y))
         if _TOP < at < _BOTTOM:
             yield _path(f"M{_LEFT} {at:.1f}H{_RIGHT}", "#555", ' stroke-dasharray="2 3"')
             yield _text(_LEFT + 6, at - 4, level.text)
-    for tick in range(7):
-        value = x.low + (x.high - x.low) * tick / 6
-        yield _text(x.at(value), _BOTTOM + 18, f"{10**value:.2g}", "middle")
+    for right, text in x.ticks():
+        yield _text(_LEFT + right, _BOTTOM + 18, text, "middle")
 
 
-def _line(line: ChartLine, x: _Scale, y: _Scale) -> Iterator[str]:
+def _line(line: ChartLine, x: Axis, y: Axis) -> Iterator[str]:
     colour = _COLOURS[line.number % len(_COLOURS)]
     places = [_place(p, x, y) for p in line.points if p.y and not p.small]
     if places:
@@ -130,6 +114,6 @@ def _line(line: ChartLine, x: _Scale, y: _Scale) -> Iterator[str]:
         yield f"{shape}><title>{escape(point.title)}</title></{end}>"
 
 
-def _place(point: ChartPoint, x: _Scale, y: _Scale) -> tuple[float, float]:
-    down = _TOP if not point.y else y.at(math.log10(point.y))
-    return x.at(math.log10(point.x)), down
+def _place(point: ChartPoint, x: Axis, y: Axis) -> tuple[float, float]:
+    down = _TOP if not point.y else _BOTTOM - y.at(math.log10(point.y))
+    return _LEFT + x.at(math.log10(point.x)), down

@@ -198,11 +198,6 @@ class OrderRow(Record, frozen=True):
     attitude: FittedOrder | None
     velocity: FittedOrder | None
 
-    @property
-    def has_orders(self) -> bool:
-        """Whether an order is known for any of the errors."""
-        return any(order is not None for order in (self.position, self.attitude, self.velocity))
-
 
 class StableRow(Record, frozen=True):
     """The largest stable timestep of an integrator in a scenario."""

@@ -70,8 +70,7 @@ def test_what_is_said_to_be_separate_never_touches() -> None:
         for _ in range(40):
             random_state(random, model, data)
             mujoco.mj_forward(model, data)
-            touching = {tuple(sorted(pair)) for pair in data.contact.geom[: data.ncon].tolist()}
-            mismatches += [(seed, "touch", *pair) for pair in touching & apart]
+            mismatches += [(seed, "touch", *pair) for pair in contact_pairs(data) & apart]
             for a, b in apart:
                 if not {a, b} & flat and mujoco.mj_geomDistance(model, data, a, b, 10.0, None) <= 0:
                     mismatches.append((seed, "lie in each other", a, b))
@@ -117,8 +116,11 @@ def test_possible_pairs_are_those_that_mujoco_looks_at() -> None:
             model = everything_touching(seed, flag)
             data = mujoco.MjData(model)
             mujoco.mj_forward(model, data)
-            pairs = {tuple(sorted(pair)) for pair in data.contact.geom[: data.ncon].tolist()}
-            assert pairs == possible_pairs(model), (seed, flag)
+            assert contact_pairs(data) == possible_pairs(model), (seed, flag)
+
+
+def contact_pairs(data: mujoco.MjData) -> set[tuple[int, ...]]:
+    return {tuple(sorted(pair)) for pair in data.contact.geom[: data.ncon].tolist()}
 
 
 def everything_touching(seed: int, flag: str) -> mujoco.MjModel:
