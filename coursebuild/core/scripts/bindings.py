@@ -35,7 +35,7 @@ from coursebuild.core.scripts.bound_places import (
     reworded_addresses,
 )
 from coursebuild.core.scripts.edit import update_body
-from coursebuild.core.scripts.lines import plain_text
+from coursebuild.core.scripts.lines import masked, plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_key
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import row_values
@@ -353,13 +353,16 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
             message = f"the output above has no number right after `{binding.words}`"
             message += f", another of `{bound.path}` has"
             binding = of_script
-        else:
-            wordless = replace(bound, binding=replace(binding, words=""))
-            noted_places = rivals = wordless.current_places
+        else:  # a number among its words may be another now
+            others = (replace(binding, words=words) for words in ("", masked(binding.words)))
+            choices = (BoundNumber(other, bound.outputs).current_places for other in others)
+            noted_places = rivals = next(filter(None, choices), [])
+            noted_places.sort(key=lambda place: _distance(text.numbers, place.numbers))
     else:
         line_text = bound.lost_address().description
         message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
         noted_places = rivals = replace(bound, addresses=()).places()
+    if not (places_now or (binding.words and noted_places)):
         example = binding.mark(words="tau")
         help = f"bind it anew: choose the words before it, as in `{example}`"
     notes = [place_note(binding, place, rivals) for place in noted_places[:_MAX_NOTES]]

@@ -48,7 +48,8 @@ def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ..
         for table in model.find_blocks(document, model.Table)
         for row in table.rows
         for cell, header in zip(row, table.header, strict=False)
-        for inline in cell.children[-1:]
+        for inline in model.walk_inlines(cell.children)
+        if isinstance(inline, model.NumberBinding) and _ends_cell(inline, cell)
     }
     recordings = model.find_blocks(document, model.Recording)
     outputs = sorted((recording.span.start, bool(recording.script)) for recording in recordings)
@@ -58,6 +59,18 @@ def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ..
         if b.source is None
         and (b.script or [True, *(is_read for at, is_read in outputs if at < b.span.start)][-1])
     )
+
+
+def _ends_cell(binding: model.NumberBinding, cell: model.Cell) -> bool:
+    """Whether nothing but marks stands behind a number; in a formula it is all, or the result."""
+    text, span = cell.span.source.text, binding.span
+    ends = _MARKS.fullmatch(text[span.end : cell.span.end]) is not None
+    formula = text[cell.span.start : span.start].rpartition("$")[2]
+    return ends and (not binding.is_in_formula or _RELATION.fullmatch(formula) is not None)
+
+
+_MARKS = regex(r"[\s*_~$]*")
+_RELATION = regex(r"(?:.*(?:[=≈]|\\approx))?\s*")
 
 
 def bound_values(

@@ -39,6 +39,7 @@ from coursebuild.core.scripts.lines import (
 from coursebuild.core.scripts.module_code import DEFINITIONS, first_line
 from coursebuild.core.scripts.table_cells import (
     HEADER_HELP,
+    ROW_HELP,
     cell_matches,
     number_text,
     table_rows,
@@ -307,10 +308,9 @@ def _update_table(
     for row in match.rows:
         if row.line < 0 or not row.certain:
             span = row.row[0].cell.span.to(row.row[-1].cell.span)
-            reason = (
-                "several lines of this run have" if row.line >= 0 else "no line of this run has"
-            )
-            return refusal(span, f"{reason} the cells of this row in order")
+            if row.line < 0:
+                return refusal(span, "no line of this run has the cells of this row", ROW_HELP)
+            return refusal(span, "several lines of this run have the cells of this row in order")
         for cell, old, new in row.pairs:
             span = cell.span(old)
             text: str | None = span.text

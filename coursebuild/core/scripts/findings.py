@@ -32,7 +32,7 @@ from coursebuild.core.scripts.diff import quote, shorten
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, Side
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.table_cells import HEADER_HELP, cell_text, table_rows
+from coursebuild.core.scripts.table_cells import HEADER_HELP, ROW_HELP, cell_text, table_rows
 from coursebuild.core.scripts.tables import TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
@@ -305,6 +305,8 @@ def drift_diagnostic(
         isinstance(body := recording.body, Table) and first.span.start < body.rows[0][0].span.start
     ):
         help = HEADER_HELP
+    elif isinstance(body, Table) and first.kind is DriftKind.MISSING:
+        help = f"{help}; {ROW_HELP}"
     message = f"recorded output differs from this run ({classes(changes)})"
     message = f"{change}: {message}" if change else message
     return diagnose(

@@ -175,7 +175,9 @@ def row_values(
     return tuple(shown_values((path, recording.script, before, row_text(row)) for row in rows))
 
 
-def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
+def cell_text(
+    cell: model.Cell, filters: Iterable[model.Filter], *, formula_sign: str = ""
+) -> MappedText:
     """The plain text of a cell, filtered; origins are offsets in the lesson's source.
 
     Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
@@ -197,7 +199,8 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
             case model.NumberBinding():
                 text, span = inline.text, inline.text_span
             case model.Math():
-                stretches.append(_formula_text(inline.tex))
+                sign = MappedText.substitute_for(span.start, span.start, formula_sign)
+                stretches += (sign, _formula_text(inline.tex), sign)
                 continue
             case model.Image():
                 text = inline.alt
@@ -287,6 +290,7 @@ HEADER_HELP = (
     "write the unit that is printed, or put the columns in order; where a unit is not meant, mark "
     'it: `` `s`{given="…"} ``'
 )
+ROW_HELP = "rows, and the cells of each, stand in the order in which they are printed"
 
 
 class ColumnTitle(Struct, frozen=True):
@@ -304,19 +308,20 @@ class ColumnTitle(Struct, frozen=True):
     @classmethod
     def of(cls, cell: model.Cell) -> ColumnTitle:
         """The words and the unit of a cell of a header."""
-        title = cell_text(cell, ())
+        title = cell_text(cell, (), formula_sign="$")
         unit = unit_of_header(title.text)
         inlines = model.walk_inlines(cell.children)
         bindings = (i for i in inlines if isinstance(i, model.NumberBinding))
         excepted_text = " ".join(i.text for i in bindings if i.source is not None)
         name, at = name_of_header(title.text)
+        name, text = (part.replace("$", "") for part in (name, title.text))
         unit_span = cell.span
         if at >= 0:
             unit_span = Span(cell.span.source, *title.origin(at, at + len(unit.text)))
         words = words_of(name) - words_of(excepted_text)
         if excepted_text:
             name, unit = "", NO_UNIT
-        return cls(cell.span, title.text, name, words, unit, unit_span)
+        return cls(cell.span, text, name, words, unit, unit_span)
 
     def has(self, word: str) -> bool:
         """Whether a printed word is one of the title, or a mere sign."""
