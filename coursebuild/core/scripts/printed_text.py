@@ -125,6 +125,11 @@ class PrintedPlace(Struct, frozen=True):
         """The labels of all numbers of the line."""
         return self.output.labels(self.at)
 
+    @property
+    def contexts(self) -> tuple[list[_Words], list[_Words]]:
+        """The words before the first of them: all, then some of these."""
+        return self.output.contexts(self.at, self.first)
+
     def quantity(self, words: str = "") -> tuple[str, str] | None:
         """What the first of them is called: the heading, and its label or the words that name it.
 
@@ -158,7 +163,7 @@ class PrintedText:
         self.lines = tuple(lines)
         self.labels = cache(self._read_labels)
         self.leads = cache(self._read_leads)
-        self._contexts = cache(self._read_contexts)
+        self.contexts = cache(self._read_contexts)
         self._headings: list[int] = []
         """The index of the heading of each line; -1 for none."""
         heading = -1
@@ -334,14 +339,15 @@ class PrintedText:
     def find_words(self, words: str, count: int) -> list[PrintedPlace]:
         """The numbers, `count` in a row, that have these words right before them, or as a title.
 
-        In the words `#` stands for any number; signs around them do not count.
+        In the words `#` stands for any number; signs around them do not count. What leaves words
+        out is read so only where no number has the words as they are.
         """
-        sought = _split(words)
-        return [
-            place
-            for place in self.places(count)
-            if any(_ends_with(context, sought) for context in self._contexts(place.at, place.first))
-        ]
+        sought, places = _split(words), [*self.places(count)]
+        whole, abridged = (
+            [p for p in places if any(_ends_with(c, sought) for c in p.contexts[kind])]
+            for kind in (0, 1)
+        )
+        return whole or abridged
 
     def places(self, count: int) -> Iterator[PrintedPlace]:
         """All runs of so many numbers of one line."""
@@ -366,11 +372,16 @@ class PrintedText:
 
     def _words_among(self, places: Iterable[PrintedPlace], place: PrintedPlace) -> str:
         address = self, place.at, place.first
-        rivals = [rival for p in places if (rival := (p.output, p.at, p.first)) != address]
-        contexts = [context for o, line, first in rivals for context in o._contexts(line, first)]
+        rivals = [p for p in places if (p.output, p.at, p.first) != address]
+        abridged = [context for p in rivals for context in (*p.contexts[0], *p.contexts[1])]
+        whole = [context for p in rivals for context in p.contexts[0]]
+        if any(p.output is not self for p in rivals):  # each output is looked through by itself
+            whole = abridged
         in_heading = len(_split(self.heading(place.at)))
         choices: list[tuple[bool, bool, int, str]] = []
-        for context in self._contexts(place.at, place.first):
+        own = [(context, whole) for context in place.contexts[0]]
+        own += ((context, abridged) for context in place.contexts[1])
+        for context, contexts in own:
             numbers = [at for at, (_, is_number) in enumerate(context) if is_number]
             plain_words = ["#" if is_number else word for word, is_number in context]
             row_words = [*plain_words]
@@ -393,30 +404,35 @@ class PrintedText:
             return min(choices, key=lambda choice: choice[:3])[3]
         lead = self.leads(place.at)[place.first] or self.title(place.at, place.numbers[0])
         label = " ".join(word for word, _ in _split(lead))
-        is_shared = any(o.is_called(line, first, label) for o, line, first in rivals)
+        is_shared = any(p.output.is_called(p.at, p.first, label) for p in rivals)
         return "" if is_shared or _FORBIDDEN.search(label) else label
 
-    def _read_contexts(self, at: int, first: int) -> list[_Words]:
+    def _read_contexts(self, at: int, first: int) -> tuple[list[_Words], list[_Words]]:
         """All words before a number, also the heading's, and again with the title of the column.
 
-        The label may stand right behind what its row begins with, and without its unit.
+        Then those that leave some out: the label stands right behind what its row begins with. In
+        both it may stand without its unit.
         """
         line = self.lines[at]
         number = line.numbers[first]
         heading, title = self.heading(at), self.title(at, number)
         before = f"{heading} {line.text[: number.start]}"
-        texts = [before, f"{before} {title}"] if title else [before]
+        whole, abridged = [before, f"{before} {title}"] if title else [before], list[str]()
         if first > 0:
             end = line.numbers[0].end + len(unit_behind(line.text, line.numbers[0].end).text) + 1
             above = self.heading(self._headings[at]) if line.title(number) is None else ""
             label = title or self.leads(at)[first]
-            texts += (f"{words} {line.text[:end]} {label}" for words in (heading, above))
+            abridged += (f"{words} {line.text[:end]} {label}" for words in (heading, above))
             if title:
-                texts += (f"{above} {title}", f"{line.text[: line.numbers[0].start]} {title}")
+                abridged += (f"{above} {title}", f"{line.text[: line.numbers[0].start]} {title}")
         bare_title, _ = name_of_header(title)
-        bare_texts = [_UNIT_IN_BRACKETS.sub("", text) for text in texts]
-        bare_texts += (text.removesuffix(title) + bare_title for text in texts if title)
-        return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
+
+        def read(texts: Sequence[str]) -> list[_Words]:
+            bare_texts = [_UNIT_IN_BRACKETS.sub("", text) for text in texts]
+            bare_texts += (text.removesuffix(title) + bare_title for text in texts if title)
+            return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
+
+        return read(whole), read(abridged)
 
 
 def _split(text: str) -> _Words:
