@@ -34,12 +34,13 @@ from coursebuild.core.scripts.bound_places import (
     place_note,
     reworded_addresses,
 )
+from coursebuild.core.scripts.diff import limit_notes
 from coursebuild.core.scripts.edit import update_body
 from coursebuild.core.scripts.lines import masked, plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_key
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import row_values
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import Number, difference
 from coursebuild.core.text.quantities import with_unit
 
@@ -150,9 +151,7 @@ def _ambiguous(bound: BoundNumber, places: Sequence[PrintedPlace]) -> Diagnostic
     """The diagnostic of a binding that may be any of several printed numbers."""
     binding = bound.binding
     message = f"`{bound.path}` printed `{binding.text}` at {len(places)} places"
-    notes = [place_note(binding, place, places) for place in places[:_MAX_NOTES]]
-    if len(places) > _MAX_NOTES:
-        notes.append(Note(f"and {len(places) - _MAX_NOTES} more"))
+    notes = limit_notes([place_note(binding, p, places) for p in places], _MAX_NOTES)
     return diagnose(
         "output-ambiguous", binding.text_span, message, help=_choose(binding), notes=notes
     )

@@ -184,23 +184,7 @@ def _describe_end(run: ScriptRun) -> str:
     return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
 
 
-def instability_diagnostic(recording: model.Recording, first: Side, second: Side) -> Diagnostic:
-    """Say which lines differ between two runs, of which the first is recorded."""
-    diff = text_diff("\n".join(first.lines), "\n".join(second.lines))
-    return diagnose(
-        "output-unstable",
-        recording.caption_span,
-        "two runs of the script printed different lines",
-        help=_TABLE_HELP if isinstance(recording.body, model.Table) else _HELP,
-        notes=[Note(f"printed by the first run (-) and by the second (+):\n{diff}")],
-    )
-
-
-_REPEAT_HELP = "make the script print the same each time (a fixed seed, no clock)"
-_HELP = (
-    f'{_REPEAT_HELP}, or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
-)
-_TABLE_HELP = f"{_REPEAT_HELP}, or record the output in a `text` fence with `volatile`"
+REPEAT_HELP = "make the script print the same each time (a fixed seed, no clock)"
 
 
 def _compare_table(

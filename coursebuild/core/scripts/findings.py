@@ -27,8 +27,8 @@ from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun
 from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
 from coursebuild.core.scripts.bound_places import BoundNumber, document_bindings
-from coursebuild.core.scripts.compare import compare, instability_diagnostic
-from coursebuild.core.scripts.diff import quote, shorten
+from coursebuild.core.scripts.compare import REPEAT_HELP, compare
+from coursebuild.core.scripts.diff import limit_notes, quote, shorten, text_diff
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, Side
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
@@ -213,8 +213,18 @@ def find_instability(
     if [(c.span, c.printed) for c in changes] == [(c.span, c.printed) for c in verdict.changes]:
         return None
     outputs = (r.output_of(recording.part) for r in (earlier_run, run))
-    before, now = (Side.of(output, comparison.filters) for output in outputs)
-    return instability_diagnostic(recording, before, now)
+    before, now = ("\n".join(Side.of(text, comparison.filters).lines) for text in outputs)
+    help = 'or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
+    if isinstance(recording.body, Table):
+        help = "or record the output in a `text` fence with `volatile`"
+    note = f"printed by the first run (-) and by the second (+):\n{text_diff(before, now)}"
+    return diagnose(
+        "output-unstable",
+        recording.caption_span,
+        "two runs of the script printed different lines",
+        help=f"{REPEAT_HELP}, {help}",
+        notes=[Note(note)],
+    )
 
 
 def count_unproven(
@@ -289,11 +299,9 @@ def drift_diagnostic(
         return diagnose("output-drift", recording.caption_span, message, help=f"run {update}")
     changes = verdict.changes
     first, *rest = sorted(changes, key=lambda change: change.span.start)
-    notes = [Note(_describe_difference(change), change.span) for change in rest[:_MAX_NOTES]]
-    if len(rest) > _MAX_NOTES:
-        rest_count = len(rest) - _MAX_NOTES
-        noun = "difference" if rest_count == 1 else "differences"
-        notes.append(Note(f"and {rest_count} more {noun}"))
+    noun = "more difference" if len(rest) == _MAX_NOTES + 1 else "more differences"
+    differences = [Note(_describe_difference(change), change.span) for change in rest]
+    notes = limit_notes(differences, _MAX_NOTES, noun)
     notes += (Note(_describe_dependence(d), d.binding.text_span) for d in dependents)
     help = f"if the change is intended, run {update}"
     fraction = re.match(r",(\d+)", first.span.source.text[first.span.end : first.span.end + 40])

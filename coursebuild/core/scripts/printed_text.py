@@ -16,14 +16,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, cached_property
-from itertools import accumulate
+from itertools import accumulate, chain
 from typing import TypeAlias
 
 from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.model.lesson_record import Address
-from coursebuild.core.scripts.lines import MappedText, Side, masked, plain_text
+from coursebuild.core.scripts.lines import MappedText, Side, masked, plain_text, replace_ranges
 from coursebuild.core.scripts.table_cells import ColumnTitle, RowCell, table_rows
 from coursebuild.core.text.numbers import Number, as_printed, has_groups, scan
 from coursebuild.core.text.quantities import (
@@ -40,8 +40,8 @@ from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 Locate: TypeAlias = Callable[[int, int], Span]
-_Words: TypeAlias = tuple[tuple[str, bool], ...]
-"""Words and numbers, each with whether it is a number."""
+_Words: TypeAlias = tuple[str, ...]
+"""Words without the signs around them, and numbers behind a `#`."""
 
 
 _IN_BRACKETS = regex(r"[(\[]([^()\[\]]+)[)\]]")
@@ -371,40 +371,39 @@ class PrintedText:
         return words or (self._words_among(rivals, place) if rivals else "")
 
     def _words_among(self, places: Iterable[PrintedPlace], place: PrintedPlace) -> str:
-        address = self, place.at, place.first
-        rivals = [p for p in places if (p.output, p.at, p.first) != address]
-        abridged = [context for p in rivals for context in (*p.contexts[0], *p.contexts[1])]
-        whole = [context for p in rivals for context in p.contexts[0]]
-        if any(p.output is not self for p in rivals):  # each output is looked through by itself
-            whole = abridged
+        rivals = {(p.output, p.at, p.first) for p in places} - {(self, place.at, place.first)}
+        outputs = dict.fromkeys((self, *(output for output, _, _ in rivals)))
         in_heading = len(_split(self.heading(place.at)))
         choices: list[tuple[bool, bool, int, str]] = []
-        own = [(context, whole) for context in place.contexts[0]]
-        own += ((context, abridged) for context in place.contexts[1])
-        for context, contexts in own:
-            numbers = [at for at, (_, is_number) in enumerate(context) if is_number]
-            plain_words = ["#" if is_number else word for word, is_number in context]
+
+        def is_alone(text: str) -> bool:
+            matches = [p for output in outputs for p in output.find_words(text, 1)]
+            addresses = [(p.output, p.at, p.first) for p in matches]
+            return (self, place.at, place.first) in addresses and rivals.isdisjoint(addresses)
+
+        for context in chain(*place.contexts):
+            numbers = [at for at, word in enumerate(context) if word.startswith("#")]
+            plain_words = ["#" if at in numbers else word for at, word in enumerate(context)]
             row_words = [*plain_words]
             for at in [at for at in numbers if at >= in_heading][:1]:  # it may name its line
-                row_words[at] = context[at][0]
+                row_words[at] = context[at].removeprefix("#") or "#"
             for words in (plain_words, row_words):
                 for start in range(len(words) - 1, -1, -1):
                     is_unit = start - 1 in numbers and bool(unit_behind(words[start]))
                     text = " ".join(words[start:])
-                    sought = _split(text)
                     if words[start] == "#" or is_unit:
                         continue
                     if _FORBIDDEN.search(text):
                         break
-                    if not any(_ends_with(rival, sought) for rival in contexts):
+                    if is_alone(text):
                         is_result = words is row_words  # a number may be another tomorrow
                         choices.append((is_result, "#" in text, len(words) - start, text))
                         break
         if choices:
             return min(choices, key=lambda choice: choice[:3])[3]
         lead = self.leads(place.at)[place.first] or self.title(place.at, place.numbers[0])
-        label = " ".join(word for word, _ in _split(lead))
-        is_shared = any(p.output.is_called(p.at, p.first, label) for p in rivals)
+        label = " ".join(word.removeprefix("#") for word in _split(lead))
+        is_shared = any(output.is_called(line, first, label) for output, line, first in rivals)
         return "" if is_shared or _FORBIDDEN.search(label) else label
 
     def _read_contexts(self, at: int, first: int) -> tuple[list[_Words], list[_Words]]:
@@ -436,23 +435,16 @@ class PrintedText:
 
 
 def _split(text: str) -> _Words:
-    parts: list[tuple[str, bool]] = []
-    at = 0
-    for number in scan(text):
-        parts += ((word, False) for word in text[at : number.start].split())
-        parts.append((plain_text(number.text), True))
-        at = number.end
-    parts += ((word, False) for word in text[at:].split())
-    bare = ((w if is_number else w.strip('=:,;()[]|<>~/"'), is_number) for w, is_number in parts)
-    return tuple((word, is_number) for word, is_number in bare if word)
+    places = ((n.start, n.end, f" #{plain_text(n.text)} ") for n in scan(text))
+    words = (word.strip('=:,;()[]|<>~/"') for word in replace_ranges(text, places).split())
+    return tuple(filter(None, words))
 
 
 def _ends_with(context: _Words, sought: _Words) -> bool:
     """Whether words end with others, in which `#` is any number."""
-    pairs = zip(reversed(context), reversed(sought), strict=False)
     return 0 < len(sought) <= len(context) and all(
-        word == sought_word or (sought_word == "#" and is_number)
-        for (word, is_number), (sought_word, _) in pairs
+        word == sought_word or (sought_word == "#" and word.startswith("#"))
+        for word, sought_word in zip(reversed(context), reversed(sought), strict=False)
     )
 
 
