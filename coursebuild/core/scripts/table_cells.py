@@ -64,16 +64,6 @@ class LineLayout(NamedTuple):
     columns: tuple[int, ...]
 
 
-class Fit(NamedTuple):
-    """A way to find a row in a line: where its cells begin there."""
-
-    line: int
-    places: tuple[int, ...]
-    layout: LineLayout
-    is_right: bool
-    """Whether its numbers match, too."""
-
-
 class RowCell(Struct, frozen=True):
     """A cell of a recorded table."""
 
