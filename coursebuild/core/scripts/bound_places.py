@@ -3,7 +3,7 @@
 1. Where its address is known (see `printed_text`), what stands there counts, and nothing else. The
    words of `{out="words"}` are an address where they are printed before one number only; of several
    they choose.
-2. Else it is sought, by `search` alone. Text next to the numbers (a unit, a name) narrows the
+2. Else it is sought, by `candidates` alone. Text next to the numbers (a unit, a name) narrows the
    choice, then the unit behind the binding, then digits that are printed exactly so. What is found
    at two places has both as addresses, and follows where they agree; it is ambiguous if they are
    not of one quantity.
@@ -322,7 +322,7 @@ class BoundNumber(Struct, frozen=True, dict=True):
         places = [place for place in at_addresses if place is not None]
         if not words:
             is_gone = len(places) < len(at_addresses)
-            return [] if is_gone else places or self.search(outputs)
+            return [] if is_gone else places or self.text.candidates(outputs, self.following)
         behind_words = [p for output in outputs for p in output.find_words(words, count)]
         if len(behind_words) == 1:
             return behind_words
@@ -357,10 +357,6 @@ class BoundNumber(Struct, frozen=True, dict=True):
             return False
         unsigned = [re.sub("[-−+]", "", t) for t in (self.text.text, self.text.rewrite(places[0]))]
         return unsigned[0] == unsigned[1] or self.text.bare.is_in(outputs)
-
-    def search(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
-        """The numbers that it may mean: a proposal, until one that it shows is remembered."""
-        return self.text.candidates(outputs, self.following)
 
 
 _LINE_END = regex(r"(?<!\n)\n[ \t>]*(?!\n)")

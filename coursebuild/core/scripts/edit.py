@@ -174,15 +174,9 @@ def _update_lines(
                     changed = [pair for pair in pairs if not matcher.numbers_match(*pair)]
                     places = ((old.start, old.end, new.text) for old, new in changed)
                     lines.append(replace_ranges(text, places))
-                case StepKind.SAME if (
-                    matcher.elides(text)  # it matches by an ellipsis or a filter
-                    or recorded.raw_lines(step.recorded) != (text,)
-                    or printed.raw_lines(step.printed) != (printed.lines[step.printed],)
-                ):
+                case StepKind.SAME | StepKind.ELLIPSIS:
                     lines += recorded.raw_lines(step.recorded)
-                case StepKind.ELLIPSIS:
-                    lines += recorded.raw_lines(step.recorded)
-                case StepKind.SAME | StepKind.DIFFERS | StepKind.EXTRA:
+                case StepKind.DIFFERS | StepKind.EXTRA:
                     lines += printed.raw_lines(step.printed)
                 case StepKind.MISSING | StepKind.ELIDED:
                     pass

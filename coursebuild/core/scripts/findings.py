@@ -35,7 +35,7 @@ from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.table_cells import HEADER_HELP, ROW_HELP, cell_text, table_rows
 from coursebuild.core.scripts.tables import TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
-from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
+from coursebuild.core.text.numbers import only_number, scan, within_tolerance
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -362,11 +362,6 @@ def _is_same_value(change: Change) -> bool:
     return recorded is not None and printed is not None and recorded.value == printed.value
 
 
-def _single_number(text: str) -> Number | None:
-    numbers = scan(text)
-    return numbers[0] if len(numbers) == 1 else None
-
-
 def closeness(change: Change) -> str:
     """How near a printed number is to the recorded one, in words; empty if that has no meaning."""
     if change.relative_error is None:
@@ -393,7 +388,7 @@ def _describe_difference(change: Change) -> str:
 def _describe_dependence(dependent: bindings.DependentBinding) -> str:
     binding, change = dependent.binding, dependent.change
     lead = f"`{binding.text}` depends on "
-    recorded, printed = _single_number(change.recorded), _single_number(change.printed)
+    recorded, printed = only_number(change.recorded), only_number(change.printed)
     if recorded is None or printed is None or change.kind is DriftKind.MISSING:
         return lead + "a line that changed"
     text = BoundText.of(binding.text, binding.comma, may_join=True)
