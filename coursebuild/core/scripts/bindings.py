@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from decimal import Context, Decimal
+from itertools import islice
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -232,11 +233,14 @@ def dependent_bindings(
             if bound_text.numbers:
                 shown_places = bound_text.shown_places([output])
                 places = ((p.line, n.start, n.end) for p in shown_places for n in p.numbers)
-            located = (line.locate(a, b) for line, a, b in places if line.locate is not None)
-            spans = [(span.start, span.end) for span in located]
-            overlap = (c for a, b in spans for c in changes if a < c.span.end and c.span.start < b)
-            change = next(overlap, None)
-            dependents += [] if change is None else [DependentBinding(binding, change)]
+            spans = (line.locate(a, b) for line, a, b in places if line.locate is not None)
+            overlaps = (
+                DependentBinding(binding, change)
+                for span in spans
+                for change in changes
+                if span.start < change.span.end and change.span.start < span.end
+            )
+            dependents += islice(overlaps, 1)
     return tuple(dependents)
 
 

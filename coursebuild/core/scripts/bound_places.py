@@ -158,8 +158,8 @@ def reworded_addresses(
 
 def _has_new_words(before: PrintedText, now: PrintedText) -> bool:
     """Whether no line has the words that another line had before."""
-    pairs = [(before.words(at), now.words(at)) for at in range(len(before.lines))]
-    old, new = {words for words, _ in pairs}, {words for _, words in pairs}
+    old, new = before.words, now.words
+    pairs = zip(old, new, strict=True)
     return all(a == b or (a not in new and b not in old) for a, b in pairs)
 
 

@@ -42,6 +42,7 @@ from coursebuild.core.scripts.table_cells import (
     ROW_HELP,
     cell_matches,
     number_text,
+    refusal,
     table_rows,
 )
 from coursebuild.core.scripts.tables import RowAddresses, TableMatcher
@@ -132,13 +133,6 @@ def update_body(
         "no text was found that matches what the script prints",
         "bring it up to date by hand: a `...` or a filter is in the way",
     )
-
-
-def refusal(
-    span: Span, message: str, help: str = "bring the row up to date by hand", label: str = ""
-) -> Diagnostic:
-    """An output that cannot be brought up to date."""
-    return diagnose("output-not-updatable", span, message, label=label, help=help)
 
 
 # ------------------------------------------------------------------------------------ new lines

@@ -125,11 +125,6 @@ class PrintedPlace(Struct, frozen=True):
         """The labels of all numbers of the line."""
         return self.output.labels(self.at)
 
-    @property
-    def contexts(self) -> tuple[list[_Words], list[_Words]]:
-        """The words before the first of them: all, then some of these."""
-        return self.output.contexts(self.at, self.first)
-
     def quantity(self, words: str = "") -> tuple[str, str] | None:
         """What the first of them is called: the heading, and its label or the words that name it.
 
@@ -141,7 +136,7 @@ class PrintedPlace(Struct, frozen=True):
     @property
     def address(self) -> Address | None:
         """`None` where nothing tells their line from others, which have other numbers there."""
-        heading, words = self.output.heading(self.at), self.output.words(self.at)
+        heading, words = self.output.heading(self.at), self.output.words[self.at]
         for depth in range(-1, self.first + 1):
             name, names = self.output.names(self.at, depth)
             if names.count(name) == 1:
@@ -169,7 +164,7 @@ class PrintedText:
         heading = -1
         for at, line in enumerate(self.lines):
             self._headings.append(heading)
-            words = self._words[at]
+            words = self.words[at]
             if any(map(str.isalpha, words)) and (not line.numbers or words.endswith(":")):
                 heading = at
 
@@ -209,7 +204,8 @@ class PrintedText:
     # --- what is printed with a number
 
     @cached_property
-    def _words(self) -> list[str]:
+    def words(self) -> list[str]:
+        """The words of each line, with `#` for numbers."""
         return [masked(line.text, line.is_grouped) for line in self.lines]
 
     @property
@@ -224,13 +220,13 @@ class PrintedText:
     @cached_property
     def _names_of_headings(self) -> dict[int, str]:
         places = sorted({*self._headings} - {-1})
-        counts = Counter(self._words[at] for at in places)
+        counts = Counter(self.words[at] for at in places)
         names = {-1: ""}
         for at in places:
-            words, outer = self._words[at], self._headings[at]
-            is_told = outer >= 0 and self._words[outer] != words and not self.lines[at].numbers
+            words, outer = self.words[at], self._headings[at]
+            is_told = outer >= 0 and self.words[outer] != words and not self.lines[at].numbers
             is_named = counts[words] > 1 and is_told
-            names[at] = f"{self._words[outer]} / {words}" if is_named else words
+            names[at] = f"{self.words[outer]} / {words}" if is_named else words
         return names
 
     def headings(self, at: int) -> str:
@@ -243,7 +239,7 @@ class PrintedText:
         if (title := self.lines[at].title(number)) is not None:
             return title.text
         first = heading = self._headings[at]
-        if heading < 0 or self._words[heading].endswith(":"):
+        if heading < 0 or self.words[heading].endswith(":"):
             return ""
         while first > max(0, heading - 2) and self._headings[first] == first - 1:
             first -= 1
@@ -286,20 +282,16 @@ class PrintedText:
     @cached_property
     def _by_words(self) -> dict[tuple[str, str], list[int]]:
         lines: dict[tuple[str, str], list[int]] = {}
-        for at, words in enumerate(self._words):
+        for at, words in enumerate(self.words):
             heading = self._headings[at]
-            names = {self.heading(at), self._words[heading] if heading >= 0 else ""}
+            names = {self.heading(at), self.words[heading] if heading >= 0 else ""}
             for name in names:  # records may hold the shorter one
                 lines.setdefault((name, words), []).append(at)
         return lines
 
-    def words(self, at: int) -> str:
-        """The words of a line, with `#` for numbers."""
-        return self._words[at]
-
     def names(self, at: int, depth: int) -> tuple[str, tuple[str, ...]]:
         """The name of a line, of so many of its numbers, and those of all lines of its words."""
-        siblings = self._by_words[self.heading(at), self._words[at]]
+        siblings = self._by_words[self.heading(at), self.words[at]]
         in_heading = len({self._numbers(self._headings[sibling]) for sibling in siblings}) > 1
         names = (self._name(sibling, depth, in_heading) for sibling in siblings)
         return self._name(at, depth, in_heading), tuple(names)
@@ -342,12 +334,12 @@ class PrintedText:
         In the words `#` stands for any number; signs around them do not count. What leaves words
         out is read so only where no number has the words as they are.
         """
-        sought, places = _split(words), [*self.places(count)]
-        whole, abridged = (
-            [p for p in places if any(_ends_with(c, sought) for c in p.contexts[kind])]
-            for kind in (0, 1)
-        )
-        return whole or abridged
+        sought = _split(words)
+        for kind in (0, 1):
+            contexts = ((p, self.contexts(p.at, p.first)[kind]) for p in self.places(count))
+            if matches := [p for p, some in contexts if any(_ends_with(c, sought) for c in some)]:
+                return matches
+        return []
 
     def places(self, count: int) -> Iterator[PrintedPlace]:
         """All runs of so many numbers of one line."""
@@ -367,21 +359,22 @@ class PrintedText:
         Where none do, those that tell them from the rivals; empty where that is impossible, too.
         """
         rivals = [*rivals]
-        words = self._words_among([*self.places(1), *rivals], place)
-        return words or (self._words_among(rivals, place) if rivals else "")
+        groups = filter(None, ([*self.places(1), *rivals], rivals))
+        return next(filter(None, (self._words_among(group, place) for group in groups)), "")
 
     def _words_among(self, places: Iterable[PrintedPlace], place: PrintedPlace) -> str:
-        rivals = {(p.output, p.at, p.first) for p in places} - {(self, place.at, place.first)}
+        own = self, place.at, place.first
+        rivals = {(p.output, p.at, p.first) for p in places} - {own}
         outputs = dict.fromkeys((self, *(output for output, _, _ in rivals)))
         in_heading = len(_split(self.heading(place.at)))
         choices: list[tuple[bool, bool, int, str]] = []
 
         def is_alone(text: str) -> bool:
-            matches = [p for output in outputs for p in output.find_words(text, 1)]
-            addresses = [(p.output, p.at, p.first) for p in matches]
-            return (self, place.at, place.first) in addresses and rivals.isdisjoint(addresses)
+            matches = (p for output in outputs for p in output.find_words(text, 1))
+            addresses = {(p.output, p.at, p.first) for p in matches}
+            return own in addresses and rivals.isdisjoint(addresses)
 
-        for context in chain(*place.contexts):
+        for context in chain(*self.contexts(place.at, place.first)):
             numbers = [at for at, word in enumerate(context) if word.startswith("#")]
             plain_words = ["#" if at in numbers else word for at, word in enumerate(context)]
             row_words = [*plain_words]
@@ -409,8 +402,7 @@ class PrintedText:
     def _read_contexts(self, at: int, first: int) -> tuple[list[_Words], list[_Words]]:
         """All words before a number, also the heading's, and again with the title of the column.
 
-        Then those that leave some out: the label stands right behind what its row begins with. In
-        both it may stand without its unit.
+        Then with the label right behind what its row begins with. It may stand without its unit.
         """
         line = self.lines[at]
         number = line.numbers[first]
@@ -424,10 +416,10 @@ class PrintedText:
             abridged += (f"{words} {line.text[:end]} {label}" for words in (heading, above))
             if title:
                 abridged += (f"{above} {title}", f"{line.text[: line.numbers[0].start]} {title}")
-        bare_title, _ = name_of_header(title)
 
         def read(texts: Sequence[str]) -> list[_Words]:
             bare_texts = [_UNIT_IN_BRACKETS.sub("", text) for text in texts]
+            bare_title = name_of_header(title)[0]
             bare_texts += (text.removesuffix(title) + bare_title for text in texts if title)
             return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
 

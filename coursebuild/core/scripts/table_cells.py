@@ -5,6 +5,7 @@ By the words and units of a title printed numbers are named.
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -23,6 +24,7 @@ from coursebuild.core.scripts.lines import (
     numbers_fit,
     same_number,
 )
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.macros import COMMAND
 from coursebuild.core.text.numbers import (
     Number,
@@ -239,24 +241,16 @@ def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
     return new.text
 
 
-def _is_word(character: str) -> bool:
-    return character.isalnum() or character == "_"
-
-
 def _find_places(
     cell: CanonicalText, line: CanonicalText, start: int, numbers_match: SameNumber
 ) -> Iterator[int]:
     """Offsets from `start` on at which a cell stands in a line, whole words and numbers only."""
-    text, cell_text = line.skeleton, cell.skeleton
-    place = text.find(cell_text, start)
-    while place >= 0:
-        end = place + len(cell_text)
-        splits_word = (place > 0 and _is_word(cell_text[0]) and _is_word(text[place - 1])) or (
-            end < len(text) and _is_word(cell_text[-1]) and _is_word(text[end])
-        )
-        if not splits_word and numbers_fit(cell, line, place, numbers_match):
-            yield place
-        place = text.find(cell_text, place + 1)
+    text = cell.skeleton
+    before = r"(?<!\w)" if _WORD_CHARACTER.match(text[0]) else ""
+    after = r"(?!\w)" if _WORD_CHARACTER.match(text[-1]) else ""
+    pattern = re.compile(f"(?={before}{re.escape(text)}{after})")
+    places = (match.start() for match in pattern.finditer(line.skeleton, start))
+    return (place for place in places if numbers_fit(cell, line, place, numbers_match))
 
 
 def find_rows(
@@ -272,6 +266,7 @@ def find_rows(
             yield (place, *rest)
 
 
+_WORD_CHARACTER = regex(r"\w")
 _WORD = regex(r"[^\W_]+")
 _PARTS = regex(r"[,;|]|[:=](?=.*\w)")
 """Between the parts of what stands before a number."""
@@ -281,6 +276,13 @@ HEADER_HELP = (
     'it: `` `s`{given="…"} ``'
 )
 ROW_HELP = "rows, and the cells of each, stand in the order in which they are printed"
+
+
+def refusal(
+    span: Span, message: str, help: str = "bring the row up to date by hand", label: str = ""
+) -> Diagnostic:
+    """An output that cannot be brought up to date."""
+    return diagnose("output-not-updatable", span, message, label=label, help=help)
 
 
 class ColumnTitle(Struct, frozen=True):
