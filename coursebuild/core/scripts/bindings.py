@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from decimal import Context, Decimal
-from itertools import islice
+from itertools import chain, islice
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -30,7 +30,6 @@ from coursebuild.core.scripts.bound_numbers import (
 from coursebuild.core.scripts.bound_places import (
     BoundNumber,
     bound_values,
-    document_bindings,
     mark_edits,
     place_note,
     reworded_addresses,
@@ -218,29 +217,31 @@ def _orphan_diagnostic(bound: BoundNumber) -> Diagnostic:
 
 
 def dependent_bindings(
-    verdict: Verdict, documents: Iterable[model.Document], outputs: PrintedOutputs
+    verdict: Verdict,
+    documents: Iterable[model.Document],
+    outputs: PrintedOutputs,
+    addresses: Addresses,
 ) -> tuple[DependentBinding, ...]:
     """The bindings of the course, in order, that depend on a changed value of a recording."""
     changes = [c for c in verdict.changes if c.kind is not DriftKind.EXTRA]
     key, output = recording_key(verdict.recording), outputs.text(verdict)
     dependents: list[DependentBinding] = []
-    for binding in (b for document in documents for b in document_bindings(document)):
-        if any(
-            recording_key(candidate.recording) == key for candidate in outputs.of_binding(binding)
-        ):
-            bound_text = BoundNumber(binding, outputs).text
-            places = text_places(bound_text.before, output.lines)
-            if bound_text.numbers:
-                shown_places = bound_text.shown_places([output])
-                places = ((p.line, n.start, n.end) for p in shown_places for n in p.numbers)
-            spans = (line.locate(a, b) for line, a, b in places if line.locate is not None)
-            overlaps = (
-                DependentBinding(binding, change)
-                for span in spans
-                for change in changes
-                if span.start < change.span.end and change.span.start < span.end
-            )
-            dependents += islice(overlaps, 1)
+    for binding, value in chain(*(bound_values(document, outputs) for document in documents)):
+        if all(recording_key(v.recording) != key for v in outputs.of_binding(binding)):
+            continue
+        bound = BoundNumber(binding, outputs, addresses.get(value, ()))
+        places = text_places(bound.text.before, output.lines)
+        if bound.text.numbers:
+            shown_places = filter(bound.text.shows, bound.look_up([output]))
+            places = ((p.line, n.start, n.end) for p in shown_places for n in p.numbers)
+        spans = (line.locate(a, b) for line, a, b in places if line.locate is not None)
+        overlaps = (
+            DependentBinding(binding, change)
+            for span in spans
+            for change in changes
+            if span.start < change.span.end and change.span.start < span.end
+        )
+        dependents += islice(overlaps, 1)
     return tuple(dependents)
 
 

@@ -109,7 +109,9 @@ def output_findings(
             elif unstable_output := find_instability(verdict, run, other_runs or {}):
                 yield unstable_output
             elif verdict.status == "drift":
-                dependents = bindings.dependent_bindings(verdict, course.documents, outputs)
+                dependents = bindings.dependent_bindings(
+                    verdict, course.documents, outputs, addresses or {}
+                )
                 change = _environment_change(verdict, run, record)
                 yield drift_diagnostic(verdict, id, dependents, change)
         yield from bindings.check_bindings(document, outputs, addresses)

@@ -264,7 +264,7 @@ def find_dependents(text: str, printed: str, *documents: Document) -> list[tuple
     return [
         (dependent.binding.text, dependent.change.recorded, dependent.change.printed)
         for verdict in verdicts
-        for dependent in dependent_bindings(verdict, [lesson, *documents], printed_now)
+        for dependent in dependent_bindings(verdict, [lesson, *documents], printed_now, {})
     ]
 
 
