@@ -358,8 +358,8 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
             message += f", another of `{bound.path}` has"
             binding = of_script
         else:  # a number among its words may be another now
-            others = (replace(binding, words=words) for words in ("", masked(binding.words)))
-            choices = (BoundNumber(other, bound.outputs).current_places for other in others)
+            attempts = (replace(binding, words=words) for words in ("", masked(binding.words)))
+            choices = (BoundNumber(attempt, bound.outputs).current_places for attempt in attempts)
             noted_places = rivals = next(filter(None, choices), [])
             noted_places.sort(key=lambda place: _distance(text.numbers, place.numbers))
     else:

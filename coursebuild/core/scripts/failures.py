@@ -306,8 +306,8 @@ def _incident_diagnostic(
 ) -> Diagnostic:
     """A diagnostic at the first incident, with some more in notes."""
     fence = extraction.script.span.first_line()
-    others = [Note(_describe_incident(i), _place(i, scripts)) for i in incidents[1:]]
-    notes = limit_notes(others, _MAX_INCIDENTS, "more like these")
+    notes = [Note(_describe_incident(i), _place(i, scripts)) for i in incidents[1:]]
+    notes = limit_notes(notes, _MAX_INCIDENTS, "more like these")
     if incidents[0].path not in ("", extraction.path):
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))
     place = _place(incidents[0], scripts) or fence

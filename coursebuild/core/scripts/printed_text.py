@@ -363,8 +363,8 @@ class PrintedText:
         return next(filter(None, (self._words_among(group, place) for group in groups)), "")
 
     def _words_among(self, places: Iterable[PrintedPlace], place: PrintedPlace) -> str:
-        own = self, place.at, place.first
-        rivals = {(p.output, p.at, p.first) for p in places} - {own}
+        address = self, place.at, place.first
+        rivals = {(p.output, p.at, p.first) for p in places} - {address}
         outputs = dict.fromkeys((self, *(output for output, _, _ in rivals)))
         in_heading = len(_split(self.heading(place.at)))
         choices: list[tuple[bool, bool, int, str]] = []
@@ -372,7 +372,7 @@ class PrintedText:
         def is_alone(text: str) -> bool:
             matches = (p for output in outputs for p in output.find_words(text, 1))
             addresses = {(p.output, p.at, p.first) for p in matches}
-            return own in addresses and rivals.isdisjoint(addresses)
+            return address in addresses and rivals.isdisjoint(addresses)
 
         for context in chain(*self.contexts(place.at, place.first)):
             numbers = [at for at, word in enumerate(context) if word.startswith("#")]

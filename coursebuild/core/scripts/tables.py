@@ -302,8 +302,8 @@ class TableMatcher:
                 parts, pairs, at = [], list[tuple[RowCell, Number, Number]](), 0
                 for cell, place in zip(cells, way, strict=True):
                     numbers = canonical.numbers_at(cell.canonical, place)
-                    both = zip(cell.canonical.numbers, numbers, strict=True)
-                    pairs += ((cell, old, new) for old, new in both)
+                    matches = zip(cell.canonical.numbers, numbers, strict=True)
+                    pairs += ((cell, old, new) for old, new in matches)
                     parts.append(canonical.skeleton[at:place])
                     at = place + len(cell.canonical.skeleton)
                 parts.append(canonical.skeleton[at:])

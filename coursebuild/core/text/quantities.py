@@ -273,8 +273,8 @@ def unit_of_header(text: str) -> UnitText:
         unit = read_unit(in_words["unit"])  # `F in N`, but not `change in V`
         is_certain = len(unit.text) > 1 or _SYMBOL.fullmatch(in_words["symbol"]) is not None
     elif quotient is not None:
-        unit, tail = read_unit(quotient["unit"]), text.split()[-1]
-        is_unit_itself = find_units(text) or ("/" in tail and find_units(tail))  # `at 200 rad/s`
+        unit = read_unit(quotient["unit"])
+        is_unit_itself = find_units(text) or ("/" in last and find_units(last))  # `at 200 rad/s`
         is_certain = is_symbol or not (is_unit_itself or unit.text in _SECOND_READINGS)
     else:
         return NO_UNIT
@@ -296,9 +296,7 @@ def name_of_header(text: str) -> tuple[str, int]:
 
 def unit_of_label(before: str) -> UnitText:
     """The unit in the label that ends right before a number, or the list that it stands in."""
-    before = before[-_REACH:]
-    gap = _TO_NUMBER.search(before)
-    return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
+    return unit_of_header(_TO_NUMBER.sub("", before[-_REACH:], count=1))
 
 
 def unit_of_printed(line: str, number: Number, above: Sequence[str]) -> UnitText:
