@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 from msgspec import Struct
 
 from coursebuild.core.model import Comparison
-from coursebuild.core.scripts.lines import LineMatcher, Side
+from coursebuild.core.scripts.lines import LineMatcher, Side, find_in_order
 from coursebuild.core.text.regex import regex
 
 _ALIKE_WEIGHT = 6
@@ -66,22 +66,12 @@ def same_lines(recorded: Side, printed: Side, comparison: Comparison) -> bool:
         else:
             blocks[-1].append(line)
 
-    def stands_at(block: Sequence[str], place: int) -> bool:
-        return all(matcher.matches(line, lines[place + i]) for i, line in enumerate(block))
+    def fits(block: int, place: int) -> bool:
+        return all(matcher.matches(line, lines[place + i]) for i, line in enumerate(blocks[block]))
 
-    first, *inner, last = blocks if len(blocks) > 1 else [blocks[0], []]
-    at, stop = len(first), len(lines) - len(last)
-    if at > stop or not (stands_at(first, 0) and stands_at(last, stop)):
-        return False
     if len(blocks) == 1:
-        return at == stop
-    for block in inner:
-        places = range(at, stop - len(block) + 1)
-        place = next((place for place in places if stands_at(block, place)), None)
-        if place is None:
-            return False
-        at = place + len(block)
-    return True
+        return len(lines) == len(blocks[0]) and fits(0, 0)
+    return find_in_order(list(map(len, blocks)), len(lines), fits) is not None
 
 
 def align(recorded: Side, printed: Side, matcher: LineMatcher) -> tuple[Step, ...]:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from decimal import Context, Decimal
+from itertools import chain, islice
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -29,17 +30,17 @@ from coursebuild.core.scripts.bound_numbers import (
 from coursebuild.core.scripts.bound_places import (
     BoundNumber,
     bound_values,
-    document_bindings,
     mark_edits,
     place_note,
     reworded_addresses,
 )
+from coursebuild.core.scripts.diff import limit_notes
 from coursebuild.core.scripts.edit import update_body
-from coursebuild.core.scripts.lines import plain_text
+from coursebuild.core.scripts.lines import masked, plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs, recording_key
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import row_values
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, diagnose, did_you_mean
 from coursebuild.core.text.numbers import Number, difference
 from coursebuild.core.text.quantities import with_unit
 
@@ -150,9 +151,7 @@ def _ambiguous(bound: BoundNumber, places: Sequence[PrintedPlace]) -> Diagnostic
     """The diagnostic of a binding that may be any of several printed numbers."""
     binding = bound.binding
     message = f"`{bound.path}` printed `{binding.text}` at {len(places)} places"
-    notes = [place_note(binding, place, places) for place in places[:_MAX_NOTES]]
-    if len(places) > _MAX_NOTES:
-        notes.append(Note(f"and {len(places) - _MAX_NOTES} more"))
+    notes = limit_notes([place_note(binding, p, places) for p in places], _MAX_NOTES)
     return diagnose(
         "output-ambiguous", binding.text_span, message, help=_choose(binding), notes=notes
     )
@@ -218,26 +217,31 @@ def _orphan_diagnostic(bound: BoundNumber) -> Diagnostic:
 
 
 def dependent_bindings(
-    verdict: Verdict, documents: Iterable[model.Document], outputs: PrintedOutputs
+    verdict: Verdict,
+    documents: Iterable[model.Document],
+    outputs: PrintedOutputs,
+    addresses: Addresses,
 ) -> tuple[DependentBinding, ...]:
     """The bindings of the course, in order, that depend on a changed value of a recording."""
     changes = [c for c in verdict.changes if c.kind is not DriftKind.EXTRA]
     key, output = recording_key(verdict.recording), outputs.text(verdict)
     dependents: list[DependentBinding] = []
-    for binding in (b for document in documents for b in document_bindings(document)):
-        if any(
-            recording_key(candidate.recording) == key for candidate in outputs.of_binding(binding)
-        ):
-            bound_text = BoundNumber(binding, outputs).text
-            places = text_places(bound_text.before, output.lines)
-            if bound_text.numbers:
-                shown_places = bound_text.shown_places([output])
-                places = ((p.line, n.start, n.end) for p in shown_places for n in p.numbers)
-            located = (line.locate(a, b) for line, a, b in places if line.locate is not None)
-            spans = [(span.start, span.end) for span in located]
-            overlap = (c for a, b in spans for c in changes if a < c.span.end and c.span.start < b)
-            change = next(overlap, None)
-            dependents += [] if change is None else [DependentBinding(binding, change)]
+    for binding, value in chain(*(bound_values(document, outputs) for document in documents)):
+        if all(recording_key(v.recording) != key for v in outputs.of_binding(binding)):
+            continue
+        bound = BoundNumber(binding, outputs, addresses.get(value, ()))
+        places = text_places(bound.text.before, output.lines)
+        if bound.text.numbers:
+            shown_places = filter(bound.text.shows, bound.look_up([output]))
+            places = ((p.line, n.start, n.end) for p in shown_places for n in p.numbers)
+        spans = (line.locate(a, b) for line, a, b in places if line.locate is not None)
+        overlaps = (
+            DependentBinding(binding, change)
+            for span in spans
+            for change in changes
+            if span.start < change.span.end and change.span.start < span.end
+        )
+        dependents += islice(overlaps, 1)
     return tuple(dependents)
 
 
@@ -353,13 +357,16 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
             message = f"the output above has no number right after `{binding.words}`"
             message += f", another of `{bound.path}` has"
             binding = of_script
-        else:
-            wordless = replace(bound, binding=replace(binding, words=""))
-            noted_places = rivals = wordless.current_places
+        else:  # a number among its words may be another now
+            attempts = (replace(binding, words=words) for words in ("", masked(binding.words)))
+            choices = (BoundNumber(attempt, bound.outputs).current_places for attempt in attempts)
+            noted_places = rivals = next(filter(None, choices), [])
+            noted_places.sort(key=lambda place: _distance(text.numbers, place.numbers))
     else:
         line_text = bound.lost_address().description
         message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
         noted_places = rivals = replace(bound, addresses=()).places()
+    if not (places_now or (binding.words and noted_places)):
         example = binding.mark(words="tau")
         help = f"bind it anew: choose the words before it, as in `{example}`"
     notes = [place_note(binding, place, rivals) for place in noted_places[:_MAX_NOTES]]

@@ -3,7 +3,7 @@
 1. Where its address is known (see `printed_text`), what stands there counts, and nothing else. The
    words of `{out="words"}` are an address where they are printed before one number only; of several
    they choose.
-2. Else it is sought, by `search` alone. Text next to the numbers (a unit, a name) narrows the
+2. Else it is sought, by `candidates` alone. Text next to the numbers (a unit, a name) narrows the
    choice, then the unit behind the binding, then digits that are printed exactly so. What is found
    at two places has both as addresses, and follows where they agree; it is ambiguous if they are
    not of one quantity.
@@ -48,7 +48,8 @@ def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ..
         for table in model.find_blocks(document, model.Table)
         for row in table.rows
         for cell, header in zip(row, table.header, strict=False)
-        for inline in cell.children[-1:]
+        for inline in model.walk_inlines(cell.children)
+        if isinstance(inline, model.NumberBinding) and _ends_cell(inline, cell)
     }
     recordings = model.find_blocks(document, model.Recording)
     outputs = sorted((recording.span.start, bool(recording.script)) for recording in recordings)
@@ -58,6 +59,18 @@ def document_bindings(document: model.Document) -> tuple[model.NumberBinding, ..
         if b.source is None
         and (b.script or [True, *(is_read for at, is_read in outputs if at < b.span.start)][-1])
     )
+
+
+def _ends_cell(binding: model.NumberBinding, cell: model.Cell) -> bool:
+    """Whether nothing but marks stands behind a number; in a formula it is all, or the result."""
+    text, span = cell.span.source.text, binding.span
+    ends = _MARKS.fullmatch(text[span.end : cell.span.end]) is not None
+    formula = text[cell.span.start : span.start].rpartition("$")[2]
+    return ends and (not binding.is_in_formula or _RELATION.fullmatch(formula) is not None)
+
+
+_MARKS = regex(r"[\s*_~$]*")
+_RELATION = regex(r"(?:.*(?:[=≈]|\\approx))?\s*")
 
 
 def bound_values(
@@ -145,8 +158,8 @@ def reworded_addresses(
 
 def _has_new_words(before: PrintedText, now: PrintedText) -> bool:
     """Whether no line has the words that another line had before."""
-    pairs = [(before.words(at), now.words(at)) for at in range(len(before.lines))]
-    old, new = {words for words, _ in pairs}, {words for _, words in pairs}
+    old, new = before.words, now.words
+    pairs = zip(old, new, strict=True)
     return all(a == b or (a not in new and b not in old) for a, b in pairs)
 
 
@@ -309,7 +322,7 @@ class BoundNumber(Struct, frozen=True, dict=True):
         places = [place for place in at_addresses if place is not None]
         if not words:
             is_gone = len(places) < len(at_addresses)
-            return [] if is_gone else places or self.search(outputs)
+            return [] if is_gone else places or self.text.candidates(outputs, self.following)
         behind_words = [p for output in outputs for p in output.find_words(words, count)]
         if len(behind_words) == 1:
             return behind_words
@@ -344,10 +357,6 @@ class BoundNumber(Struct, frozen=True, dict=True):
             return False
         unsigned = [re.sub("[-−+]", "", t) for t in (self.text.text, self.text.rewrite(places[0]))]
         return unsigned[0] == unsigned[1] or self.text.bare.is_in(outputs)
-
-    def search(self, outputs: Sequence[PrintedText]) -> list[PrintedPlace]:
-        """The numbers that it may mean: a proposal, until one that it shows is remembered."""
-        return self.text.candidates(outputs, self.following)
 
 
 _LINE_END = regex(r"(?<!\n)\n[ \t>]*(?!\n)")

@@ -11,12 +11,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 
-from msgspec import Struct
-
 from coursebuild.core import model
 from coursebuild.core.model.lesson_record import Addresses
 from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun, Verdict
-from coursebuild.core.scripts.align import Step, StepKind, align, same_lines
+from coursebuild.core.scripts.align import StepKind, align, same_lines
 from coursebuild.core.scripts.diff import find_differences, number_change, text_diff
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.lines import LineMatcher, Side
@@ -77,70 +75,52 @@ def compare(
     recorded, printed = (Side.of(text, comparison.filters) for text in (body.text, stdout))
     if same_lines(recorded, printed, comparison):
         return Verdict(recording, comparison, "verified")
-    matcher = LineMatcher(comparison)
-    finder = _ChangeFinder(recording, body, recorded, printed, matcher)
-    drift = tuple(finder.find(align(recorded, printed, matcher)))
+    drift = tuple(_find_changes(recording, recorded, printed, LineMatcher(comparison)))
     return Verdict(recording, comparison, "drift" if drift else "verified", drift)
 
 
-class _ChangeFinder(Struct, frozen=True):
-    """Turns steps into changes with their places in the lesson."""
+def _find_changes(
+    recording: model.Recording, recorded: Side, printed: Side, matcher: LineMatcher
+) -> Iterator[Change]:
+    """A change for each difference in a line, and for each run of missing or extra lines."""
 
-    recording: model.Recording
-    body: Excerpt
-    recorded: Side
-    printed: Side
-    matcher: LineMatcher
+    def locate(start: int, end: int) -> Span:
+        if isinstance(recording.body, Excerpt) and recording.body.text:
+            return recording.body.span(start, end)
+        span = recording.body_span
+        return Span(span.source, span.start, span.start)
 
-    def find(self, steps: Sequence[Step]) -> Iterator[Change]:
-        """A change for each difference in a line, and for each run of missing or extra lines."""
-        for kind, group in groupby(steps, key=lambda step: step.kind):
-            match kind:
-                case StepKind.DIFFERS:
-                    for step in group:
-                        yield from self._line(step)
-                case StepKind.MISSING:
-                    missing = [step.recorded for step in group]
-                    start, _ = self.recorded.origin(missing[0], 0, 0)
-                    span = self._span(start, self._end_of(missing[-1]))
-                    text = "\n".join(self.recorded.lines[line] for line in missing)
-                    yield Change(DriftKind.MISSING, span, text, "")
-                case StepKind.EXTRA:
-                    extra = list(group)
-                    text = "\n".join(self.printed.lines[step.printed] for step in extra)
-                    before, count = extra[0].recorded, len(self.recorded.lines)
-                    place = self._end_of(count - 1)
-                    if before < count:
-                        place = self.recorded.origin(before, 0, 0)[0]
-                    yield Change(DriftKind.EXTRA, self._span(place, place), "", text)
-                case _:
-                    pass
-
-    def _line(self, step: Step) -> Iterator[Change]:
-        recorded, printed = self.recorded.lines[step.recorded], self.printed.lines[step.printed]
-        for d in find_differences(recorded, printed, self.matcher):
-            start, end = self.recorded.origin(step.recorded, d.start, d.end)
-            printed_start, printed_end = self.printed.origin(
-                step.printed, d.printed_start, d.printed_end
-            )
-            span = self._span(start, end)
-            texts = self.recorded.raw[start:end], self.printed.raw[printed_start:printed_end]
-            if d.numbers is not None:
-                yield number_change(span, *texts, d.numbers)
-            else:
-                yield Change(DriftKind.TEXT, span, *texts)
-
-    def _end_of(self, line: int) -> int:
+    def end_of(line: int) -> int:
         """Where a recorded line ends; 0 where none is recorded."""
-        if line < 0:
-            return 0
-        return self.recorded.origin(line, 0, len(self.recorded.lines[line]))[1]
+        return recorded.origin(line, 0, len(recorded.lines[line]))[1] if line >= 0 else 0
 
-    def _span(self, start: int, end: int) -> Span:
-        if not self.body.text:
-            span = self.recording.body_span
-            return Span(span.source, span.start, span.start)
-        return self.body.span(start, end)
+    for kind, group in groupby(align(recorded, printed, matcher), key=lambda step: step.kind):
+        steps = list(group)
+        first, last = steps[0].recorded, steps[-1].recorded
+        match kind:
+            case StepKind.DIFFERS:
+                for step in steps:
+                    lines = recorded.lines[step.recorded], printed.lines[step.printed]
+                    for d in find_differences(*lines, matcher):
+                        start, end = recorded.origin(step.recorded, d.start, d.end)
+                        place = printed.origin(step.printed, d.printed_start, d.printed_end)
+                        span = locate(start, end)
+                        texts = recorded.raw[start:end], printed.raw[slice(*place)]
+                        if d.numbers is not None:
+                            yield number_change(span, *texts, d.numbers)
+                        else:
+                            yield Change(DriftKind.TEXT, span, *texts)
+            case StepKind.MISSING:
+                span = locate(recorded.origin(first, 0, 0)[0], end_of(last))
+                text = "\n".join(recorded.lines[first : last + 1])
+                yield Change(DriftKind.MISSING, span, text, "")
+            case StepKind.EXTRA:
+                text = "\n".join(printed.lines[step.printed] for step in steps)
+                count = len(recorded.lines)
+                start = recorded.origin(first, 0, 0)[0] if first < count else end_of(count - 1)
+                yield Change(DriftKind.EXTRA, locate(start, start), "", text)
+            case _:
+                pass
 
 
 def repeat_findings(
@@ -184,23 +164,7 @@ def _describe_end(run: ScriptRun) -> str:
     return f"{run.outcome.value} ({run.status})" if run.status else run.outcome.value
 
 
-def instability_diagnostic(recording: model.Recording, first: Side, second: Side) -> Diagnostic:
-    """Say which lines differ between two runs, of which the first is recorded."""
-    diff = text_diff("\n".join(first.lines), "\n".join(second.lines))
-    return diagnose(
-        "output-unstable",
-        recording.caption_span,
-        "two runs of the script printed different lines",
-        help=_TABLE_HELP if isinstance(recording.body, model.Table) else _HELP,
-        notes=[Note(f"printed by the first run (-) and by the second (+):\n{diff}")],
-    )
-
-
-_REPEAT_HELP = "make the script print the same each time (a fixed seed, no clock)"
-_HELP = (
-    f'{_REPEAT_HELP}, or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
-)
-_TABLE_HELP = f"{_REPEAT_HELP}, or record the output in a `text` fence with `volatile`"
+REPEAT_HELP = "make the script print the same each time (a fixed seed, no clock)"
 
 
 def _compare_table(

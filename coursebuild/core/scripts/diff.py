@@ -1,16 +1,16 @@
 """How a recorded output differs from what its script prints now: inside a line, and line by line.
 
 1. Lines that differ in their numbers only: each pair of numbers that does not match.
-2. Other lines are cut into numbers, words, signs and white space, and these are aligned: paired
-   numbers are compared, the rest is text. White space that differs is reported only where nothing
-   else does, because columns shift when a number gets wider.
+2. Other lines are cut into numbers, words and signs, and these are aligned: paired numbers are
+   compared, the rest is text. White space that differs is reported only where nothing else does,
+   because columns shift when a number gets wider.
 3. A recorded line with an ellipsis that does not fit differs as a whole.
 """
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from typing import Literal, TypeAlias
 
@@ -20,6 +20,7 @@ from coursebuild.core.model import Table
 from coursebuild.core.model.results import Change, DriftKind, Verdict
 from coursebuild.core.scripts.align import MATCH, StepKind, align, pair
 from coursebuild.core.scripts.lines import LineMatcher, Side
+from coursebuild.core.text.diagnostics import Note
 from coursebuild.core.text.numbers import (
     Number,
     agreeing_digits,
@@ -31,8 +32,8 @@ from coursebuild.core.text.numbers import (
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
-_PART = regex(r"\s+|\w+|[^\w\s]")
-_SPACE, _NUMBER = 1, 4
+_PART = regex(r"\w+|[^\w\s]")
+_NUMBER = 4
 
 
 class Difference(Struct, frozen=True):
@@ -100,60 +101,52 @@ class _Token(Struct, frozen=True):
 
 
 def _tokens(text: str) -> Iterator[_Token]:
+    """The numbers, words and signs of a line, and its end."""
     at = 0
-    for number in (*scan(text), None):
-        stop = len(text) if number is None else number.start
-        for part in _PART.finditer(text, at, stop):
-            yield _Token(part.start(), part.end(), part.group())
-        if number is not None:
-            yield _Token(number.start, number.end, number.text, number)
-            at = number.end
+    for number in scan(text):
+        yield from (
+            _Token(*part.span(), part[0]) for part in _PART.finditer(text, at, number.start)
+        )
+        yield _Token(number.start, number.end, number.text, number)
+        at = number.end
+    yield from (_Token(*part.span(), part[0]) for part in _PART.finditer(text, at))
+    yield _Token(len(text), len(text), "")
 
 
 def _token_differences(recorded: str, printed: str, matcher: LineMatcher) -> tuple[Difference, ...]:
-    left, right = list(_tokens(recorded)), list(_tokens(printed))
+    *left, left_end = _tokens(recorded)
+    *right, right_end = _tokens(printed)
 
     def weight(i: int, j: int) -> int:
         a, b = left[i], right[j]
         if a.number is not None and b.number is not None:
             return MATCH if matcher.numbers_match(a.number, b.number) else _NUMBER
-        if a.text.isspace() and b.text.isspace():
-            return _SPACE
         return MATCH if a.text == b.text else 0
 
     differences: list[Difference] = []
+    spaces: list[Difference] = []
     at = printed_at = 0
     pairs = pair([t.text for t in left], [t.text for t in right], weight)
-    left.append(_Token(len(recorded), len(recorded), ""))
-    right.append(_Token(len(printed), len(printed), ""))
-    for i, j in (*pairs, (-1, -1)):
-        a, b = left[i], right[j]
-        if at < a.start or printed_at < b.start:
-            differences.append(Difference(at, a.start, printed_at, b.start))
+    for a, b in (*((left[i], right[j]) for i, j in pairs), (left_end, right_end)):
+        start, end = _without_spaces(recorded, at, a.start)
+        printed_start, printed_end = _without_spaces(printed, printed_at, b.start)
+        if start < end or printed_start < printed_end:
+            differences.append(Difference(start, end, printed_start, printed_end))
+        elif recorded[at : a.start] != printed[printed_at : b.start]:
+            spaces.append(Difference(at, a.start, printed_at, b.start))
         if a.number is not None and b.number is not None:
-            if not matcher.numbers_match(a.number, b.number):
-                numbers = (a.number, b.number)
+            numbers = (a.number, b.number)
+            if not matcher.numbers_match(*numbers):
                 differences.append(Difference(a.start, a.end, b.start, b.end, numbers))
-        elif a.text != b.text:
-            differences.append(Difference(a.start, a.end, b.start, b.end))
         at, printed_at = a.end, b.end
+    return tuple(differences or spaces)
 
-    # Drop white space where anything else differs; join texts with only white space between
-    def is_blank(d: Difference) -> bool:
-        return not (
-            recorded[d.start : d.end].strip() or printed[d.printed_start : d.printed_end].strip()
-        )
 
-    merged_differences: list[Difference] = []
-    for d in [d for d in differences if not is_blank(d)] or differences:
-        if merged_differences and d.numbers is None:
-            last = merged_differences[-1]
-            gap = Difference(last.end, d.start, last.printed_end, d.printed_start)
-            if last.numbers is None and is_blank(gap):
-                merged_differences.pop()
-                d = Difference(last.start, d.end, last.printed_start, d.printed_end)
-        merged_differences.append(d)
-    return tuple(merged_differences)
+def _without_spaces(text: str, start: int, end: int) -> tuple[int, int]:
+    """A range of a text without the white space at both ends."""
+    part = text[start:end]
+    lead = len(part) - len(part.lstrip())
+    return start + lead, start + max(lead, len(part.rstrip()))
 
 
 Mark: TypeAlias = Literal[" ", "-", "+"]
@@ -174,16 +167,18 @@ def quote(text: str, width: int) -> str:
     return f"`{shorten(text.strip(), width)}`"
 
 
+def limit_notes(notes: Sequence[Note], most: int, noun: str = "more") -> list[Note]:
+    """So many notes, and one that counts the rest."""
+    rest = len(notes) - most
+    return [*notes[:most], *([Note(f"and {rest} {noun}")] if rest > 0 else [])]
+
+
 def text_diff(before: str, now: str) -> str:
     """The lines that two texts do not share, at most twelve of them."""
-    lines = [
-        shorten(line, _WIDTH)
-        for line in difflib.unified_diff(before.splitlines(), now.splitlines(), n=0, lineterm="")
-        if not line.startswith(("---", "+++", "@@"))
-    ]
-    if len(lines) > _LINES:
-        lines[_LINES:] = [f"… and {len(lines) - _LINES} more lines"]
-    return "\n".join(lines)
+    diff = difflib.unified_diff(before.splitlines(), now.splitlines(), n=0, lineterm="")
+    lines = [line for line in diff if not line.startswith(("---", "+++", "@@"))]
+    rest = f"\n… and {len(lines) - _LINES} more lines" if len(lines) > _LINES else ""
+    return "\n".join(shorten(line, _WIDTH) for line in lines[:_LINES]) + rest
 
 
 def diff_rows(verdict: Verdict, stdout: str) -> tuple[DiffRow, ...]:

@@ -39,8 +39,10 @@ from coursebuild.core.scripts.lines import (
 from coursebuild.core.scripts.module_code import DEFINITIONS, first_line
 from coursebuild.core.scripts.table_cells import (
     HEADER_HELP,
+    ROW_HELP,
     cell_matches,
     number_text,
+    refusal,
     table_rows,
 )
 from coursebuild.core.scripts.tables import RowAddresses, TableMatcher
@@ -133,13 +135,6 @@ def update_body(
     )
 
 
-def refusal(
-    span: Span, message: str, help: str = "bring the row up to date by hand", label: str = ""
-) -> Diagnostic:
-    """An output that cannot be brought up to date."""
-    return diagnose("output-not-updatable", span, message, label=label, help=help)
-
-
 # ------------------------------------------------------------------------------------ new lines
 
 
@@ -173,15 +168,9 @@ def _update_lines(
                     changed = [pair for pair in pairs if not matcher.numbers_match(*pair)]
                     places = ((old.start, old.end, new.text) for old, new in changed)
                     lines.append(replace_ranges(text, places))
-                case StepKind.SAME if (
-                    matcher.elides(text)  # it matches by an ellipsis or a filter
-                    or recorded.raw_lines(step.recorded) != (text,)
-                    or printed.raw_lines(step.printed) != (printed.lines[step.printed],)
-                ):
+                case StepKind.SAME | StepKind.ELLIPSIS:
                     lines += recorded.raw_lines(step.recorded)
-                case StepKind.ELLIPSIS:
-                    lines += recorded.raw_lines(step.recorded)
-                case StepKind.SAME | StepKind.DIFFERS | StepKind.EXTRA:
+                case StepKind.DIFFERS | StepKind.EXTRA:
                     lines += printed.raw_lines(step.printed)
                 case StepKind.MISSING | StepKind.ELIDED:
                     pass
@@ -307,10 +296,9 @@ def _update_table(
     for row in match.rows:
         if row.line < 0 or not row.certain:
             span = row.row[0].cell.span.to(row.row[-1].cell.span)
-            reason = (
-                "several lines of this run have" if row.line >= 0 else "no line of this run has"
-            )
-            return refusal(span, f"{reason} the cells of this row in order")
+            if row.line < 0:
+                return refusal(span, "no line of this run has the cells of this row", ROW_HELP)
+            return refusal(span, "several lines of this run have the cells of this row in order")
         for cell, old, new in row.pairs:
             span = cell.span(old)
             text: str | None = span.text

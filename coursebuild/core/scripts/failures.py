@@ -21,7 +21,7 @@ import msgspec
 
 from coursebuild.core.model import Recording
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
-from coursebuild.core.scripts.diff import shorten
+from coursebuild.core.scripts.diff import limit_notes, shorten
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, propose
 from coursebuild.core.text.regex import regex
@@ -306,13 +306,10 @@ def _incident_diagnostic(
 ) -> Diagnostic:
     """A diagnostic at the first incident, with some more in notes."""
     fence = extraction.script.span.first_line()
-    named_incidents = incidents[1 : _MAX_INCIDENTS + 1]
-    rest_count = len(incidents) - 1 - _MAX_INCIDENTS
-    notes = [Note(_describe_incident(i), _place(i, scripts)) for i in named_incidents]
+    notes = [Note(_describe_incident(i), _place(i, scripts)) for i in incidents[1:]]
+    notes = limit_notes(notes, _MAX_INCIDENTS, "more like these")
     if incidents[0].path not in ("", extraction.path):
         notes.insert(0, Note(f"`{extraction.path}` was running", fence))
-    if rest_count > 0:
-        notes.append(Note(f"and {rest_count} more like these"))
     place = _place(incidents[0], scripts) or fence
     return diagnose(
         rule, place, f"{message}: {_describe_incident(incidents[0])}", help=help, notes=notes

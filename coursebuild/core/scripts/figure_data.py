@@ -16,6 +16,7 @@ import xml.etree.ElementTree as ET
 import zlib
 from collections.abc import Iterator, Sequence
 from typing import TypeAlias
+from xml.sax.saxutils import unescape
 
 import msgspec
 from msgspec import Struct
@@ -115,14 +116,11 @@ def without_data(figure: bytes) -> bytes:
     return figure if at < 0 else figure[: at - 4] + figure[end:]
 
 
-def _read_svg(data: bytes) -> bytes:
+def _read_svg(data: bytes) -> str:
     match = _SVG_DATA.search(data)
     if match is None or len(match[1]) > 2 * MOST_DATA:
-        return b""
-    text: bytes = match[1]
-    for name, character in ((b"&lt;", b"<"), (b"&gt;", b">"), (b"&amp;", b"&")):
-        text = text.replace(name, character)
-    return text
+        return ""
+    return unescape(match[1].decode("utf-8", "replace"))
 
 
 def _read_png(data: bytes) -> bytes:
@@ -161,14 +159,17 @@ def _differences(old: FigureData, new: FigureData) -> Iterator[str]:
         yield "it is {:g}×{:g} inches where {:g}×{:g} are recorded".format(*new.size, *old.size)
 
 
+_WORDS_OF_AXES = {
+    "the titles": "titles",
+    "the labels of the axes": "labels",
+    "the legend": "legend",
+}
+
+
 def _axes_differences(old: Axes, new: Axes) -> Iterator[str]:
-    for name, before, now in (
-        ("the titles", old.titles, new.titles),
-        ("the labels of the axes", old.labels, new.labels),
-        ("the scales", (old.kind, *old.scales), (new.kind, *new.scales)),
-        ("the legend", old.legend, new.legend),
-    ):
-        yield from _words(name, before, now)
+    for name, field in _WORDS_OF_AXES.items():
+        yield from _words(name, getattr(old, field), getattr(new, field))
+    yield from _words("the scales", (old.kind, *old.scales), (new.kind, *new.scales))
     for before, now in itertools.zip_longest(old.ticks, new.ticks, fillvalue=()):
         yield from _words("the ticks", before, now)
     if old.inverted != new.inverted:

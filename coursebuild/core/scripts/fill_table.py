@@ -17,8 +17,8 @@ from msgspec import Struct
 from coursebuild.core import model
 from coursebuild.core.scripts.lines import Side, masked, plain_text
 from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText
-from coursebuild.core.scripts.table_cells import ColumnTitle
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, diagnose
+from coursebuild.core.scripts.table_cells import ColumnTitle, refusal
+from coursebuild.core.text.diagnostics import Diagnostic, Edit
 from coursebuild.core.text.numbers import write_comma
 
 
@@ -48,21 +48,20 @@ def fill_table(table: model.Table, stdout: str) -> Edit | Diagnostic:
     words = ["".join(kinds[kind][0].places[0].labels) for kind in best if not scores[kind][1]]
     if is_named and any(map(str.isalpha, "".join(words))):
         best = []  # they have other words than the titles, and other lines have these
+    place = table.span.first_line()
     if len(best) != 1:
-        place = table.span.first_line()
         message = "no printed line has a number for each column of this table"
         help = "print a line for each row, with the words of the header, or write the rows by hand"
         if best:
             lines_text = " or ".join(f"`{kinds[kind][0].line}`" for kind in best[:3])
             message = f"its rows may be lines such as {lines_text}"
             help = "write the words and units that are printed with the numbers into the header"
-        return diagnose("output-not-updatable", place, message, help=help)
+        return refusal(place, message, help)
     source, lines = table.span.source, kinds[best[0]]
     for line in lines:
         if sorted(line.places, key=lambda place: place.first) != [*line.places]:
             message = f"the numbers of these columns are printed in another order, in `{line.line}`"
-            help, place = "put the columns in this order", table.span.first_line()
-            return diagnose("output-not-updatable", place, message, help=help)
+            return refusal(place, message, "put the columns in this order")
     delimiter = re.compile(r"\n([ \t>]*)[^\r\n]*").search(source.text, table.header[-1].span.end)
     assert delimiter is not None
     write = write_comma if table.comma else str

@@ -27,15 +27,15 @@ from coursebuild.core.model.results import Change, DriftKind, Outcome, ScriptRun
 from coursebuild.core.scripts import bindings, failures
 from coursebuild.core.scripts.bound_numbers import BoundText, shows
 from coursebuild.core.scripts.bound_places import BoundNumber, document_bindings
-from coursebuild.core.scripts.compare import compare, instability_diagnostic
-from coursebuild.core.scripts.diff import quote, shorten
+from coursebuild.core.scripts.compare import REPEAT_HELP, compare
+from coursebuild.core.scripts.diff import limit_notes, quote, shorten, text_diff
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.lines import ELLIPSIS, Side
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.table_cells import HEADER_HELP, cell_text, table_rows
+from coursebuild.core.scripts.table_cells import HEADER_HELP, ROW_HELP, cell_text, table_rows
 from coursebuild.core.scripts.tables import TableMatcher
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
-from coursebuild.core.text.numbers import Number, only_number, scan, within_tolerance
+from coursebuild.core.text.numbers import only_number, scan, within_tolerance
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -109,7 +109,9 @@ def output_findings(
             elif unstable_output := find_instability(verdict, run, other_runs or {}):
                 yield unstable_output
             elif verdict.status == "drift":
-                dependents = bindings.dependent_bindings(verdict, course.documents, outputs)
+                dependents = bindings.dependent_bindings(
+                    verdict, course.documents, outputs, addresses or {}
+                )
                 change = _environment_change(verdict, run, record)
                 yield drift_diagnostic(verdict, id, dependents, change)
         yield from bindings.check_bindings(document, outputs, addresses)
@@ -213,8 +215,18 @@ def find_instability(
     if [(c.span, c.printed) for c in changes] == [(c.span, c.printed) for c in verdict.changes]:
         return None
     outputs = (r.output_of(recording.part) for r in (earlier_run, run))
-    before, now = (Side.of(output, comparison.filters) for output in outputs)
-    return instability_diagnostic(recording, before, now)
+    before, now = ("\n".join(Side.of(text, comparison.filters).lines) for text in outputs)
+    help = 'or say what varies by `volatile="…"` on the fence, or by `ellipsis` and `...`'
+    if isinstance(recording.body, Table):
+        help = "or record the output in a `text` fence with `volatile`"
+    note = f"printed by the first run (-) and by the second (+):\n{text_diff(before, now)}"
+    return diagnose(
+        "output-unstable",
+        recording.caption_span,
+        "two runs of the script printed different lines",
+        help=f"{REPEAT_HELP}, {help}",
+        notes=[Note(note)],
+    )
 
 
 def count_unproven(
@@ -289,11 +301,9 @@ def drift_diagnostic(
         return diagnose("output-drift", recording.caption_span, message, help=f"run {update}")
     changes = verdict.changes
     first, *rest = sorted(changes, key=lambda change: change.span.start)
-    notes = [Note(_describe_difference(change), change.span) for change in rest[:_MAX_NOTES]]
-    if len(rest) > _MAX_NOTES:
-        rest_count = len(rest) - _MAX_NOTES
-        noun = "difference" if rest_count == 1 else "differences"
-        notes.append(Note(f"and {rest_count} more {noun}"))
+    noun = "more difference" if len(rest) == _MAX_NOTES + 1 else "more differences"
+    differences = [Note(_describe_difference(change), change.span) for change in rest]
+    notes = limit_notes(differences, _MAX_NOTES, noun)
     notes += (Note(_describe_dependence(d), d.binding.text_span) for d in dependents)
     help = f"if the change is intended, run {update}"
     fraction = re.match(r",(\d+)", first.span.source.text[first.span.end : first.span.end + 40])
@@ -305,6 +315,8 @@ def drift_diagnostic(
         isinstance(body := recording.body, Table) and first.span.start < body.rows[0][0].span.start
     ):
         help = HEADER_HELP
+    elif isinstance(body, Table) and first.kind is DriftKind.MISSING:
+        help = f"{help}; {ROW_HELP}"
     message = f"recorded output differs from this run ({classes(changes)})"
     message = f"{change}: {message}" if change else message
     return diagnose(
@@ -352,11 +364,6 @@ def _is_same_value(change: Change) -> bool:
     return recorded is not None and printed is not None and recorded.value == printed.value
 
 
-def _single_number(text: str) -> Number | None:
-    numbers = scan(text)
-    return numbers[0] if len(numbers) == 1 else None
-
-
 def closeness(change: Change) -> str:
     """How near a printed number is to the recorded one, in words; empty if that has no meaning."""
     if change.relative_error is None:
@@ -383,7 +390,7 @@ def _describe_difference(change: Change) -> str:
 def _describe_dependence(dependent: bindings.DependentBinding) -> str:
     binding, change = dependent.binding, dependent.change
     lead = f"`{binding.text}` depends on "
-    recorded, printed = _single_number(change.recorded), _single_number(change.printed)
+    recorded, printed = only_number(change.recorded), only_number(change.printed)
     if recorded is None or printed is None or change.kind is DriftKind.MISSING:
         return lead + "a line that changed"
     text = BoundText.of(binding.text, binding.comma, may_join=True)

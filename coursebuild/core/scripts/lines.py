@@ -265,8 +265,9 @@ class LineMatcher:
         if recorded == printed:
             return True
         if self.elides(recorded):
-            parts = [CanonicalText(part, ()) for part in recorded.split(ELLIPSIS)]
-            if _find_parts(parts, CanonicalText(printed, ()), always_match) is not None:
+            parts = recorded.split(ELLIPSIS)
+            lengths = list(map(len, parts))
+            if find_in_order(lengths, len(printed), lambda i, at: printed.startswith(parts[i], at)):
                 return True
         if self.comparison.mode is Mode.EXACT:
             return False
@@ -291,7 +292,14 @@ class LineMatcher:
             number_pairs = tuple(zip(expected.numbers, line.numbers, strict=True))
             return number_pairs if all(numbers_match(a, b) for a, b in number_pairs) else None
         parts = _split_at_ellipses(recorded)
-        places = _find_parts(parts, line, numbers_match)
+        places = find_in_order(
+            [len(part.skeleton) for part in parts],
+            len(line.skeleton),
+            lambda i, at: (
+                line.skeleton.startswith(parts[i].skeleton, at)
+                and numbers_fit(parts[i], line, at, numbers_match)
+            ),
+        )
         if places is None:
             return None
         return tuple(
@@ -312,29 +320,25 @@ def _split_at_ellipses(recorded: str) -> tuple[CanonicalText, ...]:
     return tuple(parts)
 
 
-def _find_parts(
-    parts: Sequence[CanonicalText], line: CanonicalText, numbers_match: SameNumber
+def find_in_order(
+    lengths: Sequence[int], total: int, fits: Callable[[int, int], bool]
 ) -> list[int] | None:
-    """Where the parts of a recorded line stand in the skeleton of a printed line, if they do."""
-    first, *inner, last = parts
-    stop = len(line.skeleton) - len(last.skeleton)
-    ends = line.skeleton.startswith(first.skeleton) and line.skeleton.endswith(last.skeleton)
-    if not (
-        ends
-        and numbers_fit(first, line, 0, numbers_match)
-        and numbers_fit(last, line, stop, numbers_match)
-    ):
+    """Where parts between ellipses stand, if they do.
+
+    The first stands at the start, the last at the end, each other one at the first place where it
+    fits. `lengths` are those of the parts; `fits(part, place)` says whether one stands at a place.
+    """
+    last, stop = len(lengths) - 1, total - lengths[-1]
+    if stop < 0 or not (fits(0, 0) and fits(last, stop)):
         return None
-    places = [0]
-    at = len(first.skeleton)
-    for part in inner:
-        place = line.skeleton.find(part.skeleton, at, stop)
-        while place >= 0 and not numbers_fit(part, line, place, numbers_match):
-            place = line.skeleton.find(part.skeleton, place + 1, stop)
-        if place < 0:
+    places, at = [0], lengths[0]
+    for part in range(1, last):
+        options = range(at, stop - lengths[part] + 1)
+        place = next((place for place in options if fits(part, place)), None)
+        if place is None:
             return None
         places.append(place)
-        at = place + len(part.skeleton)
+        at = place + lengths[part]
     return [*places, stop] if at <= stop else None
 
 

@@ -17,6 +17,7 @@ from msgspec import Struct
 from coursebuild.core.text.python_code import python_nodes
 
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+_SCOPES = (ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 
 class NotOneFileError(Exception):
@@ -135,15 +136,7 @@ def bound_name(alias: ast.alias) -> str:
 
 def bound_names(statement: ast.stmt) -> tuple[str, ...]:
     """The names that a statement binds, without those inside of functions and classes."""
-    match statement:
-        case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
-            return (statement.name,)
-        case ast.Import() | ast.ImportFrom():
-            if is_future(statement):
-                return ()
-            return tuple(map(bound_name, statement.names))
-        case _:
-            return tuple(sorted(_scope_names([statement])))
+    return () if is_future(statement) else tuple(sorted(_scope_names([statement])))
 
 
 def global_names(node: ast.AST, hidden: frozenset[str] = frozenset()) -> Iterator[ast.Name]:
@@ -192,9 +185,9 @@ def _scope_names(nodes: Iterable[ast.AST]) -> frozenset[str]:
             case ast.FunctionDef() | ast.AsyncFunctionDef() | ast.ClassDef():
                 names.add(node.name)
                 continue
-            case ast.Lambda() | ast.ListComp() | ast.SetComp() | ast.DictComp():
-                continue
-            case ast.GeneratorExp():
+            case (
+                ast.Lambda() | ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp()
+            ):
                 continue
             case ast.Import() | ast.ImportFrom():
                 names |= {*map(bound_name, node.names)}

@@ -12,7 +12,7 @@ import math
 import sys
 from collections.abc import Iterator
 
-from coursebuild.core.scripts.diff import quote
+from coursebuild.core.scripts.diff import limit_notes, quote
 from coursebuild.core.scripts.sensitivity import PERTURBATION, Sensitivity, round_to
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.numbers import only_number
@@ -49,9 +49,7 @@ def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
     if not warnings:
         return
     (span, label), *rest = warnings
-    notes = [Note(text, place) for place, text in rest[:_MAX_NOTES]]
-    if len(rest) > _MAX_NOTES:
-        notes.append(Note(f"and {len(rest) - _MAX_NOTES} more"))
+    notes = limit_notes([Note(text, place) for place, text in rest], _MAX_NOTES)
     if sensitivity.chaotic:
         notes.append(Note(f"its simulation is chaotic: {describe_growth(sensitivity)}"))
     yield diagnose(

@@ -16,14 +16,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache, cached_property
-from itertools import accumulate
+from itertools import accumulate, chain
 from typing import TypeAlias
 
 from msgspec import Struct
 
 from coursebuild.core.model import Filter, Recording, Table
 from coursebuild.core.model.lesson_record import Address
-from coursebuild.core.scripts.lines import MappedText, Side, masked, plain_text
+from coursebuild.core.scripts.lines import MappedText, Side, masked, plain_text, replace_ranges
 from coursebuild.core.scripts.table_cells import ColumnTitle, RowCell, table_rows
 from coursebuild.core.text.numbers import Number, as_printed, has_groups, scan
 from coursebuild.core.text.quantities import (
@@ -40,8 +40,8 @@ from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source, Span
 
 Locate: TypeAlias = Callable[[int, int], Span]
-_Words: TypeAlias = tuple[tuple[str, bool], ...]
-"""Words and numbers, each with whether it is a number."""
+_Words: TypeAlias = tuple[str, ...]
+"""Words without the signs around them, and numbers behind a `#`."""
 
 
 _IN_BRACKETS = regex(r"[(\[]([^()\[\]]+)[)\]]")
@@ -136,7 +136,7 @@ class PrintedPlace(Struct, frozen=True):
     @property
     def address(self) -> Address | None:
         """`None` where nothing tells their line from others, which have other numbers there."""
-        heading, words = self.output.heading(self.at), self.output.words(self.at)
+        heading, words = self.output.heading(self.at), self.output.words[self.at]
         for depth in range(-1, self.first + 1):
             name, names = self.output.names(self.at, depth)
             if names.count(name) == 1:
@@ -158,13 +158,13 @@ class PrintedText:
         self.lines = tuple(lines)
         self.labels = cache(self._read_labels)
         self.leads = cache(self._read_leads)
-        self._contexts = cache(self._read_contexts)
+        self.contexts = cache(self._read_contexts)
         self._headings: list[int] = []
         """The index of the heading of each line; -1 for none."""
         heading = -1
         for at, line in enumerate(self.lines):
             self._headings.append(heading)
-            words = self._words[at]
+            words = self.words[at]
             if any(map(str.isalpha, words)) and (not line.numbers or words.endswith(":")):
                 heading = at
 
@@ -204,7 +204,8 @@ class PrintedText:
     # --- what is printed with a number
 
     @cached_property
-    def _words(self) -> list[str]:
+    def words(self) -> list[str]:
+        """The words of each line, with `#` for numbers."""
         return [masked(line.text, line.is_grouped) for line in self.lines]
 
     @property
@@ -219,13 +220,13 @@ class PrintedText:
     @cached_property
     def _names_of_headings(self) -> dict[int, str]:
         places = sorted({*self._headings} - {-1})
-        counts = Counter(self._words[at] for at in places)
+        counts = Counter(self.words[at] for at in places)
         names = {-1: ""}
         for at in places:
-            words, outer = self._words[at], self._headings[at]
-            is_told = outer >= 0 and self._words[outer] != words and not self.lines[at].numbers
+            words, outer = self.words[at], self._headings[at]
+            is_told = outer >= 0 and self.words[outer] != words and not self.lines[at].numbers
             is_named = counts[words] > 1 and is_told
-            names[at] = f"{self._words[outer]} / {words}" if is_named else words
+            names[at] = f"{self.words[outer]} / {words}" if is_named else words
         return names
 
     def headings(self, at: int) -> str:
@@ -238,7 +239,7 @@ class PrintedText:
         if (title := self.lines[at].title(number)) is not None:
             return title.text
         first = heading = self._headings[at]
-        if heading < 0 or self._words[heading].endswith(":"):
+        if heading < 0 or self.words[heading].endswith(":"):
             return ""
         while first > max(0, heading - 2) and self._headings[first] == first - 1:
             first -= 1
@@ -281,20 +282,16 @@ class PrintedText:
     @cached_property
     def _by_words(self) -> dict[tuple[str, str], list[int]]:
         lines: dict[tuple[str, str], list[int]] = {}
-        for at, words in enumerate(self._words):
+        for at, words in enumerate(self.words):
             heading = self._headings[at]
-            names = {self.heading(at), self._words[heading] if heading >= 0 else ""}
+            names = {self.heading(at), self.words[heading] if heading >= 0 else ""}
             for name in names:  # records may hold the shorter one
                 lines.setdefault((name, words), []).append(at)
         return lines
 
-    def words(self, at: int) -> str:
-        """The words of a line, with `#` for numbers."""
-        return self._words[at]
-
     def names(self, at: int, depth: int) -> tuple[str, tuple[str, ...]]:
         """The name of a line, of so many of its numbers, and those of all lines of its words."""
-        siblings = self._by_words[self.heading(at), self._words[at]]
+        siblings = self._by_words[self.heading(at), self.words[at]]
         in_heading = len({self._numbers(self._headings[sibling]) for sibling in siblings}) > 1
         names = (self._name(sibling, depth, in_heading) for sibling in siblings)
         return self._name(at, depth, in_heading), tuple(names)
@@ -334,14 +331,15 @@ class PrintedText:
     def find_words(self, words: str, count: int) -> list[PrintedPlace]:
         """The numbers, `count` in a row, that have these words right before them, or as a title.
 
-        In the words `#` stands for any number; signs around them do not count.
+        In the words `#` stands for any number; signs around them do not count. What leaves words
+        out is read so only where no number has the words as they are.
         """
         sought = _split(words)
-        return [
-            place
-            for place in self.places(count)
-            if any(_ends_with(context, sought) for context in self._contexts(place.at, place.first))
-        ]
+        for kind in (0, 1):
+            contexts = ((p, self.contexts(p.at, p.first)[kind]) for p in self.places(count))
+            if matches := [p for p, some in contexts if any(_ends_with(c, sought) for c in some)]:
+                return matches
+        return []
 
     def places(self, count: int) -> Iterator[PrintedPlace]:
         """All runs of so many numbers of one line."""
@@ -361,82 +359,84 @@ class PrintedText:
         Where none do, those that tell them from the rivals; empty where that is impossible, too.
         """
         rivals = [*rivals]
-        words = self._words_among([*self.places(1), *rivals], place)
-        return words or (self._words_among(rivals, place) if rivals else "")
+        groups = filter(None, ([*self.places(1), *rivals], rivals))
+        return next(filter(None, (self._words_among(group, place) for group in groups)), "")
 
     def _words_among(self, places: Iterable[PrintedPlace], place: PrintedPlace) -> str:
         address = self, place.at, place.first
-        rivals = [rival for p in places if (rival := (p.output, p.at, p.first)) != address]
-        contexts = [context for o, line, first in rivals for context in o._contexts(line, first)]
+        rivals = {(p.output, p.at, p.first) for p in places} - {address}
+        outputs = dict.fromkeys((self, *(output for output, _, _ in rivals)))
         in_heading = len(_split(self.heading(place.at)))
         choices: list[tuple[bool, bool, int, str]] = []
-        for context in self._contexts(place.at, place.first):
-            numbers = [at for at, (_, is_number) in enumerate(context) if is_number]
-            plain_words = ["#" if is_number else word for word, is_number in context]
+
+        def is_alone(text: str) -> bool:
+            matches = (p for output in outputs for p in output.find_words(text, 1))
+            addresses = {(p.output, p.at, p.first) for p in matches}
+            return address in addresses and rivals.isdisjoint(addresses)
+
+        for context in chain(*self.contexts(place.at, place.first)):
+            numbers = [at for at, word in enumerate(context) if word.startswith("#")]
+            plain_words = ["#" if at in numbers else word for at, word in enumerate(context)]
             row_words = [*plain_words]
             for at in [at for at in numbers if at >= in_heading][:1]:  # it may name its line
-                row_words[at] = context[at][0]
+                row_words[at] = context[at].removeprefix("#") or "#"
             for words in (plain_words, row_words):
                 for start in range(len(words) - 1, -1, -1):
                     is_unit = start - 1 in numbers and bool(unit_behind(words[start]))
                     text = " ".join(words[start:])
-                    sought = _split(text)
                     if words[start] == "#" or is_unit:
                         continue
                     if _FORBIDDEN.search(text):
                         break
-                    if not any(_ends_with(rival, sought) for rival in contexts):
+                    if is_alone(text):
                         is_result = words is row_words  # a number may be another tomorrow
                         choices.append((is_result, "#" in text, len(words) - start, text))
                         break
         if choices:
             return min(choices, key=lambda choice: choice[:3])[3]
         lead = self.leads(place.at)[place.first] or self.title(place.at, place.numbers[0])
-        label = " ".join(word for word, _ in _split(lead))
-        is_shared = any(o.is_called(line, first, label) for o, line, first in rivals)
+        label = " ".join(word.removeprefix("#") for word in _split(lead))
+        is_shared = any(output.is_called(line, first, label) for output, line, first in rivals)
         return "" if is_shared or _FORBIDDEN.search(label) else label
 
-    def _read_contexts(self, at: int, first: int) -> list[_Words]:
+    def _read_contexts(self, at: int, first: int) -> tuple[list[_Words], list[_Words]]:
         """All words before a number, also the heading's, and again with the title of the column.
 
-        The label may stand right behind what its row begins with, and without its unit.
+        Then with the label right behind what its row begins with. It may stand without its unit.
         """
         line = self.lines[at]
         number = line.numbers[first]
         heading, title = self.heading(at), self.title(at, number)
         before = f"{heading} {line.text[: number.start]}"
-        texts = [before, f"{before} {title}"] if title else [before]
+        whole, abridged = [before, f"{before} {title}"] if title else [before], list[str]()
         if first > 0:
             end = line.numbers[0].end + len(unit_behind(line.text, line.numbers[0].end).text) + 1
             above = self.heading(self._headings[at]) if line.title(number) is None else ""
             label = title or self.leads(at)[first]
-            texts += (f"{words} {line.text[:end]} {label}" for words in (heading, above))
+            abridged += (f"{words} {line.text[:end]} {label}" for words in (heading, above))
             if title:
-                texts += (f"{above} {title}", f"{line.text[: line.numbers[0].start]} {title}")
-        bare_title, _ = name_of_header(title)
-        bare_texts = [_UNIT_IN_BRACKETS.sub("", text) for text in texts]
-        bare_texts += (text.removesuffix(title) + bare_title for text in texts if title)
-        return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
+                abridged += (f"{above} {title}", f"{line.text[: line.numbers[0].start]} {title}")
+
+        def read(texts: Sequence[str]) -> list[_Words]:
+            bare_texts = [_UNIT_IN_BRACKETS.sub("", text) for text in texts]
+            bare_title = name_of_header(title)[0]
+            bare_texts += (text.removesuffix(title) + bare_title for text in texts if title)
+            return list(dict.fromkeys(map(_split, (*texts, *bare_texts))))
+
+        return read(whole), read(abridged)
 
 
 def _split(text: str) -> _Words:
-    parts: list[tuple[str, bool]] = []
-    at = 0
-    for number in scan(text):
-        parts += ((word, False) for word in text[at : number.start].split())
-        parts.append((plain_text(number.text), True))
-        at = number.end
-    parts += ((word, False) for word in text[at:].split())
-    bare = ((w if is_number else w.strip('=:,;()[]|<>~/"'), is_number) for w, is_number in parts)
-    return tuple((word, is_number) for word, is_number in bare if word)
+    places = ((n.start, n.end, f" #{plain_text(n.text)} ") for n in scan(text))
+    words = (word.strip('=:,;()[]|<>~/"') for word in replace_ranges(text, places).split())
+    return tuple(filter(None, words))
 
 
 def _ends_with(context: _Words, sought: _Words) -> bool:
     """Whether words end with others, in which `#` is any number."""
-    pairs = zip(reversed(context), reversed(sought), strict=False)
     return 0 < len(sought) <= len(context) and all(
-        word == sought_word or (sought_word == "#" and is_number)
-        for (word, is_number), (sought_word, _) in pairs
+        word == sought_word or (sought_word == "#" and word.startswith("#"))
+        for word, sought_word in zip(reversed(context), reversed(sought), strict=False)
     )
 
 

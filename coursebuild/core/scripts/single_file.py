@@ -12,9 +12,7 @@ from __future__ import annotations
 
 import ast
 import builtins
-import re
-import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TypeAlias
 
 from msgspec import Struct
@@ -115,8 +113,10 @@ class _File:
         own_imports = "\n".join(
             lines[n - 1] for n in range(top + 1, end + 1) if n not in course_lines
         )
-        imports = _merge_imports(own_imports, self._imports)
-        parts = ["\n".join(opening), imports, *sections, "\n".join(lines[end:])]
+        new_imports = {line for line in self._imports if "__future__" not in line}
+        new_imports -= {*own_imports.split("\n")}
+        imports = (own_imports, "\n".join(sorted(new_imports)))
+        parts = ["\n".join(opening), *imports, *sections, "\n".join(lines[end:])]
         text, last = "", ""
         for part in filter(None, (part.strip("\n") for part in parts)):
             defines = part.startswith(("def ", "class ", "@", "# --- ")) or "\ndef " in last
@@ -353,31 +353,6 @@ class _File:
                 yield self._modules[name]
 
 
-def _merge_imports(text: str, new_imports: Iterable[str]) -> str:
-    """The script's imports and others: those of Python's own modules in the first group."""
-    groups = [group.split("\n") for group in re.split(r"\n{2,}", text.strip("\n")) if group]
-    present = {line for group in groups for line in group}
-    lines = [line for line in new_imports if "__future__" not in line and line not in present]
-    for is_own, at in ((True, 0), (False, len(groups))):
-        new_lines = [line for line in lines if _is_standard(line) == is_own]
-        nearest = groups[at and -1] if groups else []
-        if nearest and all(_is_plain(line) and _is_standard(line) == is_own for line in nearest):
-            nearest.extend(new_lines)
-            nearest.sort(key=_import_order)
-        elif new_lines:
-            groups.insert(at, sorted(new_lines, key=_import_order))
-    return "\n\n".join("\n".join(group) for group in groups)
-
-
-def _is_plain(line: str) -> bool:
-    """Whether it is an import on a line of its own."""
-    return line.startswith(("import ", "from ")) and "(" not in line
-
-
-def _import_order(line: str) -> tuple[bool, str]:
-    return line.startswith("from "), line.lower()
-
-
 def _dictionary(values: Mapping[str, str]) -> str:
     rows = "".join(f'    "{key}": {value},\n' for key, value in sorted(values.items()))
     return f"{{\n{rows}}}"
@@ -388,8 +363,3 @@ def _literal(text: str) -> str:
     if text.endswith('"') or any(part in text for part in ('"""', "\r", "\0", "\\")):
         return repr(text)
     return f'"""\\\n{text}"""'
-
-
-def _is_standard(line: str) -> bool:
-    words = line.split()
-    return len(words) > 1 and words[1].partition(".")[0] in sys.stdlib_module_names

@@ -5,6 +5,7 @@ By the words and units of a title printed numbers are named.
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -23,6 +24,7 @@ from coursebuild.core.scripts.lines import (
     numbers_fit,
     same_number,
 )
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.macros import COMMAND
 from coursebuild.core.text.numbers import (
     Number,
@@ -62,16 +64,6 @@ class LineLayout(NamedTuple):
     parts: tuple[str, ...]
     """Before, between and after the cells."""
     columns: tuple[int, ...]
-
-
-class Fit(NamedTuple):
-    """A way to find a row in a line: where its cells begin there."""
-
-    line: int
-    places: tuple[int, ...]
-    layout: LineLayout
-    is_right: bool
-    """Whether its numbers match, too."""
 
 
 class RowCell(Struct, frozen=True):
@@ -175,7 +167,9 @@ def row_values(
     return tuple(shown_values((path, recording.script, before, row_text(row)) for row in rows))
 
 
-def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
+def cell_text(
+    cell: model.Cell, filters: Iterable[model.Filter], *, formula_sign: str = ""
+) -> MappedText:
     """The plain text of a cell, filtered; origins are offsets in the lesson's source.
 
     Marks of Markdown are gone, minus signs are hyphens, runs of white space are one space. A
@@ -197,7 +191,8 @@ def cell_text(cell: model.Cell, filters: Iterable[model.Filter]) -> MappedText:
             case model.NumberBinding():
                 text, span = inline.text, inline.text_span
             case model.Math():
-                stretches.append(_formula_text(inline.tex))
+                sign = MappedText.substitute_for(span.start, span.start, formula_sign)
+                stretches += (sign, _formula_text(inline.tex), sign)
                 continue
             case model.Image():
                 text = inline.alt
@@ -246,24 +241,16 @@ def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
     return new.text
 
 
-def _is_word(character: str) -> bool:
-    return character.isalnum() or character == "_"
-
-
 def _find_places(
     cell: CanonicalText, line: CanonicalText, start: int, numbers_match: SameNumber
 ) -> Iterator[int]:
     """Offsets from `start` on at which a cell stands in a line, whole words and numbers only."""
-    text, cell_text = line.skeleton, cell.skeleton
-    place = text.find(cell_text, start)
-    while place >= 0:
-        end = place + len(cell_text)
-        splits_word = (place > 0 and _is_word(cell_text[0]) and _is_word(text[place - 1])) or (
-            end < len(text) and _is_word(cell_text[-1]) and _is_word(text[end])
-        )
-        if not splits_word and numbers_fit(cell, line, place, numbers_match):
-            yield place
-        place = text.find(cell_text, place + 1)
+    text = cell.skeleton
+    before = r"(?<!\w)" if _WORD_CHARACTER.match(text[0]) else ""
+    after = r"(?!\w)" if _WORD_CHARACTER.match(text[-1]) else ""
+    pattern = re.compile(f"(?={before}{re.escape(text)}{after})")
+    places = (match.start() for match in pattern.finditer(line.skeleton, start))
+    return (place for place in places if numbers_fit(cell, line, place, numbers_match))
 
 
 def find_rows(
@@ -279,6 +266,7 @@ def find_rows(
             yield (place, *rest)
 
 
+_WORD_CHARACTER = regex(r"\w")
 _WORD = regex(r"[^\W_]+")
 _PARTS = regex(r"[,;|]|[:=](?=.*\w)")
 """Between the parts of what stands before a number."""
@@ -287,6 +275,14 @@ HEADER_HELP = (
     "write the unit that is printed, or put the columns in order; where a unit is not meant, mark "
     'it: `` `s`{given="…"} ``'
 )
+ROW_HELP = "rows, and the cells of each, stand in the order in which they are printed"
+
+
+def refusal(
+    span: Span, message: str, help: str = "bring the row up to date by hand", label: str = ""
+) -> Diagnostic:
+    """An output that cannot be brought up to date."""
+    return diagnose("output-not-updatable", span, message, label=label, help=help)
 
 
 class ColumnTitle(Struct, frozen=True):
@@ -304,19 +300,20 @@ class ColumnTitle(Struct, frozen=True):
     @classmethod
     def of(cls, cell: model.Cell) -> ColumnTitle:
         """The words and the unit of a cell of a header."""
-        title = cell_text(cell, ())
+        title = cell_text(cell, (), formula_sign="$")
         unit = unit_of_header(title.text)
         inlines = model.walk_inlines(cell.children)
         bindings = (i for i in inlines if isinstance(i, model.NumberBinding))
         excepted_text = " ".join(i.text for i in bindings if i.source is not None)
         name, at = name_of_header(title.text)
+        name, text = (part.replace("$", "") for part in (name, title.text))
         unit_span = cell.span
         if at >= 0:
             unit_span = Span(cell.span.source, *title.origin(at, at + len(unit.text)))
         words = words_of(name) - words_of(excepted_text)
         if excepted_text:
             name, unit = "", NO_UNIT
-        return cls(cell.span, title.text, name, words, unit, unit_span)
+        return cls(cell.span, text, name, words, unit, unit_span)
 
     def has(self, word: str) -> bool:
         """Whether a printed word is one of the title, or a mere sign."""

@@ -28,6 +28,7 @@ from coursebuild.core.model.results import Change, DriftKind
 from coursebuild.core.scripts.align import MATCH, pair
 from coursebuild.core.scripts.lines import (
     MARK,
+    CanonicalText,
     Side,
     always_match,
     canonicalize,
@@ -36,7 +37,6 @@ from coursebuild.core.scripts.lines import (
 from coursebuild.core.scripts.printed_text import PrintedLine, PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import (
     ColumnTitle,
-    Fit,
     LineLayout,
     PrintedName,
     RowCell,
@@ -50,7 +50,7 @@ from coursebuild.core.scripts.table_cells import (
     words_of,
 )
 from coursebuild.core.text.numbers import Number, has_groups, relative_error, scan
-from coursebuild.core.text.quantities import NO_UNIT, UnitText, are_different, title_of_column
+from coursebuild.core.text.quantities import UnitText, are_different, title_of_column
 from coursebuild.core.text.source import Span
 
 _ALIKE_WEIGHT = 6
@@ -61,14 +61,15 @@ RowAddresses = tuple[tuple[Address, ...], ...]
 
 
 class RowMatch(Struct, frozen=True):
-    """A row of a table and the line that it stands in; `line` is -1 where there is none.
-
-    `pairs` holds each of its numbers with its cell and the printed one.
-    """
+    """A row of a table and the line that it may stand in; `line` is -1 where there is none."""
 
     row: tuple[RowCell, ...]
     line: int = -1
+    layout: LineLayout = LineLayout("", (), ())
     pairs: tuple[tuple[RowCell, Number, Number], ...] = ()
+    """Each of its numbers with its cell and the printed one."""
+    is_right: bool = False
+    """Whether these match, with their units."""
     certain: bool = True
     """Whether no other line can be meant."""
 
@@ -100,14 +101,14 @@ class TableMatcher:
         self.titles = [ColumnTitle.of(cell) for cell in table.header]
         self._addresses = addresses if len(addresses) == len(self.rows) else [()] * len(self.rows)
         self._numbers_match = partial(cell_matches, comparison=comparison)
-        self.lines = list(map(plain_text, printed_lines))
-        self.text, self._text_with_gaps = (
-            PrintedText(PrintedLine(line, None, is_grouped) for line in lines)
-            for lines in (self.lines, printed_lines)
-        )
-        self._canonical_line = cache(
-            lambda line: canonicalize(self.lines[line], is_grouped=is_grouped)
-        )
+        self.lines = [line.replace("\u2212", "-") for line in printed_lines]
+        self.text = PrintedText(PrintedLine(line, None, is_grouped) for line in self.lines)
+
+        def read(at: int) -> CanonicalText:
+            line = canonicalize(self.lines[at], is_grouped=is_grouped)
+            return replace(line, skeleton=plain_text(line.skeleton))
+
+        self._canonical_line = cache(read)
         self._fits_of_row = cache(self._fits_at_address)
 
     def match(self) -> TableMatch:
@@ -119,8 +120,8 @@ class TableMatcher:
         rivals = tuple(dict.fromkeys(map(self._describe, layouts))) if layouts[1:] else ()
         if rivals and not is_right:
             nearest = (self._nearest_fit(row, layouts) for row in range(len(self.rows)))
-            rows = (self._row_match(row, fit, is_certain=False) for row, fit in enumerate(nearest))
-            return TableMatch(tuple(rows), rivals)
+            rows = tuple(replace(fit, certain=False) for fit in nearest)
+            return TableMatch(rows, rivals)
         matches = tuple(self._match_rows(layouts[0]))
         return TableMatch(matches, rivals, self._count_lines(layouts[0]))
 
@@ -165,9 +166,9 @@ class TableMatcher:
 
     def _describe(self, layout: LineLayout) -> str:
         line = self.lines[self._fits_in(0, layout)[0].line]
-        return f"{layout.heading} / {line}" if layout.heading else line
+        return plain_text(f"{layout.heading} / {line}" if layout.heading else line)
 
-    def _fits_in(self, row: int, layout: LineLayout) -> list[Fit]:
+    def _fits_in(self, row: int, layout: LineLayout) -> list[RowMatch]:
         return [fit for fit in self._fits_of_row(row) if fit.layout == layout]
 
     def _right_rows(self, layout: LineLayout) -> int:
@@ -177,7 +178,7 @@ class TableMatcher:
     def _score(self, layout: LineLayout) -> tuple[float, ...]:
         """How well a layout suits the table, in several respects."""
         fit = self._fits_in(0, layout)[0]
-        pairs, numbers = self._pairs(0, fit), self.text.lines[fit.line].numbers
+        pairs, numbers = fit.pairs, self.text.lines[fit.line].numbers
         names = self._names(fit.line)
         labels = [name.text for name in names]
         places = [(cell.column, numbers.index(n)) for cell, _, n in pairs if n in numbers]
@@ -191,16 +192,13 @@ class TableMatcher:
 
         Wide gaps tell the titles above them apart.
         """
-        text = self._text_with_gaps
-        if len(text.lines[at].numbers) != len(self.text.lines[at].numbers):
-            text = self.text
         titles = [squeeze(title.text) for title in self.titles if scan(title.text)]
-        above = [line.text for line in text.lines[:at] if titles]
+        above = self.lines[:at] if titles else []
         above = [line for line in above if all(title in squeeze(line) for title in titles)]
         header = "".join(above[-1:])  # such as `25%  75%`, which has the look of a row
         cells = (re.escape(c.mapped.text) for c in self.rows[0] if not c.canonical.numbers)
         cell_pattern = re.compile(rf"(?<!\w)(?:{'|'.join(cells) or '(?!)'})(?!\w)")
-        row, numbers = text.lines[at].text, text.lines[at].numbers
+        text, row, numbers = self.text, self.lines[at], self.text.lines[at].numbers
         names = [text.title(at, n) or title_of_column(row, n.start, header) for n in numbers]
         return [
             PrintedName(cell_pattern.sub(",", lead), title, n.text, text.unit(at, n))
@@ -221,7 +219,7 @@ class TableMatcher:
 
     # --- rows
 
-    def _fits_at_address(self, row: int) -> tuple[Fit, ...]:
+    def _fits_at_address(self, row: int) -> tuple[RowMatch, ...]:
         """The way to find a row at its addresses; where they are gone, those that are right."""
         fits, addresses = tuple(self._find_fits(row)), self._addresses[row]
         if not addresses:
@@ -230,7 +228,7 @@ class TableMatcher:
         at = [(place.at, place.numbers[0]) for place in places if place is not None]
         for fit in fits:
             numbers = self.text.lines[fit.line].numbers
-            if at == [(fit.line, n) for _, _, n in self._pairs(row, fit) if n in numbers]:
+            if at == [(fit.line, n) for _, _, n in fit.pairs if n in numbers]:
                 return (fit,)
         return tuple(fit for fit in fits if fit.is_right)
 
@@ -242,73 +240,57 @@ class TableMatcher:
         ]
         lines = sorted({fit.line for fits_of_row in fits for fit in fits_of_row})
 
-        def weight(row: int, at: int) -> int:
+        def best(row: int, at: int) -> RowMatch | None:
             fits_there = [fit for fit in fits[row] if fit.line == lines[at]]
-            if any(fit.is_right for fit in fits_there):
-                return MATCH
-            return max((self._weight(row, fit) for fit in fits_there), default=0)
+            return max(fits_there, key=self._weight, default=None)
+
+        def weight(row: int, at: int) -> int:
+            fit = best(row, at)
+            return 0 if fit is None else self._weight(fit)
 
         texts = list(map(row_text, self.rows))
-        line_of_row = dict(pair(texts, [self.lines[line] for line in lines], weight))
-        matches: list[Fit | None] = []
-        for row in range(len(self.rows)):
-            at = line_of_row.get(row)
-            fits_there = [fit for fit in fits[row] if at is not None and fit.line == lines[at]]
-            best = max(
-                fits_there, key=lambda fit: (fit.is_right, self._weight(row, fit)), default=None
-            )
-            matches.append(best)
+        places = dict(pair(texts, [self.lines[line] for line in lines], weight))
+        matches = [best(row, places[row]) if row in places else None for row in range(len(fits))]
         are_all = layout is not None and len(lines) == len(self.rows)
         are_only = [len({fit.line for fit in fits_of_row}) == 1 for fits_of_row in fits]
         are_named = all(
-            fit is not None and (are_only[row] or self._is_named(row, fit, fits[row]))
+            fit is not None and (are_only[row] or self._is_named(fit, fits[row]))
             for row, fit in enumerate(matches)
         )
         for row, fit in enumerate(matches):
-            is_certain = fit is None or fit.is_right or are_only[row] or are_all or are_named
-            yield self._row_match(row, fit, is_certain=is_certain)
+            if fit is None:
+                yield RowMatch(self.rows[row])
+            else:
+                is_certain = fit.is_right or are_only[row] or are_all or are_named
+                yield replace(fit, certain=is_certain)
 
-    def _is_named(self, row: int, fit: Fit, fits: Iterable[Fit]) -> bool:
+    def _is_named(self, fit: RowMatch, fits: Iterable[RowMatch]) -> bool:
         """Whether the first number of a row is that of this line and of no other."""
         lines = {
             candidate.line
             for candidate in fits
-            for _, old, new in self._pairs(row, candidate)[:1]
+            for _, old, new in candidate.pairs[:1]
             if self._numbers_match(old, new)
         }
         return lines == {fit.line}
 
-    def _nearest_fit(self, row: int, layouts: Sequence[LineLayout]) -> Fit:
+    def _nearest_fit(self, row: int, layouts: Sequence[LineLayout]) -> RowMatch:
         """The way in which the numbers of a row are nearest to the printed ones."""
 
-        def distance(fit: Fit) -> float:
-            errors = [relative_error(a.value, b.value) for _, a, b in self._pairs(row, fit)]
+        def distance(fit: RowMatch) -> float:
+            errors = [relative_error(a.value, b.value) for _, a, b in fit.pairs]
             return sum(1.0 if error is None else min(1.0, float(error)) for error in errors)
 
         return min((fit for layout in layouts for fit in self._fits_in(row, layout)), key=distance)
 
-    def _weight(self, row: int, fit: Fit) -> int:
+    def _weight(self, fit: RowMatch) -> int:
         """Less for a row more of whose numbers differ."""
-        pairs = self._pairs(row, fit)
-        count = sum(self._numbers_match(old, new) for _, old, new in pairs)
-        return 2 + (_ALIKE_WEIGHT - 2) * count // max(1, len(pairs))
+        if fit.is_right:
+            return MATCH
+        count = sum(self._numbers_match(old, new) for _, old, new in fit.pairs)
+        return 2 + (_ALIKE_WEIGHT - 2) * count // max(1, len(fit.pairs))
 
-    def _row_match(self, row: int, fit: Fit | None, *, is_certain: bool = True) -> RowMatch:
-        if fit is None:
-            return RowMatch(self.rows[row])
-        return RowMatch(self.rows[row], fit.line, self._pairs(row, fit), is_certain)
-
-    def _pairs(self, row: int, fit: Fit) -> tuple[tuple[RowCell, Number, Number], ...]:
-        canonical = self._canonical_line(fit.line)
-        return tuple(
-            (cell, old, new)
-            for cell, place in zip(self.rows[row], fit.places, strict=True)
-            for old, new in zip(
-                cell.canonical.numbers, canonical.numbers_at(cell.canonical, place), strict=True
-            )
-        )
-
-    def _find_fits(self, row: int) -> Iterator[Fit]:
+    def _find_fits(self, row: int) -> Iterator[RowMatch]:
         """The ways to find a row, those first in which its numbers match."""
         cells = self.rows[row]
         for line in range(len(self.lines)):
@@ -317,17 +299,19 @@ class TableMatcher:
             for way in islice(find_rows(cells, canonical, 0, always_match), _PLACES):
                 places.setdefault(way, False)
             for way, is_right in places.items():
-                parts, at = [], 0
+                parts, pairs, at = [], list[tuple[RowCell, Number, Number]](), 0
                 for cell, place in zip(cells, way, strict=True):
+                    numbers = canonical.numbers_at(cell.canonical, place)
+                    matches = zip(cell.canonical.numbers, numbers, strict=True)
+                    pairs += ((cell, old, new) for old, new in matches)
                     parts.append(canonical.skeleton[at:place])
                     at = place + len(cell.canonical.skeleton)
                 parts.append(canonical.skeleton[at:])
                 columns = tuple(cell.column for cell in cells)
                 layout = LineLayout(self.text.heading(line), tuple(parts), columns)
-                fit = Fit(line, way, layout, is_right)
-                if is_right and any(cell.unit for cell in cells):
-                    is_right = not any(self.unit_changes(self._row_match(row, fit)))
-                yield fit._replace(is_right=is_right)
+                match = RowMatch(cells, line, layout, tuple(pairs))
+                is_right = is_right and not any(self.unit_changes(match))
+                yield replace(match, is_right=is_right)
 
     # --- the header
 
@@ -352,15 +336,7 @@ class TableMatcher:
         """The cells of a row that have units, with those that are printed."""
         pairs = {cell.column: (cell, new) for cell, _, new in match.pairs if cell.unit}
         for cell, new in pairs.values():  # with its last number
-            yield cell, self._unit(match.line, new)
-
-    def _unit(self, at: int, number: Number) -> UnitText:
-        """The unit that is printed with a number; wide gaps tell the titles above it apart."""
-        numbers, with_gaps = (text.lines[at].numbers for text in (self.text, self._text_with_gaps))
-        unit = NO_UNIT
-        if len(numbers) == len(with_gaps) and number in numbers:
-            unit = self._text_with_gaps.unit(at, with_gaps[numbers.index(number)])
-        return unit or self.text.unit(at, number)
+            yield cell, self.text.unit(match.line, new)
 
     def misplaced_titles(self, match: TableMatch) -> Iterator[tuple[ColumnTitle, str, bool]]:
         """The titles of other numbers, each with what is printed, and whether it is certain."""
@@ -401,7 +377,7 @@ class TableMatcher:
         units: dict[int, list[UnitText]] = {}
         for row in match.rows:
             for cell, _, number in row.pairs:
-                units.setdefault(cell.column, []).append(self._unit(row.line, number))
+                units.setdefault(cell.column, []).append(self.text.unit(row.line, number))
         return units
 
 

@@ -83,7 +83,12 @@ _BEHIND_COMMA = regex(r"[^\W\d_]{2}|.*[/^²³°A-Z].*|[a-z]+s")
 _SOLIDUS = regex(r"\s*/\s*(?P<unit>\([^()]*\)|[^/=:]+)\Z")
 _DENOMINATOR = regex(r"(?<=\w/)\([^()]*\)")
 """As in `c in J/(g K)`, a part of a unit and not the unit in brackets."""
-_BEFORE_UNIT = regex(r"[\s/(\[,]+(?:in\s+)?\Z")
+_SYMBOL_OVER = regex(
+    r"\$(?:(?!\\(?:mathrm|text))[^$/])+"
+    r"(?:\$\s*/\s*(?!\s|\$(?!\\(?:mathrm|text)))|/\s*\\(?:mathrm|text))"
+)
+"""`$T$ / s`: what is upright is a unit, and what is not is none, where `T / s` may be one."""
+_BEFORE_UNIT = regex(r"[\s/(\[,]+(?:in\s+)?(?:\\(?:mathrm|text)\s*\{?)?\Z")
 _IN_WORDS = regex(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
 _SYMBOL = regex(r"\w{1,2}|\\[a-z]+")
 _TO_NUMBER = regex(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")
@@ -246,6 +251,7 @@ def numbers_of_quantities(text: str, numbers: Iterable[Number]) -> tuple[Number,
 
 def unit_of_header(text: str) -> UnitText:
     """The unit in a label or the header of a column: `τ (min)`, `v [m/s]`, `t / s`, `time in s`."""
+    is_symbol = _SYMBOL_OVER.match(text) is not None
     text = plain_unit(text[-2 * _REACH :])
     text = _DENOMINATOR.sub(lambda match: match[0].replace(" ", "·"), text)
     bracket = _BRACKET_WITH_WORDS.search(text) or _BRACKET.search(text)
@@ -267,9 +273,9 @@ def unit_of_header(text: str) -> UnitText:
         unit = read_unit(in_words["unit"])  # `F in N`, but not `change in V`
         is_certain = len(unit.text) > 1 or _SYMBOL.fullmatch(in_words["symbol"]) is not None
     elif quotient is not None:
-        unit, tail = read_unit(quotient["unit"]), text.split()[-1]
-        is_unit_itself = find_units(text) or ("/" in tail and find_units(tail))  # `at 200 rad/s`
-        is_certain = not is_unit_itself and unit.text not in _SECOND_READINGS
+        unit = read_unit(quotient["unit"])
+        is_unit_itself = find_units(text) or ("/" in last and find_units(last))  # `at 200 rad/s`
+        is_certain = is_symbol or not (is_unit_itself or unit.text in _SECOND_READINGS)
     else:
         return NO_UNIT
     is_certain &= not is_name(unit.text) and not (unit.text == "min" and _has_maximum(text))
@@ -284,15 +290,13 @@ def name_of_header(text: str) -> tuple[str, int]:
     at = max((match.start() for match in re.finditer(pattern, whole)), default=whole.rfind(unit))
     if not unit or at <= 0:
         return text, at if unit else -1
-    words_behind = text[at + len(unit) :].lstrip(")] ")
+    words_behind = text[at + len(unit) :].lstrip(")]}$ ")
     return " ".join(filter(None, (_BEFORE_UNIT.sub("", text[:at]), words_behind))), at
 
 
 def unit_of_label(before: str) -> UnitText:
     """The unit in the label that ends right before a number, or the list that it stands in."""
-    before = before[-_REACH:]
-    gap = _TO_NUMBER.search(before)
-    return NO_UNIT if gap is None else unit_of_header(before[: gap.start()])
+    return unit_of_header(_TO_NUMBER.sub("", before[-_REACH:], count=1))
 
 
 def unit_of_printed(line: str, number: Number, above: Sequence[str]) -> UnitText:

@@ -260,11 +260,12 @@ def find_dependents(text: str, printed: str, *documents: Document) -> list[tuple
     lesson = document(text)
     runs = [make_run(printed)]
     verdicts = verify(course(lesson, *documents), runs)
-    printed_now = PrintedOutputs(verdicts, runs)
     return [
         (dependent.binding.text, dependent.change.recorded, dependent.change.printed)
         for verdict in verdicts
-        for dependent in dependent_bindings(verdict, [lesson, *documents], printed_now)
+        for dependent in dependent_bindings(
+            verdict, [lesson, *documents], PrintedOutputs(verdicts, runs), {}
+        )
     ]
 
 

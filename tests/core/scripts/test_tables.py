@@ -338,4 +338,4 @@ def test_thousands_of_a_table_are_one_number_with_one_address() -> None:
     rows = "| 30 | 1,149 | 0.125 25 |\n| 60 | 152\u202f034 | 3 |"
     text = PrintedText.of_recording(table(EDITED_HEAD + rows))
     assert text.numbers == (("30", "1,149", "0.12525"), ("60", "152,034", "3"))
-    assert text.words(0) == text.words(1) == "# # #"
+    assert text.words[0] == text.words[1] == "# # #"
