@@ -90,11 +90,7 @@ def check(
         if shard is None:
             checked_course.write_records()
             remarks = remarks_on_proofs(
-                course,
-                options.store,
-                verification,
-                checked_course.documents,
-                is_green=report.summary.ok,
+                course, options.store, verification, checked_course.documents, report
             )
         part = "" if shard is None else str(shard)
         return replace(report, remarks=remarks, sensitivity=sensitivities, part=part)
