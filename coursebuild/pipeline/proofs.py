@@ -157,8 +157,8 @@ def find_losses(
                 break
 
 
-def _identity(proof: Proof) -> tuple[Kind, str, str]:
-    return proof.kind, proof.text, proof.script
+def _identity(proof: Proof) -> tuple[Kind, str, str, str]:
+    return proof.kind, proof.text, proof.script, proof.label
 
 
 def _of_document(document: Document) -> Iterator[ProvedText]:

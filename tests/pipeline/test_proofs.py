@@ -90,7 +90,7 @@ def test_a_table_without_its_caption_is_told(make: Make) -> None:
 
 @pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["links"])
 def test_a_link_that_became_text_is_told(make: Make, old: str, new: str, remark: str) -> None:
-    lesson = "## Fall\n\nAs [there](#fall).\n"
+    lesson = "## Fall\n\nAs [there](#fall), not [so](#fall).\n"
     assert_told(make, lesson, old, new, remark)
 
 
