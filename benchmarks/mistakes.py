@@ -22,8 +22,10 @@ compared, besides the map and models; what a change of these breaks elsewhere is
 Nothing excuses a silence: which slips could not be known either, a reader of the list decides.
 Claims are what says something that could be tried. None are a formula without a relation, as `$m$`,
 which names something and says nothing of it; commands, and what they printed, in blocks that are
-only shown; and docstrings, comments and sources in words (`{given="ISO 80000-3"}`). Relations
-between letters alone, as `$F = ma$`, have a row of their own: another one may be meant as well.
+only shown; docstrings, comments and sources in words (`{given="ISO 80000-3"}`); and addresses of
+others, where nothing is looked up. A formula is one if numbers stand on both sides of a relation,
+or a letter in it has a value in its text: only then there is something to compute. All others, as
+`$F = ma$` and `$p = 1$`, have a row of their own, since another one may be meant as well.
 Beside the silence stand the false alarms that it was bought with: those of `corpus.py --record`.
 """
 
@@ -77,7 +79,7 @@ CLAIMS = frozenset(
     )
 )
 """Kinds of changes of what the course claims."""
-RELATIONS = "relations between letters"
+RELATIONS = "relations without values"
 """A kind of its own; all others are of prose and its marks."""
 RESULT = Path(__file__).parent / "corpus_result.json"
 """What `corpus.py --record` writes."""

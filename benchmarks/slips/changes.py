@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
 
 from msgspec import Struct
 
@@ -46,6 +47,10 @@ _RELATION = re.compile(
 )
 _SOURCE = re.compile(r'(?<=given=")(?!lab\b|lesson:|#|[\w.-]+/)[^"]+')
 """A source in words, as `ISO 80000-3`, with which nothing is compared."""
+_VALUE = re.compile(
+    r"\$(?P<letter>[^$=]+)(?:=[^$]*\$[ ]?\{(?:symbol|given)|\$[ ]?\{(?:symbol=[^{}]*)?value=)"
+)
+"""A letter that gets a value."""
 _UNIT = re.compile(r"\\(?:begin|end|mathrm|operatorname|text)\s*(?:\{[^{}]*\}|\w)")
 _SIGN = re.compile(r"\\([A-Za-z]+)|[A-Za-z]")
 _LETTERS = frozenset(
@@ -65,7 +70,7 @@ _PLACES = {
     "link": "links",
     "code": "inline code",
     "formula": "formulas",
-    "relation": "relations between letters",
+    "relation": "relations without values",
     "symbols": "symbols",
     "heading": "heading marks",
     "emphasis": "emphasis marks",
@@ -177,11 +182,14 @@ def parts(path: str, text: str) -> list[Part]:
 
 
 def _prose_parts(text: str, start: int, end: int) -> Iterator[Part]:
+    letters = {value["letter"].strip() for value in _VALUE.finditer(text)}
     for match in _INLINE.finditer(text, start, end):
         for name, value in match.groupdict().items():
             at, stop = match.span(name)
             if name == "formula" and value:
-                name = _kind_of_formula(value)
+                name = _kind_of_formula(value, letters)
+            elif name == "link" and value and "://" in value:
+                name = "words"
             elif words := _SOURCE.search(text, at, stop):
                 yield Part(name, at, words.start())
                 yield Part("words", *words.span())
@@ -190,13 +198,14 @@ def _prose_parts(text: str, start: int, end: int) -> Iterator[Part]:
                 yield Part(name, at, stop)
 
 
-def _kind_of_formula(tex: str) -> str:
-    """Whether a formula relates anything, and whether to a number."""
+def _kind_of_formula(tex: str, letters: Iterable[str]) -> str:
+    """Whether a formula relates anything, and whether two numbers or `letters` with values."""
     sides = _RELATION.split(tex)
     if len(sides) == 1:
         return "symbols"
-    are_numbers = (re.search(r"\d", side) and not _has_letters(side) for side in sides)
-    return "formula" if any(are_numbers) else "relation"
+    are_numbers = [re.search(r"\d", side) and not _has_letters(side) for side in sides]
+    has_value = any(all(pair) for pair in pairwise(are_numbers)) or any(x in tex for x in letters)
+    return "formula" if has_value else "relation"
 
 
 def _has_letters(tex: str) -> bool:

@@ -392,8 +392,9 @@ class Feature(Struct, frozen=True, kw_only=True):
     """The diagnostics about what scripts did."""
     unproven: Callable[[Course], Iterable[Diagnostic]] | None = None
     """What the course states, and nothing in it gives, for `check --truth`."""
-    proofs: Callable[[Document], Iterable[Span]] | None = None
-    """The results in a document that its diagnostics, if there are none, prove."""
+    proofs: Callable[[Document], Iterable[tuple[Span, Span]]] | None = None
+    """Relations in a document that its diagnostics, if there are none, prove: the sides of each,
+    both with the sign between them."""
     check_models: (
         Callable[[Course, Callable[[FeatureBlock], ModelFacts | None]], Iterable[Diagnostic]] | None
     ) = None

@@ -90,11 +90,7 @@ def check(
         if shard is None:
             checked_course.write_records()
             remarks = remarks_on_proofs(
-                course,
-                options.store,
-                verification,
-                checked_course.documents,
-                is_green=report.summary.ok,
+                course, options.store, verification, checked_course.documents, report
             )
         part = "" if shard is None else str(shard)
         return replace(report, remarks=remarks, sensitivity=sensitivities, part=part)
@@ -357,14 +353,16 @@ def _without_consequences(diagnostics: Sequence[Diagnostic]) -> Iterator[Diagnos
     """The diagnostics without what only follows from another one, of the same page or line."""
     rules = {(d.span.path, d.rule) for d in diagnostics}
     mild = ("html-unbalanced", "shown-as-written")
-    error_lines = {
-        (d.span.path, d.span.line) for d in diagnostics if d.is_error and d.rule not in mild
+    told_lines = {
+        (d.span.path, d.span.line)
+        for d in diagnostics
+        if d.rule == "markup-foreign" or (d.is_error and d.rule not in mild)
     }
     for diagnostic in diagnostics:
         rule, span = diagnostic.rule, diagnostic.span
         causes = {"merge-conflict", *_CAUSES.get(rule, ())} - {rule}
         follows = any((span.path, cause) in rules for cause in causes)
-        if not follows and (rule not in mild or (span.path, span.line) not in error_lines):
+        if not follows and (rule not in mild or (span.path, span.line) not in told_lines):
             yield diagnostic
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from textwrap import shorten
 from typing import Literal, TypeAlias
 
 from msgspec import Struct
@@ -39,17 +40,16 @@ from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Source, Span
 from coursebuild.core.values import fingerprint
 from coursebuild.pipeline.verify import Verification
-from coursebuild.report.values import plural
+from coursebuild.report.values import Report, plural
 
 Kind: TypeAlias = Literal[
-    "output", "table", "value", "figure", "lab", "block", "section", "link", "result"
+    "output", "table", "value", "figure", "lab", "block", "section", "link", "formula"
 ]
 KIND = "proofs"
 """That of entries of the store: what was proved of a document, by the hash of its path."""
 _OPAQUE = regex(r"[A-Za-z][\w+.-]*:(?!//)")
 """An address that nothing looks up, as `mailto:` and a misspelt `lesson:`."""
 _FENCE = regex(r"(?:`{3,}|~{3,})[ ]*(?P<word>[\w-]+)")
-_NUMBER = regex(r"\d+(?:\.\d+)?")
 _TRIED = frozenset(("lab", "exercise"))
 """Blocks that are proved by a trial."""
 
@@ -70,7 +70,7 @@ class Proof(Struct, frozen=True):
     """The line where it stood."""
     label: str = ""
     """What stays where its text is misspelt: a link's words in their brackets, the number of a
-    value, what stands before a result."""
+    value, the first side of a formula."""
     labels: int = 0
     """How often the label stood in the document."""
 
@@ -80,14 +80,16 @@ def remarks_on_proofs(
     store: Store,
     verification: Verification,
     documents: Collection[str] | None,
-    *,
-    is_green: bool,
+    report: Report,
 ) -> tuple[str, ...]:
     """Say what is proved no longer or elsewhere; without errors, keep what is proved now.
 
-    `documents` are the paths of those that were checked; `None`: all.
+    `documents` are the paths of those that were checked; `None`: all. A formula in whose line
+    the report tells a mistake is not named as well.
     """
     remarks = []
+    spans = [diagnostic.span for diagnostic in report.diagnostics]
+    lines = {(span.path, n) for span in spans for n in range(span.line, span.end_line + 1)}
     results = verification.results
     addresses = known_addresses(course.records)
     outputs = PrintedOutputs(results.verdicts, results.runs)
@@ -108,6 +110,7 @@ def remarks_on_proofs(
         losses = [
             f"{proof.name} in line {line}"
             for proof, line in find_losses(document.source, texts, before)
+            if proof.kind != "formula" or (path, line) not in lines
         ]
         if losses:
             verb = "was proved before and is not now"
@@ -116,7 +119,7 @@ def remarks_on_proofs(
             counts = Counter(proof.kind for proof in proofs).items()
             rest = ", ".join(plural(count, kind) for kind, count in counts) or "nothing"
             remarks.append(f"{owner.id}: {' and '.join(losses)} {verb} (proved: {rest})")
-        if is_green and proofs != before:
+        if report.summary.ok and proofs != before:
             store.put_value(KIND, key, proofs)
     return tuple(remarks)
 
@@ -154,8 +157,8 @@ def find_losses(
                 break
 
 
-def _identity(proof: Proof) -> tuple[Kind, str, str]:
-    return proof.kind, proof.text, proof.script
+def _identity(proof: Proof) -> tuple[Kind, str, str, str]:
+    return proof.kind, proof.text, proof.script, proof.label
 
 
 def _of_document(document: Document) -> Iterator[ProvedText]:
@@ -168,8 +171,8 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
     for binding in document_bindings(document):
         above = [r.script for r in recordings if r.body_span.end <= binding.span.start]
         if binding_script := binding.script or (above[-1] if above else None):
-            name = f"`{binding.text}`"
-            yield _proved("value", name, binding.text, binding.span, binding_script)
+            text, label = binding.text, binding.text.partition(" ")[0]
+            yield _proved("value", f"`{text}`", text, binding.span, binding_script, label)
     for figure in recorded_figures(document):
         name = f"the figure `{figure.name}`"
         yield _proved("figure", name, figure.name, figure.span, figure.script)
@@ -182,23 +185,22 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
         title = _longest_line(heading.span.text.rpartition("{")[0].lstrip("# \t"))
         if heading.goes_further and title:
             yield _proved("section", f"the optional section `{title}`", title, heading.span)
-    for span in (s for f in features() if f.proofs is not None for s in f.proofs(document)):
-        if numbers := _NUMBER.findall(span.text):
-            yield _proved("result", f"the result `{numbers[-1]}`", numbers[-1], span)
+    for sides in (p for f in features() if f.proofs is not None for p in f.proofs(document)):
+        label, text = (side.text.strip() for side in sides)
+        whole = document.source.span(sides[0].start, sides[1].end).text
+        name = f"the formula `{shorten(whole, 80, placeholder='…')}`"
+        yield _proved("formula", name, text, sides[1], label=label)
     for link in find_inlines(document, Link):
         text = link.target_span.text
         is_opaque = isinstance(link.target, UrlTarget) and _OPAQUE.match(text)
         if not link.mention and text and not is_opaque:
-            yield _proved("link", f"the link to `{text}`", text, link.span)
+            label = link.span.text.partition("](")[0] + "]"
+            yield _proved("link", f"the link to `{text}`", text, link.span, label=label)
 
 
-def _proved(kind: Kind, name: str, text: str, span: Span, script: str | None = None) -> ProvedText:
-    labels_by_kind = {
-        "link": span.text.partition("](")[0] + "]",
-        "value": text.partition(" ")[0],
-        "result": span.text.rpartition(text)[0].strip(),
-    }
-    label = labels_by_kind.get(kind, "")
+def _proved(
+    kind: Kind, name: str, text: str, span: Span, script: str | None = None, label: str = ""
+) -> ProvedText:
     places = [*_places(span.source, text)]
     place = next(filter(span.contains, places), span)
     labels = [*_places(span.source, label)] if label else []
@@ -220,7 +222,7 @@ def _places(source: Source, text: str) -> Iterator[Span]:
     at = source.text.find(text)
     while at >= 0:
         end = at + len(text)
-        signs = source.text[at - 1 : at], source.text[end : end + 1]
-        if text[0] == "[" or not any(sign.isalnum() for sign in signs):
+        edges = source.text[max(at - 1, 0) : at + 1], source.text[end - 1 : end + 1]
+        if not any(edge.isalnum() and len(edge) > 1 for edge in edges):
             yield source.span(at, end)
         at = source.text.find(text, end)

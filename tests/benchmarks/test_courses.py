@@ -173,9 +173,19 @@ def test_mistakes_of_each_kind_end_as_they_did(rewriting: bool) -> None:
 
 
 def test_what_only_names_or_says_something_is_no_claim() -> None:
-    text = 'So $m$ is in $F = \\mathrm{k}a$, $m = 2$, `3`{given="ISO 9"}.\n\n```sh\nls\n```\n'
+    text = (
+        "So $m$ is in $F = \\mathrm{k}a$, $m = 2$, $1 + 1 = 2$, "
+        '`3`{given="ISO 9"}.\n\n```sh\nls\n```\n'
+    )
     places = [text[part.start : part.end] + " " + part.place for part in parts("a.md", text)]
     relation = "$F = \\mathrm{k}a$ relation"
-    assert {"$m$ symbols", relation, "$m = 2$ formula", "ISO 9 words", "ls shown"} <= {*places}
+    assert {
+        "$m$ symbols",
+        relation,
+        "$m = 2$ relation",
+        "$1 + 1 = 2$ formula",
+        "ISO 9 words",
+        "ls shown",
+    } <= {*places}
     pages = [f'<main><pre><i class="d">"""{w}."""</i></pre></main>'.encode() for w in ("A", "B")]
     assert compare_pages(*pages) == "prose"

@@ -37,11 +37,16 @@ def test_a_value_that_is_bound_no_longer_is_told(
     assert_told(make, LESSON, old, new, remark)
 
 
-@pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["results"])
-def test_a_result_that_is_not_computed_any_more_is_told(
+@pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["formulas"])
+def test_a_formula_that_is_not_decided_any_more_is_told(
     make: Make, old: str, new: str, remark: str
 ) -> None:
-    assert_told(make, "## Plate\n\nIt has $16\\cdot0.2\\cdot0.2 = 0.64$ kg.\n", old, new, remark)
+    lesson = (
+        "## Plate\n\nIt has $16\\cdot0.2\\cdot0.2 = 0.64$ kg.\n"
+        '$p${symbol="momentum" unit="kg m/s"} and $F${symbol="force" unit="N"}'
+        ", and $\\dot p = F$.\n"
+    )
+    assert_told(make, lesson, old, new, remark)
 
 
 def test_an_output_that_became_an_illustration_is_told_once(make: Make) -> None:
@@ -85,7 +90,7 @@ def test_a_table_without_its_caption_is_told(make: Make) -> None:
 
 @pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["links"])
 def test_a_link_that_became_text_is_told(make: Make, old: str, new: str, remark: str) -> None:
-    lesson = "## Fall\n\nAs [there](#fall).\n"
+    lesson = "## Fall\n\nAs [there](#fall), not [so](#fall).\n"
     assert_told(make, lesson, old, new, remark)
 
 

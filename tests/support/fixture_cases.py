@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import re
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -55,14 +55,24 @@ def check_lines(path: Path, convert: Callable[[str], Iterable[str]], *, rewritin
 
     def render(case: Case) -> str:
         lines: list[str] = []
-        for line in case.expected.splitlines():
-            if line and not line.startswith(" "):
-                text = ast.literal_eval(line) if line[0] in "'\"" else line
-                outputs = (r if r.isprintable() else repr(r) for r in convert(text))
-                lines += [line, *(f"  {output}".rstrip() for output in outputs)]
+        for line, text in _input_lines(case):
+            outputs = (r if r.isprintable() else repr(r) for r in convert(text))
+            lines += [line, *(f"  {output}".rstrip() for output in outputs)]
         return "".join(f"{line}\n" for line in lines)
 
     check_cases(path, render, rewriting=rewriting)
+
+
+def input_lines(path: Path) -> list[str]:
+    """The inputs of a file for `check_lines`."""
+    return [text for case in read_cases(path) for _, text in _input_lines(case)]
+
+
+def _input_lines(case: Case) -> Iterator[tuple[str, str]]:
+    """Each input as it stands in the file, and what it means."""
+    for line in case.expected.splitlines():
+        if line and not line.startswith(" "):
+            yield line, ast.literal_eval(line) if line[0] in "'\"" else line
 
 
 def read_cases(path: Path) -> list[Case]:

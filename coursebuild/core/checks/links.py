@@ -209,7 +209,7 @@ class _Checker(Struct, frozen=True):
 
     def check_url(self, span: Span, url: str) -> Iterator[Diagnostic]:
         parts = urlsplit_or_none(url)
-        if parts is None:
+        if parts is None or (parts.scheme in ("http", "https") and not parts.netloc):
             yield diagnose("link-file", span, f"`{url}` is not a readable address")
         elif parts.scheme or parts.netloc:
             return

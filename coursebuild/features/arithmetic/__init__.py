@@ -44,8 +44,8 @@ class FormulaSummary(Struct, frozen=True):
     """Symbols whose meaning the document declares, and their units."""
     identities: tuple[tuple[Excerpt, str, Span], ...]
     """Formulas whose label says `check`, their domains and where these stand."""
-    results: tuple[Span, ...] = ()
-    """Relations that hold."""
+    results: tuple[tuple[Span, Span], ...] = ()
+    """The sides of relations that hold, or whose dimensions fit, each with the sign between."""
 
 
 def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]:
@@ -55,7 +55,7 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
     from coursebuild.features.arithmetic.symbol_values import check_formulas, read_symbols
 
     identities: list[tuple[Excerpt, str, Span]] = []
-    results: list[Span] = []
+    results: list[tuple[Span, Span]] = []
     symbols, comparisons = read_symbols(document), check_formulas(document)
     diagnostics = list(symbols.diagnostics)
     for _, formula in find_formulas(document):
@@ -65,8 +65,9 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
             identities.append((tex, label.conditions or "", label.domain.span()))
         for comparison in comparisons.get(tex.span().start, ()):
             span, message = tex.span(comparison.start, comparison.end), comparison.message
-            if comparison.kind == "holds":
-                results.append(span)
+            if comparison.sign is not None:
+                start, end = comparison.sign
+                results.append((tex.span(comparison.start, end), tex.span(start, comparison.end)))
             elif comparison.kind == "wrong":
                 point = "{,}" if "{,}" in span.text else "."
                 texts = (span.text.replace(point, "."), comparison.result)
@@ -82,8 +83,8 @@ def summary(document: Document, mathml: Mathml) -> Parsed[FormulaSummary | None]
     return Parsed(None if is_empty else formulas, tuple(diagnostics))
 
 
-def proofs(document: Document) -> tuple[Span, ...]:
-    """Return the relations of a document that were computed, and hold."""
+def proofs(document: Document) -> tuple[tuple[Span, Span], ...]:
+    """Return the sides of the relations of a document that hold, or whose dimensions fit."""
     document_summary = document.summary_of(FormulaSummary)
     return () if document_summary is None else document_summary.results
 

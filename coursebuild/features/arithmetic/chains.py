@@ -144,7 +144,8 @@ def _check_chain(
             continue
         except NotUnderstood as error:
             mistake = FormulaComparison(error.kind, error.start, error.end, error.reason)
-        yield mistake or FormulaComparison("holds", left.start, right.end)
+        sign = left.end, right.start
+        yield mistake or FormulaComparison("holds", left.start, right.end, sign=sign)
 
 
 def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:

@@ -44,7 +44,8 @@ FIRST_READINGS: Readings = MappingProxyType({})
 class FormulaComparison(Struct, frozen=True):
     """The result of comparing two sides of a formula, for a range of its TeX."""
 
-    kind: Literal["holds", "wrong", "unread"]
+    kind: Literal["holds", "fits", "wrong", "unread"]
+    """It `fits` if the dimensions of symbols were compared, and no values."""
     start: int
     end: int
     message: str = ""
@@ -53,6 +54,8 @@ class FormulaComparison(Struct, frozen=True):
     help: str = ""
     result: str = ""
     """What should stand there, where a number that stands there is wrong."""
+    sign: tuple[int, int] | None = None
+    """The range between the sides, if it holds or fits."""
 
 
 class Numeral(Struct, frozen=True):

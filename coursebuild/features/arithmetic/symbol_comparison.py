@@ -85,9 +85,11 @@ class SymbolComparison:
     def find_mistake(self) -> FormulaComparison | None:
         """Return a comparison that is wrong if the relation does not hold.
 
+        Where there is nothing to compare but dimensions, and these are the same, it fits.
+
         Raises:
             NotUnderstood: it states a number of symbols with values, and cannot be computed.
-            NotJudged: there is nothing to compare but units, which fit.
+            NotJudged: there is nothing to compare.
         """
         try:
             mistake = self._find_mistake()
@@ -129,7 +131,11 @@ class SymbolComparison:
             right = self.expressions[1]
             return FormulaComparison("wrong", right.start, right.end, message)
         if not self.has_values or self.relation not in ("=", "≈") or has_calculus:
-            raise NotJudged
+            if bare is not None or has_zero(*quantities):
+                raise NotJudged
+            first, second = self.sides
+            sign = first.end, second.start
+            return FormulaComparison("fits", first.start, second.end, sign=sign)
         try:
             return self._compare_values(
                 [quantity.value for quantity in quantities], bare, dimensions

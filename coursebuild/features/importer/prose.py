@@ -71,7 +71,7 @@ _LINE = regex(
     rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
     r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
-    r"|(?P<anchor>(?<!!)\[(?P<bare>[^\[\]\n`]*)\]\(\)(?:\{[^{}\n]*\})?)"
+    r"|(?P<anchor>(?<!!)\[(?P<bare>(?:[^\[\]\n`]|!\[[^\[\]\n]*\]\([^()\n]*\))*)\]\(\)(?:\{[^{}\n]*\})?)"
     r"|(?P<object>\[(?P<called>(?:[^\[\]\n`]|`[^`\n]+`)+)\]"
     r"(?:\[(?P<path>[A-Za-z_]\w*(?:[.-]\w+)+)?\]|(?=\[\^)))"
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\](?!\())"
@@ -80,9 +80,10 @@ _LINE = regex(
     r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
     r"|(?<!\^)\^(?:[^\s\^\[\]]|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
-    r"|(?P<wiki>!?\[\[(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
+    r"|(?P<wiki>!?\[\[(?!@)(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
-    r"|(?P<latex>\\(?:newline|newpage|pagebreak|clearpage|noindent|(?:small|med|big)skip|[hv]fill)"
+    r"|(?P<latex>\\(?:newline|newpage|pagebreak|clearpage|noindent|(?:small|med|big)skip|[hv]fill|pause"
+    r"|(?:footnote|script|normal)size)"
     r"(?![A-Za-z])[ ]?|\\[hv]space\*?\{[^{}\n]*\}|\\index\w*\{(?:[^{}\n]|\{[^{}\n]*\})*\})"
     r"|(?P<definition>^[ ]{0,3}\[(?!\^)[^\[\]\n]+\]:[ \t]*(?P<named>[^\s<]+)(?=[ \t]*(?:$|[\"'(])))"
     rf"|(?P<cite>\[(?:[^\[\]\n`@]*[\s(])?-?@{_KEY}(?:[;,\s][^\[\]\n]*)?\])"
@@ -317,7 +318,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             text = _rewrite_line(match["text"], context) or words_of_link(address, match["address"])
             return write_link(text, address, match["title"] or "")
         case "anchor":
-            if words := match["bare"]:
+            words = match["bare"]
+            if words and "](" not in words:
                 context.leave("link", f"the link “{words}”, which has no address")
             return _rewrite_line(words, context)
         case "icon":
@@ -398,7 +400,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             address = context.resolve_link(whole[1:-1])
             return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
         case "latex":
-            if not context.has_marks:
+            if not context.has_marks and match.string.strip() != whole.strip():
                 return whole
             if "{" in whole:
                 context.leave("command of LaTeX", f"`{whole}`, which no page here shows")

@@ -5,7 +5,7 @@ one piece of inline code; `Claim` and `CodeNames`.
 
 Inline code may be a name where it has the shape of one: a call, a dotted name, a word with an
 underscore or one that begins as MuJoCo's do, elements and attributes of MJCF, a command or an
-option of coursebuild, a table of the course map, a file of the course.
+option of coursebuild, a table of the course map, a script of the course.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ ENGINE_WORD = regex(r"(?:mj[A-Z]|mj[a-z]{0,2}_|mjt[A-Z]|Mj[A-Z])\w+")
 _ATTRIBUTES = regex(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
 _TAG = regex(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
 _TABLE = regex(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
-_FILE = regex(r"(?:content|examples|models)/(?!.*[A-Z]{3})[\w./-]*\w\.[a-z]+")
+_FILE = regex(r"examples/[\w./-]*\w\.[a-z]+")
 _CODE_WORD = regex(
     r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
     r"|(?<=\")[A-Za-z]\w+(?=\")"

@@ -8,7 +8,6 @@ or a library that nobody here knows.
 
 from __future__ import annotations
 
-import builtins
 import functools
 import re
 
@@ -100,19 +99,13 @@ class Resolver:
             case "table":
                 return known_names.resolve_table(self._manual("course-map"), *claim.name.split(" "))
             case "file":
-                path = claim.name
-                is_script = path in self.scripts and path.startswith("examples/")
-                sources = self.course.sources
-                has_file = is_script or any(source.path == path for source in sources)
-                return KnownName(f"#{path}" if is_script else "") if has_file else None
+                return KnownName(f"#{claim.name}") if claim.name in self.scripts else None
 
     # --- Python
 
     def _word(self, name: str, names: CodeNames) -> Answer:
         if name in names.definitions:
             return KnownName(f"#{line_anchor(*names.definitions[name])}", name)
-        if name in names.imports or hasattr(builtins, name):
-            return KnownName()
         return None if self.engine is None else find_engine_name(self.engine, name)
 
     def _function(self, name: str, names: CodeNames) -> Answer:

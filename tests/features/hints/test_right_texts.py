@@ -1,5 +1,7 @@
 """Right texts: nothing in them is an error or a warning, whatever their language and subject.
 
+`slips.md` has wrong ones, and says of each whether it is an error, a hint or silence.
+
 `cases.txt` has a case below each line `=== name`, and `prose.md` three pages; `sentences.md` has a
 text in each paragraph. They are lessons of one course that has a script with MuJoCo, so that its
 names are known. What holds formulas is checked with `check`, which typesets them, elsewhere.
@@ -18,7 +20,7 @@ from coursebuild.core.model.course import CALLOUTS
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 from coursebuild.features.hints import unread_marks
-from support.fixture_cases import fixture_text
+from support.fixture_cases import FIXTURES, check_lines, fixture_text, input_lines
 from support.scratch_course import Folder, block
 
 ROOT = Path(__file__).parents[3]
@@ -79,3 +81,22 @@ def test_formulas_of_right_prose_hold(make_course: MakeCourse) -> None:
     course = make_course(fixture_text("right_texts/prose.md"))
     report = json.loads(course.main("check", "--format", "json", "-q").out)
     assert report["diagnostics"] == []
+
+
+@pytest.mark.site
+def test_slips_of_edited_books_are_told_where_they_are_certain(
+    make_course: MakeCourse, rewriting: bool
+) -> None:
+    path = FIXTURES / "right_texts/slips.md"
+    places: dict[int, str] = {}
+    text = f"## Slips\n\n{block('m.py', SIMULATION, '0.0')}\n"
+    for slip in input_lines(path):
+        start = text.count("\n") + 1
+        text += f"{slip}\n\n"
+        places |= dict.fromkeys(range(start, text.count("\n") + 1), slip)
+    course = make_course(text)
+    report = json.loads(course.main("check", "--hints", "--format", "json", "-q").out)
+    verdicts: dict[str, set[str]] = {slip: set() for slip in places.values()}
+    for told in report["diagnostics"]:
+        verdicts[places[told["line"]]].add(f"{told['severity']} {told['rule']}")
+    check_lines(path, lambda slip: sorted(verdicts[slip]) or ["silent"], rewriting=rewriting)
