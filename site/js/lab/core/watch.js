@@ -18,7 +18,7 @@ export class Watch {
     this.engine = engine
     this.model = model
     this.data = data
-    this.numbers = new StepNumbers(data)
+    this.numbers = new StepNumbers(data, model.opt)
     this.counts = new Int32Array(this.numbers.count)
     this.total = 0
     this.arrays = {}
