@@ -84,9 +84,10 @@ export class StepNumbers {
     return this.words()[this.contactsAt]
   }
 
-  /** How often warning `i` was raised. */
-  number(i) {
-    return this.words()[this.start + 2 * i + 1]
+  /** How often each warning was raised. */
+  counts() {
+    const words = this.words()
+    return Array.from({ length: this.count }, (_, i) => words[this.start + 2 * i + 1])
   }
 
   /** The index that the last warning `i` refers to, in the array that it is about. */

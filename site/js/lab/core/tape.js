@@ -85,7 +85,7 @@ export class Tape {
   event(numbers) {
     this.cut()
     const { steps } = this.lab
-    while (this.states.length > 0 && this.states[this.states.length - 1].step >= steps) this.states.pop()
+    this.states = this.states.filter(({ step }) => step < steps)
     this.keep(null, numbers)
     this.markEnd(this.lab.time)
   }
