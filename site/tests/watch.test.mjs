@@ -121,7 +121,7 @@ test('what is read from memory is what the bindings say, also where these cannot
   for (let i = 0; i < 400; i++) {
     lab.step(5)
     contacts.add(numbers.contacts)
-    assert.deepEqual([numbers.time, numbers.contacts], [lab.data.time, lab.data.ncon])
+    assert.deepEqual([numbers.time, numbers.timestep, numbers.contacts], [lab.data.time, lab.option.timestep, lab.data.ncon])
   }
   assert.ok(contacts.size > 1)
 })

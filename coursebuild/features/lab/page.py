@@ -37,7 +37,15 @@ from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
 from coursebuild.features.lab.reply import LabRecord, PublishedLab
-from coursebuild.features.lab.schema import Control, Overlay, Plot, Select, SimLab, Slider
+from coursebuild.features.lab.schema import (
+    Control,
+    Overlay,
+    Plot,
+    Select,
+    SimLab,
+    Slider,
+    Verify,
+)
 
 
 class RecordedView(Struct, frozen=True):
@@ -275,7 +283,10 @@ _DRIFT = "else if (model.nu === 0 && Math.hypot(...model.opt.gravity) === 0) dat
 def _gallery_lab(model: MjcfModel) -> Lab:
     place = model.source.span(0, 0)
     setup = f"{START} {_DRIFT}"
-    fields = SimLab(model=model.name, title=model.name, toggles=_TOGGLES, setup=setup)
+    verify = Verify(seconds=3)  # what drifts goes on for ever: the camera shows how it begins
+    fields = SimLab(
+        model=model.name, title=model.name, toggles=_TOGGLES, setup=setup, verify=verify
+    )
     return Lab(place, SIMLAB, place, "", fields)
 
 

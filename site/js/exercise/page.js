@@ -76,11 +76,9 @@ export class Exercise extends Instrument {
     this.tries += 1
     this.checkedText = editor.text
     this.showState(words('exercise.live.checking'))
-    const { address } = this.simulation
-    const addresses = { worker: address(config.worker), module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
     const results = []
     const next = () => results.length < this.rows.length && this.showVerdict(this.rows[results.length], 'running')
-    this.stopJudging = judgeAttempt(addresses, { ...config, attempt: editor.text }, {
+    this.stopJudging = judgeAttempt(this.simulation.addresses, { ...config, attempt: editor.text }, {
       begun: next,
       verdict: (index, verdict) => {
         results.push(verdict.passed)

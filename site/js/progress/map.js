@@ -55,7 +55,7 @@ export function showMark(place, state, words) {
 function showSummary(place, sum, words) {
   if (!place) return
   const parts = []
-  const part = (name, text) => parts.push(h('span', { class: 'mark' }, ...(name ? [sign(name)] : []), text))
+  const part = (name, text) => parts.push(h('span', { class: 'mark' }, sign(name), text))
   if (sum.read || sum.begun) part('read', say(words, 'progress.map.lessons_read', { n: sum.lessons, read: sum.read }))
   if (sum.begun) part('begun', say(words, 'progress.map.lessons_begun', { n: sum.begun }))
   if (sum.answered) part('right', say(words, 'progress.map.questions', { n: sum.questions, right: sum.right }))

@@ -93,15 +93,19 @@ export class Framing {
     const { data } = lab.sync()
     const points = [...rows(data.flexvert_xpos, 0, model.nflexvert), ...rows(data.site_xpos, sampler.site, sampler.site < 0 ? 0 : 1)]
     for (let i = 0; i < model.ntendon; i++) points.push(...rows(data.wrap_xpos, data.ten_wrapadr[i], data.ten_wrapnum[i]))
-    this.stillReaches = this.stillGeoms.map((i) => this.directions.map((d) => this.support(model, data, i, d)))
+    this.stillReaches = this.stillGeoms.map((i) => this.reachOf(model, data, i))
     const gone = this.falling(model, data)
     const staying = this.movingGeoms.filter((i) => !gone.has(model.body_rootid[model.geom_bodyid[i]]))
     if (staying.length + points.length === 0 && this.planes.length > 0) return
     const shown = staying.length + points.length > 0 ? staying : this.movingGeoms
-    const reach = this.directions.map((d) =>
-      Math.max(...shown.map((i) => this.support(model, data, i, d)), ...points.map((p) => dot(p, d))),
-    )
-    if (reach.every(Number.isFinite)) this.runs.at(-1).push(reach)
+    const reaches = [...shown.map((i) => this.reachOf(model, data, i)), ...points.map((p) => this.directions.map((d) => dot(p, d)))]
+    const reach = furthest(reaches)
+    if (reach.length > 0 && reach.every(Number.isFinite)) this.runs.at(-1).push(reach)
+  }
+
+  /** How far a geom reaches in all directions. */
+  reachOf(model, data, i) {
+    return this.directions.map((d) => this.support(model, data, i, d))
   }
 
   /** The top bodies that have fallen out of the scene by now: they are below all that stands still by more than the scene's first size. */
@@ -112,9 +116,7 @@ export class Framing {
     const tops = new Map([...this.trees].map(([body, geoms]) => [body, height(geoms)]))
     if (this.bottom === null) {
       this.bottom = Math.min(...this.planes, ...this.stillReaches.map((still) => -still.at(-1)))
-      const reachOf = (i) => this.directions.map((d) => this.support(model, data, i, d))
-      const all = [...this.movingGeoms, ...this.stillGeoms].map(reachOf)
-      this.size = all.length > 0 ? sizeOf(furthest(all)) : 0
+      this.size = sizeOf(furthest([...this.movingGeoms.map((i) => this.reachOf(model, data, i)), ...this.stillReaches]))
       for (const [body, top] of tops) if (top < this.bottom) this.trees.delete(body)
     }
     for (const [body, top] of tops) {
@@ -198,7 +200,7 @@ export class Framing {
   }
 }
 
-const furthest = (moments) => moments[0].map((_, i) => Math.max(...moments.map((moment) => moment[i])))
+const furthest = ([first = [], ...others]) => first.map((x, i) => Math.max(x, ...others.map((other) => other[i])))
 const sizeOf = (reach) => Math.max(...[0, 2, 4].map((i) => reach[i] + reach[i + 1]))
 const rows = (array, start, count) => Array.from({ length: count }, (_, i) => array.subarray(3 * (start + i), 3 * (start + i) + 3))
 

@@ -302,7 +302,7 @@ export class Lab {
       this.warnings.push(...findings.warnings)
       if ((this.diverged = findings.diverged) !== null) return 'diverged'
     }
-    const timestep = this.option.timestep
+    const { timestep } = watch.numbers
     if (this.sampler.due(this.steps, timestep)) this.sampler.record(this.sync())
     tape?.after(numbers, time)
     const { stopAt } = this.config

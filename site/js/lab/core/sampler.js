@@ -51,25 +51,20 @@ export class Sampler {
     return this.active && steps % Math.max(1, Math.round(this.interval / timestep)) === 0
   }
 
-  /** The traces, evaluated now; a gap is NaN. */
-  evaluate(env) {
-    return Float64Array.from(this.traces, ({ entry, run }) => call(entry, () => plottable(entry, run(env)) ?? NaN))
-  }
-
   /** Add a sample; `env` is of data whose derived quantities are current. */
   record(env) {
-    if (this.traces.length > 0) {
-      this.values.push(...this.evaluate(env))
-      this.times.push(env.data.time)
-    }
+    const { time } = env.data
+    const values = this.traces.map(({ entry, run }) => call(entry, () => plottable(entry, run(env)) ?? NaN)) // all, before any is kept
+    if (values.length > 0) this.times.push(time)
+    this.values.push(...values)
     if (this.site >= 0) {
       const offset = 3 * (this.points++ % TRAIL)
       this.first = Math.max(this.first, this.points - TRAIL)
       const source = 3 * this.site
       this.trail.set(env.data.site_xpos.subarray(source, source + 3), offset)
     }
-    if (this.goal !== null) this.goal.look(call(ENTRY, () => condition(ENTRY, this.holds(env))), env.data.time)
-    this.last = env.data.time
+    if (this.goal !== null) this.goal.look(call(ENTRY, () => condition(ENTRY, this.holds(env))), time)
+    this.last = time
   }
 
   /**

@@ -15,53 +15,55 @@ const WRONG = 'the engine lays out its memory in another way than this version o
 /** The memory of the engine, found through any array of a model. */
 const memory = (data) => data.xpos.buffer
 
-const REACH = 1024 // bytes behind the first warning counter, in which the other numbers lie
+const REACH = 256 // words behind a place, in which a structure's other numbers lie
 
-/** What is looked at after each step: the time, the number of contacts, and how often each warning was raised since the last reset. */
+/** What is looked at with each step: its length, the time, the number of contacts, and how often each warning was raised since the last reset. */
 export class StepNumbers {
-  /** @param {Record<string, any>} data MjData, which must outlive the numbers */
-  constructor(data) {
+  /** @param {Record<string, any>} data MjData, which must outlive the numbers, as its model must @param {Record<string, any>} option of that */
+  constructor(data, option) {
     this.data = data
+    this.ints = new Int32Array(0)
+    this.doubles = new Float64Array(0)
     // A vector of {pointer to an mjWarningStat, owned}; the structures themselves lie in mjData, one behind the other.
     const vector = data.warning
     this.count = vector.size()
-    const words = new Int32Array(memory(data))
-    const start = words[vector.$$.ptr >> 2] >> 2
-    this.address = words[start]
-    this.ints = new Int32Array(0)
-    this.doubles = new Float64Array(0)
+    const words = this.words()
+    this.start = words[words[vector.$$.ptr >> 2] >> 2] >> 2
     for (let i = 0; i < this.count; i++) this.verify(vector, i)
-    this.contactsAt = this.find('ncon')
-    this.timeAt = this.find('time') / 2
+    this.contactsAt = this.find(data, 'ncon', this.start)
+    this.timeAt = this.find(data, 'time', this.start) / 2
+    this.timestepAt = this.find(option, 'timestep', words[option.$$.ptr >> 2] >> 2) / 2
   }
 
   verify(vector, i) {
-    const before = this.number(i)
-    this.words()[2 * i + 1] = 1000 + i
+    const words = this.words()
+    const at = this.start + 2 * i + 1
+    const before = words[at]
+    words[at] = 1000 + i
     const copy = vector.get(i)
-    this.words()[2 * i + 1] = before
+    words[at] = before
     if (copy.number !== 1000 + i) throw new EngineError(WRONG, true)
     copy.delete()
   }
 
-  /** The word whose change the bindings read in a number of the data. */
-  find(name) {
+  /** The first word from a place on whose change the bindings read in a number of an object. */
+  find(object, name, start) {
     const words = this.words()
-    const before = this.data[name]
-    const index = words.findIndex((word, i) => {
+    const before = object[name]
+    for (let i = start; i < start + REACH; i++) {
+      const word = words[i]
       words[i] = word + 1
-      const isPart = this.data[name] !== before
+      const isPart = object[name] !== before
       words[i] = word
-      return isPart
-    })
-    if (index < 0) throw new EngineError(WRONG, true)
-    return index
+      if (isPart) return i
+    }
+    throw new EngineError(WRONG, true)
   }
 
   words() {
     if (this.ints.length === 0) {
-      this.ints = new Int32Array(memory(this.data), this.address, REACH / 4)
-      this.doubles = new Float64Array(memory(this.data), this.address, REACH / 8)
+      this.ints = new Int32Array(memory(this.data))
+      this.doubles = new Float64Array(memory(this.data))
     }
     return this.ints
   }
@@ -72,25 +74,33 @@ export class StepNumbers {
     return this.doubles[this.timeAt]
   }
 
+  /** s */
+  get timestep() {
+    this.words()
+    return this.doubles[this.timestepAt]
+  }
+
   get contacts() {
     return this.words()[this.contactsAt]
   }
 
-  /** How often warning `i` was raised. */
-  number(i) {
-    return this.words()[2 * i + 1]
+  /** How often each warning was raised. */
+  counts() {
+    const words = this.words()
+    return Array.from({ length: this.count }, (_, i) => words[this.start + 2 * i + 1])
   }
 
   /** The index that the last warning `i` refers to, in the array that it is about. */
   info(i) {
-    return this.words()[2 * i]
+    return this.words()[this.start + 2 * i]
   }
 
   /** The sum of all warning counters. */
   total() {
+    const { start, count } = this
     const words = this.words()
     let sum = 0
-    for (let i = 0; i < this.count; i++) sum += words[2 * i + 1]
+    for (let i = 0; i < count; i++) sum += words[start + 2 * i + 1]
     return sum
   }
 }

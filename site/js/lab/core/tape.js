@@ -2,7 +2,8 @@
  * What a run was: its states, one every few steps, from which each step is found again to the last bit.
  *
  * A state holds all that the next step depends on: MuJoCo's numbers, the lab's `ctx`, its controls and its random numbers. What is derived
- * (`xpos`, sensors, contacts) is that of the step before; so the numbers before a step are kept, too, and the step is made again. After
+ * (`xpos`, sensors, contacts) is that of the step before; so the numbers before a step are kept, and the step is made again. Those after it
+ * are kept, too, where it need not end as it did: where a controller may have changed the model, or a hand pulled. After
  * something was done to the lab, the numbers are those before `mj_forward`. (Accelerations are derived with the model as it is now, which
  * is another if a controller changes it.) Between two states steps are repeated, unless a body was
  * pulled there: then the run can be looked at in the states only. When there are too many, every second one goes.
@@ -14,7 +15,7 @@ const MOST = 1500 // states
 const LEAST = 4
 const MOST_NUMBERS = 1_000_000 // in all of them, 8 MB
 const LARGEST = 5000 // values that `ctx` may hold
-const SAMPLES = 4 // of the plots, between two states
+const SAMPLES = 16 // of the plots, between two states
 const MOST_MARKS = 200
 const APART = 0.3 // s between two marks of one control, or of contacts
 const TOLERANCE = 1e-6 // of a step
@@ -66,7 +67,8 @@ export class Tape {
 
   /** A step was made. @param {Float64Array | null} numbers of `before` @param {number} time s */
   after(numbers, time) {
-    if (numbers !== null) this.keep(numbers, this.lab.physics.read())
+    const { code, drag, physics } = this.lab
+    if (numbers !== null) this.keep(numbers, code.controller || drag.active ? physics.read() : null)
     this.touch(time)
     this.markEnd(time)
   }
@@ -83,7 +85,7 @@ export class Tape {
   event(numbers) {
     this.cut()
     const { steps } = this.lab
-    while (this.states.length > 0 && this.states[this.states.length - 1].step >= steps) this.states.pop()
+    this.states = this.states.filter(({ step }) => step < steps)
     this.keep(null, numbers)
     this.markEnd(this.lab.time)
   }
@@ -122,7 +124,7 @@ export class Tape {
       seen: lab.sampler.read(),
       isPulled: lab.drag.active,
     })
-    const room = Math.max(LEAST, Math.floor(MOST_NUMBERS / (2 * numbers.length + size)))
+    const room = Math.max(LEAST, Math.floor(MOST_NUMBERS / (2 * lab.physics.size + size)))
     if (this.states.length > Math.min(this.most, room)) this.thin()
   }
 
@@ -184,7 +186,7 @@ export class Tape {
     if (before === null) mj.mj_forward(lab.model, lab.data)
     else {
       mj.mj_step(lab.model, lab.data)
-      lab.physics.write(numbers)
+      if (numbers !== null) lab.physics.write(numbers)
     }
     lab.draw.write(random)
     lab.sampler.write(seen)

@@ -18,9 +18,8 @@ export class Watch {
     this.engine = engine
     this.model = model
     this.data = data
-    this.numbers = new StepNumbers(data)
-    this.counts = new Int32Array(this.numbers.count)
-    this.total = 0
+    this.numbers = new StepNumbers(data, model.opt)
+    this.restart()
     this.arrays = {}
     const { warning } = engine.k
     this.names = Object.fromEntries(Object.entries(warning).map(([name, i]) => [i, name.toLowerCase()]))
@@ -34,7 +33,7 @@ export class Watch {
 
   /** Start anew: after a reset, or after lab code that may have repaired the state. */
   restart() {
-    for (let i = 0; i < this.counts.length; i++) this.counts[i] = this.numbers.number(i)
+    this.counts = this.numbers.counts()
     this.total = this.numbers.total()
   }
 
@@ -55,17 +54,11 @@ export class Watch {
 
   /** The warnings raised since the last call. */
   takeNew(time) {
-    const findings = []
-    for (let i = 0; i < this.counts.length; i++) {
-      const number = this.numbers.number(i)
-      if (number > this.counts[i]) {
-        const message = sentence(this.engine.mj.mju_warningText(i, this.numbers.info(i)))
-        findings.push({ time, kind: this.names[i], message, fatal: this.fatal.has(i) })
-      }
-      this.counts[i] = number
-    }
-    this.total = this.numbers.total()
-    return findings
+    const { counts: before, numbers, engine } = this
+    this.restart()
+    const raised = Object.keys(this.names).map(Number).filter((i) => this.counts[i] > before[i])
+    const message = (i) => sentence(engine.mj.mju_warningText(i, numbers.info(i)))
+    return raised.map((i) => ({ time, kind: this.names[i], message: message(i), fatal: this.fatal.has(i) }))
   }
 
   badTime(before, time) {
@@ -74,9 +67,9 @@ export class Watch {
   }
 
   badState(name, time) {
-    if (this.isBounded(name)) return null
-    const index = this.array(name).findIndex((x) => !(Math.abs(x) < LARGEST))
-    return { time, kind: `bad${name}`, message: `${name}[${index}] is ${this.array(name)[index]}`, fatal: true }
+    const array = this.array(name)
+    const index = array.findIndex((x) => !(Math.abs(x) < LARGEST))
+    return index < 0 ? null : { time, kind: `bad${name}`, message: `${name}[${index}] is ${array[index]}`, fatal: true }
   }
 
   isBounded(name) {

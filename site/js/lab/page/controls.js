@@ -57,8 +57,8 @@ function slider({ label, unit, min, max, step, digits }, set) {
 
 function list({ label, unit, options }, set) {
   const id = freshId('list')
-  const field = h('select', { id }, ...options.map(([text], i) => h('option', { value: String(i) }, text)))
-  field.addEventListener('change', () => set(options[Number(field.value)][1]))
+  const onchange = () => set(options[field.selectedIndex][1])
+  const field = h('select', { id, onchange }, ...options.map(([text]) => h('option', {}, text)))
   const element = h('div', { class: 'lab-list' }, h('label', { for: id }, unit ? `${label} (${unit})` : label), field)
   const show = (value) => (field.selectedIndex = options.findIndex((option) => option[1] === value))
   return { element, field, show }
@@ -69,8 +69,8 @@ export function buildOverlays({ toggles, overlays, arrows }, words, toggle) {
   const available = Object.keys(SIGNS).filter((name) => arrows?.[name])
   const rest = toggles.filter((name) => !available.includes(name))
   const ticks = rest.map((name) => {
-    const box = h('input', { type: 'checkbox', checked: overlays.includes(name) })
-    box.addEventListener('change', () => toggle(name, box.checked))
+    const onchange = ({ target }) => toggle(name, target.checked)
+    const box = h('input', { type: 'checkbox', checked: overlays.includes(name), onchange })
     return h('label', { class: 'lab-check', 'data-overlay': name }, box, ` ${words(`overlay.${name}`)}`)
   })
   const buttons = available.map((name) => arrowButton(name, words, overlays, toggle))

@@ -61,9 +61,9 @@ export class Desk extends Shell {
       full: this.full,
     })
     const label = words('lab.live.cursor')
-    this.slider = h('input', { type: 'range', class: 'lab-scrub', 'aria-label': label, title: label })
-    Object.assign(this.slider, { min: String(axis.min), max: String(axis.max), step: String((axis.max - axis.min) / 600) })
-    this.slider.addEventListener('input', () => this.seek(Number(this.slider.value)))
+    const range = { min: String(axis.min), max: String(axis.max), step: String((axis.max - axis.min) / 600) }
+    const oninput = () => this.seek(Number(this.slider.value))
+    this.slider = h('input', { type: 'range', class: 'lab-scrub', 'aria-label': label, title: label, ...range, oninput })
     this.controls = buildControls(config.controls, { set: (index, value) => this.set(index, value) })
     this.readouts = buildReadouts(config.readouts)
     this.goal = this.makeGoal({
@@ -71,9 +71,9 @@ export class Desk extends Shell {
       unit: this.unit,
       format: (x) => formatNumber(x, this.digits).trim(),
     })
-    const charts = h('div', { class: 'lab-charts', role: 'group', tabIndex: 0 }, ...this.charts.map((chart) => chart.element))
+    const onkeydown = (event) => this.onKey(event)
+    const charts = h('div', { class: 'lab-charts', role: 'group', tabIndex: 0, onkeydown }, ...this.charts.map((chart) => chart.element))
     charts.setAttribute('aria-label', words('lab.live.curve', { caption: this.charts.map(({ caption }) => caption).join('; ') }))
-    charts.addEventListener('keydown', (event) => this.onKey(event))
     const link = () => this.share({ values: this.values, steps: 0, time: this.place, physics: new Float64Array() })
     const foot = h('div', { class: 'lab-foot' }, this.makeButton('link', link), this.makeHelp(['keys_curve']))
     const panel = h('div', { class: 'lab-panel' }, this.controls.element, this.readouts.element)

@@ -37,7 +37,7 @@ export class Simulation {
     this.on = on
     /** @type {HTMLElement | null} of a custom lab: see custom.js */
     this.element = null
-    this.address = (path) => (path ? new URL(path, base).href : '')
+    this.base = base
     this.visible = false
     this.own = null
     this.settings = new Map() // messages to repeat after a restart: speed, overlays, inspection
@@ -52,16 +52,22 @@ export class Simulation {
 
   /** Load the engine and the model; what is asked of them meanwhile is done then. */
   connect() {
-    const { config, address } = this
+    const { config } = this
+    const { worker, ...addresses } = this.addresses
     this.spentBuffers = [] // one for each frame not yet answered; null: the worker has to make a new one
     this.latest = null
     this.epoch = null
     this.diverged = false
     this.setState('loading')
-    this.line = connection(address(config.worker)).open(config.id, (message) => MESSAGES[message.type]?.(this, message))
-    const addresses = { module: address(config.module), mjb: address(config.mjb), wasm: address(config.wasm) }
+    this.line = connection(worker).open(config.id, (message) => MESSAGES[message.type]?.(this, message))
     this.send({ type: 'load', config, own: this.own, ...addresses })
     this.send({ type: 'visible', on: this.visible })
+  }
+
+  /** Where its worker, and what that loads, are; absolute. */
+  get addresses() {
+    const entries = ['worker', 'module', 'mjb', 'wasm'].map((name) => [name, this.config[name]])
+    return Object.fromEntries(entries.map(([name, path]) => [name, path ? new URL(path, this.base).href : '']))
   }
 
   send(message, transfer) {

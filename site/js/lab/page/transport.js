@@ -30,7 +30,11 @@ export function buildTransport(words, actions) {
   const element = h(
     'div',
     { class: 'lab-transport', role: 'group', 'aria-label': words('lab.live.transport') },
-    ...[play, step, reset, speed, clock].filter((part) => part !== null),
+    play,
+    step,
+    reset,
+    speed,
+    clock,
   )
   let shown = null
   return {
