@@ -37,10 +37,11 @@ _CODE = re.compile(
 _MARKS = re.compile(
     r"^:::[ \t]+[\w.]+\n(?:[ ]{4}[^\n]*(?:\n|\Z))+"
     r"|^[ \t>]*(?::[\w-]+:[^\n]*|:{3,}[^\n]*|\([\w:.-]+\)=|%[^\n]*|\+\+\+[^\n]*|/{3,}[^\n]*"
-    r"|===[!+]?(?=[ \t]+[\"'])|(?:!!!|\?{3}\+?)[ \t]+[\w-]+)[ \t]*$",
+    r"|===[!+]?(?=[ \t]+[\"'])|(?:!!!|\?{3}\+?)[ \t]+[\w-]+"
+    r"|import[ ][\w{}*, ]+[ ]from[ ][\"'][^\"'\n]+[\"'];?)[ \t]*$",
     re.MULTILINE,
 )
-"""Lines of options, labels, comments and frames of other tools."""
+"""Lines of options, labels, comments, frames and imports of other tools."""
 _FORMULA = re.compile(
     r"\$\$(?:(?!\n[ \t>]*\n).)+?\$\$|(?<![\\$])\$[^$\n]+\$(?!\d)"
     r"|\\begin\{(\w+\*?)\}.*?\\end\{\1\}",

@@ -426,6 +426,7 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
             yield f"src/{path.removeprefix(folder).lstrip('/')}", files.read(path)
 
 
+_MAPS = ("_quarto.yml", "_toc.yml", "book.toml", "mkdocs.yml", "myst.yml")
 _OTHER_TEXTS = tuple(".adoc .docx .htm .html .org .pdf .rst .tex .txt".split())
 
 
@@ -439,6 +440,9 @@ def _leave_unused(files: SourceFiles, paths: Iterable[str]) -> None:
             message = "a kind of text that is not read: convert it to Markdown, as by Pandoc"
         elif path.endswith(".py") and f"{stem_of(path)}.ipynb" in files:
             message = PAIR
+        elif posixpath.basename(path) in _MAPS:
+            folder = posixpath.join(files.name, posixpath.dirname(path))
+            message = f"a map of its own folder: `coursebuild import {folder}` follows it"
         elif path.endswith(".py") and re.search(rb"(?m)^# ?%%", files.read(path)):
             message = "a script of cells, which `jupytext --to ipynb` makes a notebook of"
         files.leave(path, message)

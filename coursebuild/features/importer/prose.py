@@ -349,8 +349,11 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 return whole
             if context.path.endswith(".ipynb") and match.string.lstrip().startswith("|"):
                 formula = re.sub(r"(?<!\\)\|", r"\\vert ", formula)  # no bar there ends a cell
-            is_shown = formula.startswith("$$")
-            return formula if is_shown else convert_role("math", formula[1:-1], context)
+            mark = "$$" if formula.startswith("$$") else "$"
+            is_in_line = context.files.docusaurus and match.string.strip() != whole
+            if mark == "$$" and not is_in_line:  # which is on a line of its own there
+                return formula
+            return convert_role("math", formula.removeprefix(mark).removesuffix(mark), context)
         case "code":
             is_cell = context.has_marks and re.match(r"[ \t]*\|", match.string)
             code = convert_code(whole, context)

@@ -143,9 +143,9 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case _ if _ICON_ROLE.fullmatch(name):
             return ""
         case _:
-            message = f"the role `{{{name}}}`, whose text is code now: write what it stands for"
+            message = f"the role `{{{name}}}`, whose text is shown: write what it stands for"
             context.leave(f"role `{{{name}}}`", message)
-            return f"`{body}`"
+            return words or f"`{body}`"
 
 
 CODE_ROLES = frozenset(
