@@ -438,7 +438,9 @@ def _leave_unused(files: SourceFiles, paths: Iterable[str]) -> None:
             message = "a kind of text that is not read: convert it to Markdown, as by Pandoc"
         elif path.endswith(".py") and f"{stem_of(path)}.ipynb" in files:
             message = PAIR
-        elif posixpath.basename(path) in _MAPS:
+        elif posixpath.basename(path) in _MAPS or (
+            path.endswith("/conf.py") and path.replace("conf.py", "index.md") in files
+        ):
             folder = posixpath.join(files.name, posixpath.dirname(path))
             message = f"a map of its own folder: `coursebuild import {folder}` follows it"
         elif path.endswith(".py") and re.search(rb"(?m)^# ?%%", files.read(path)):

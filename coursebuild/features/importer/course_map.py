@@ -307,7 +307,9 @@ _COLOURING = (
 )
 """A comment by which Docusaurus colours lines, with a word that tells how."""
 _TAG_BESIDE_BLOCK = regex(
-    r"^[ \t]*</?[a-z][^<>\n]*>[ \t]*\n(?=[ \t]*`{3})|^[ \t]*`{3,}[ \t]*\n(?=[ \t]*</)", re.MULTILINE
+    r"^[ \t]*</?[a-z][^<>\n]*>[ \t]*\n(?=[ \t]*`{3})|^[ \t]*`{3,}[ \t]*\n(?=[ \t]*</)"
+    r"|^<div\b[^<>\n]*>[ \t]*\n(?=[^\s<])",
+    re.MULTILINE,
 )
 _ROLE = regex(r"\{[a-z][\w:-]*\}`([^`]*?)(?:\s*<[^`<>]*>)?`")
 """A role of MyST, of which the map, where titles are plain, keeps the words."""

@@ -34,6 +34,7 @@ _OVER_LINES = regex(
     r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
+    r"|\{\{<(?=[^{}\n]*\n)(?:[^{}\n]|\n(?![ \t]*\n))+>\}\}"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
     rf"|^[ ]{{0,3}}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n(?!{BLOCK_START})[ \t]*[^\s<\[]\S*"
     r"(?=[ \t]*(?:$|[\"'(]))"
@@ -43,7 +44,7 @@ _OVER_LINES = regex(
     r"|(?<!\\)\\{2}\[(?=[^\n]*\n)(?>(?:(?!\\{2}[\[\]]|\n[ \t]*\n)[\s\S])+)\\{2}\]",
     re.MULTILINE,
 )
-"""Code, a role, a note, a citation, an address or a formula that goes on in the next line."""
+"""Code, a role, a note, a citation, a shortcode, an address or a formula over several lines."""
 
 
 def join_broken_lines(text: str) -> str:
