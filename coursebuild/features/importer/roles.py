@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import re
 import unicodedata
+from collections.abc import Sequence
 from urllib.parse import urlsplit
 
 from coursebuild.api import regex
@@ -253,20 +254,25 @@ def draw_emoji(name: str, context: LessonContext) -> str:
     """Return the sign that a name between colons has in Unicode, if its tool draws signs."""
     if not (context.files.mkdocs or context.files.docusaurus):
         return name
-    with contextlib.suppress(KeyError):
-        sign = unicodedata.lookup(name.strip(":").replace("_", " "))
-        if sign >= "\u2600":  # where the pictures begin
-            return sign
+    sign = _find_sign(name.strip(":").replace("_", " "), ("", " sign"))
+    if sign >= "\u2600":  # where the pictures begin
+        return sign
     context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
     return name
 
 
+def _find_sign(name: str, ends: Sequence[str]) -> str:
+    """Return the sign that Unicode calls so, with one of these ends; empty for none."""
+    for end in ends:
+        with contextlib.suppress(KeyError):
+            return unicodedata.lookup(name + end)
+    return ""
+
+
 def write_icon(icon: re.Match[str]) -> str:
     """Return the sign that an icon is, or its name where it is alone in a cell or link."""
-    for kind in ("sign", "mark"):
-        with contextlib.suppress(KeyError):
-            sign = unicodedata.lookup(f"{icon['sign']} {kind}")
-            return rf"\{sign} " if sign.isascii() else f"{sign} "
+    if sign := _find_sign(icon["sign"], (" sign", " mark")):
+        return rf"\{sign} " if sign.isascii() else f"{sign} "
     before, after = icon.string[: icon.start()], icon.string[icon.end() :]
     is_alone = re.search(r"[|\[][ \t]*$", before) and re.match(r"[ \t]*[|\]]", after)
     return f"{title_of_file(icon['sign']).lower()} " if is_alone else ""
