@@ -50,10 +50,11 @@ _FORMULA = re.compile(
 _NAMES = re.compile(
     r"\{cite[\w:]*\}`[^`]+`|\{[a-z][\w:+.-]*\}`[^`\s]+`|\{[a-z][\w:+.-]*\}(?=`)"
     r"|(?<=\S)\s<[^<>`\n]+>(?=`)|\[[^\[\]\n]*-?@[\w:.-]+[^\[\]\n]*\](?!\()"
-    r"|(?<![\w.\[])@\w+-[\w-]+|:[a-z]+-[\w-]+:|\{\{[^{}\n]*\}\}|\{%[^%\n]*%\}|<!--.*?-->",
+    r"|(?<![\w.\[])@\w+-[\w-]+|:[a-z]+-[\w-]+:|\{\{[^{}\n]*\}\}|\{%[^%\n]*%\}"
+    r"|<!--.*?-->|\{/\*.*?\*/\}",
     re.DOTALL,
 )
-"""Names by which other tools find what a page shows in their place, or how it looks."""
+"""Names by which other tools find what a page shows in their place, or how it looks; comments."""
 _ATTRIBUTES = re.compile(r"\{:?[ ]*[#.:][^{}\n]*\}|\{[ ]*[\w:-]+=[^{}\n]*\}")
 _EDGE = "\ue000"
 """What no run goes across."""
