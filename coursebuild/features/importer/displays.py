@@ -25,7 +25,7 @@ _DISPLAY = regex(
 """A formula between two dollar signs each, or code, in which there is none."""
 _ENVIRONMENT = regex(
     rf"{_CODE}|\$\$(?>(?:{WORDS}|[^$])+)\$\$|(?:^[ \t]*|(?P<words>[\w,.:;)][ ]))"
-    r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
+    r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|cases|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
     r"(?>(?:(?!\\(?:begin|end)\{(?P=env)(?P=star)\}).)*)"
     r"\\end\{(?P=env)(?P=star)\})(?(words)(?=\s)|[ \t]*$)",
     re.DOTALL | re.MULTILINE,
