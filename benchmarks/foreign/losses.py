@@ -37,10 +37,11 @@ _CODE = re.compile(
 _MARKS = re.compile(
     r"^:::[ \t]+[\w.]+\n(?:[ ]{4}[^\n]*(?:\n|\Z))+"
     r"|^[ \t>]*(?::[\w-]+:[^\n]*|:{3,}[^\n]*|\([\w:.-]+\)=|%[^\n]*|\+\+\+[^\n]*|/{3,}[^\n]*"
-    r"|===[!+]?(?=[ \t]+[\"'])|(?:!!!|\?{3}\+?)[ \t]+[\w-]+)[ \t]*$",
+    r"|===[!+]?(?=[ \t]+[\"'])|(?:!!!|\?{3}\+?)[ \t]+[\w-]+"
+    r"|import[ ][\w{}*, ]+[ ]from[ ][\"'][^\"'\n]+[\"'];?)[ \t]*$",
     re.MULTILINE,
 )
-"""Lines of options, labels, comments and frames of other tools."""
+"""Lines of options, labels, comments, frames and imports of other tools."""
 _FORMULA = re.compile(
     r"\$\$(?:(?!\n[ \t>]*\n).)+?\$\$|(?<![\\$])\$[^$\n]+\$(?!\d)"
     r"|\\begin\{(\w+\*?)\}.*?\\end\{\1\}",
@@ -49,10 +50,11 @@ _FORMULA = re.compile(
 _NAMES = re.compile(
     r"\{cite[\w:]*\}`[^`]+`|\{[a-z][\w:+.-]*\}`[^`\s]+`|\{[a-z][\w:+.-]*\}(?=`)"
     r"|(?<=\S)\s<[^<>`\n]+>(?=`)|\[[^\[\]\n]*-?@[\w:.-]+[^\[\]\n]*\](?!\()"
-    r"|(?<![\w.\[])@\w+-[\w-]+|:[a-z]+-[\w-]+:|\{\{[^{}\n]*\}\}|\{%[^%\n]*%\}|<!--.*?-->",
+    r"|(?<![\w.\[])@\w+-[\w-]+|:[a-z]+-[\w-]+:|\{\{[^{}\n]*\}\}|\{%[^%\n]*%\}"
+    r"|<!--.*?-->|\{/\*.*?\*/\}",
     re.DOTALL,
 )
-"""Names by which other tools find what a page shows in their place, or how it looks."""
+"""Names by which other tools find what a page shows in their place, or how it looks; comments."""
 _ATTRIBUTES = re.compile(r"\{:?[ ]*[#.:][^{}\n]*\}|\{[ ]*[\w:-]+=[^{}\n]*\}")
 _EDGE = "\ue000"
 """What no run goes across."""

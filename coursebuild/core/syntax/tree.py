@@ -113,7 +113,10 @@ class TextReader:
     def _read_paragraph(self, token: PositionedToken) -> model.Block | model.SourceMark:
         """A paragraph or what it is the caption of; its source alone, if it is nothing else."""
         self.index += 2
-        content, mark = split_source_mark(trim(token.text))
+        return self._read_text(trim(token.text), token)
+
+    def _read_text(self, text: Excerpt, token: PositionedToken) -> model.Block | model.SourceMark:
+        content, mark = split_source_mark(text)
         if mark is None:
             return self._read_content(content, token)
         if not content.text:
@@ -286,11 +289,9 @@ class TextReader:
                 title, rest = self.inlines(heading), head.value.rest
                 label = self._take_callout_label(braces)
                 self.index += 3
-                blocks: tuple[model.Block, ...] = ()
-                rest, mark = split_source_mark(rest)
-                if rest.text:
-                    blocks = (model.Paragraph(rest.span(), self.inlines(rest), source_mark=mark),)
-                blocks += self._read_blocks("blockquote_close")
+                first = self._read_text(rest, first_token) if rest.text else None
+                is_block = first is not None and not isinstance(first, model.SourceMark)
+                blocks = (*((first,) if is_block else ()), *self._read_blocks("blockquote_close"))
                 return model.Callout(span, kind, place, title, folded, blocks, label=label)
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
 

@@ -9,7 +9,8 @@ from coursebuild.api import regex
 from coursebuild.features.importer.source_files import read_yaml
 
 _OPTION = regex(
-    r"\s*(?:(?:#|//|%%)(?:[ ](?=\|[ ]+[\w-]+:[ ]))?\|(.*)|:([\w-]+):[ \t]*(.*))(?:\n|\Z)"
+    r"\s*(?:(?:#|//|%%)(?:[ ](?=\|[ ]+[\w-]+:[ ]))?\|(.*)"
+    r"|:([\w-]+):[ \t]*(.*(?:\n:[ ].*)*))(?:\n|\Z)"
 )
 """A line of options of a cell: YAML of Quarto, or one option of MyST."""
 _YAML_HEAD = regex(r"---[ \t]*\n(.*?)\n---[ \t]*(?:\n|\Z)", re.DOTALL)
@@ -30,7 +31,9 @@ def read_options(text: str) -> tuple[Mapping[str, str], str]:
     while option := _OPTION.match(text, at):
         at = option.end()
         if option[2]:
-            options[option[2]] = option[3].strip()
+            value = option[3].replace("\n:", "\n").strip()
+            is_quoted = value[:1] in ('"', "'")
+            options[option[2]] = str((is_quoted and read_yaml(value)) or " ".join(value.split()))
         else:
             yaml_lines.append(option[1])
     for yaml_text in ("\n".join(yaml_lines), head[1] if head else ""):

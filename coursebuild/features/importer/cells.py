@@ -63,7 +63,7 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
             shown_code = COMMENT.sub("", shown_code)
         blocks = [marks.fence(language, shown_code)] if shown_code else []
         return "\n\n".join((*blocks, *write_outputs(cell, context)))
-    code, figure = _with_new_paths(code, context), ""
+    code, figure = _show_columns(_with_new_paths(code, context), context), ""
     options = read_options(cell.text)[0]
     label = find_group(r"\A(fig-.*)", options.get("label", ""))
     draws = _find_drawing(code, context.drawing)
@@ -268,6 +268,18 @@ def _with_new_paths(code: str, context: LessonContext) -> str:
             lines[at] = line[:start] + f'"{path}"'.encode() + line[end:]
             context.change("path in a cell", "the new place of the file")
     return b"\n".join(lines).decode()
+
+
+def _show_columns(code: str, context: LessonContext) -> str:
+    """Return code in which pandas prints as many columns of a table as a notebook shows."""
+    lines, parts = code.split("\n"), "".join((*context.parts, code))
+    for statement in ast.parse(code).body if "max_columns" not in parts else ():
+        if name := imported_names(statement).get("pandas"):
+            line = f'{name}.set_option("display.max_columns", 20)  # as a notebook shows'
+            lines.insert(statement.end_lineno or 0, line)
+            context.change("table of pandas", "printed with as many columns as a notebook shows")
+            break
+    return "\n".join(lines)
 
 
 def _without_host(text: str, context: LessonContext) -> str:

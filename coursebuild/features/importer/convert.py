@@ -337,11 +337,9 @@ def _convert_texts(
         camera_is_position=course.camera_is_position,
         substitutions=course.substitutions,
     )
-    # Of R Markdown, all files of a book are one text
-    book_macros = course.macros + "".join(t.macros for t in texts if t.file == "index.Rmd")
     new = {}
     for text in texts:
-        macros = f"{book_macros}{text.macros}"
+        macros = f"{course.macros}{text.macros}"
         try:
             head = f'<a id="{to_anchor(text.label)}"></a>\n\n' if text.label else ""
             if macros:
@@ -426,6 +424,7 @@ def _own_packages(files: SourceFiles, texts: Sequence[ImportedText]) -> Iterator
             yield f"src/{path.removeprefix(folder).lstrip('/')}", files.read(path)
 
 
+_MAPS = ("_quarto.yml", "_toc.yml", "book.toml", "mkdocs.yml", "myst.yml")
 _OTHER_TEXTS = tuple(".adoc .docx .htm .html .org .pdf .rst .tex .txt".split())
 
 
@@ -439,6 +438,11 @@ def _leave_unused(files: SourceFiles, paths: Iterable[str]) -> None:
             message = "a kind of text that is not read: convert it to Markdown, as by Pandoc"
         elif path.endswith(".py") and f"{stem_of(path)}.ipynb" in files:
             message = PAIR
+        elif posixpath.basename(path) in _MAPS or (
+            path.endswith("/conf.py") and path.replace("conf.py", "index.md") in files
+        ):
+            folder = posixpath.join(files.name, posixpath.dirname(path))
+            message = f"a map of its own folder: `coursebuild import {folder}` follows it"
         elif path.endswith(".py") and re.search(rb"(?m)^# ?%%", files.read(path)):
             message = "a script of cells, which `jupytext --to ipynb` makes a notebook of"
         files.leave(path, message)

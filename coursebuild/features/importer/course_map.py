@@ -21,7 +21,6 @@ from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.account import shorten_value
-from coursebuild.features.importer.bookdown import read_bookdown
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
 from coursebuild.features.importer.pandoc_tables import number_examples
@@ -255,8 +254,6 @@ def _read_file(
         source = files.read_text(text.file)
         if not text.file.endswith(".ipynb"):
             source = expand_includes(source, text.file, files)
-        if text.file.endswith(".Rmd"):
-            source = read_bookdown(source)
         if text.file.endswith((".qmd", ".Rmd")):
             source = number_examples(source)
         if text.file.endswith(".qmd"):  # there a tag need not be apart from a block
@@ -310,7 +307,9 @@ _COLOURING = (
 )
 """A comment by which Docusaurus colours lines, with a word that tells how."""
 _TAG_BESIDE_BLOCK = regex(
-    r"^[ \t]*</?[a-z][^<>\n]*>[ \t]*\n(?=[ \t]*`{3})|^[ \t]*`{3,}[ \t]*\n(?=[ \t]*</)", re.MULTILINE
+    r"^[ \t]*</?[a-z][^<>\n]*>[ \t]*\n(?=[ \t]*`{3})|^[ \t]*`{3,}[ \t]*\n(?=[ \t]*</)"
+    r"|^<div\b[^<>\n]*>[ \t]*\n(?=[^\s<])",
+    re.MULTILINE,
 )
 _ROLE = regex(r"\{[a-z][\w:-]*\}`([^`]*?)(?:\s*<[^`<>]*>)?`")
 """A role of MyST, of which the map, where titles are plain, keeps the words."""

@@ -348,7 +348,7 @@ def _write_glossary(directive: Directive) -> str:
         if entry.startswith("[^"):  # a footnote
             out.append(directive.nested(entry).strip())
             continue
-        terms.append(_mark_term(term.strip(), marked_terms))
+        terms.append(_mark_term(directive.nested(term).strip(), marked_terms))
         if meaning.strip():
             words = directive.nested(textwrap.dedent(meaning)).strip()
             gap = "\n\n" if re.match(BLOCK_START, words) else " "

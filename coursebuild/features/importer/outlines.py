@@ -72,7 +72,7 @@ def read_outline(files: SourceFiles) -> Outline | None:
         )
     if not (config := files.docusaurus):
         return None
-    pattern = r"(?:^|[{,])\s*(title|tagline):\s*([\"'`])(.+?)\2"
+    pattern = r"(?:^|[{,])\s*[\"']?(title|tagline)[\"']?:\s*([\"'`])(.+?)\2"
     fields = re.findall(pattern, files.read_text(config), re.MULTILINE)
     settings = {key: text for key, _, text in reversed(fields)}  # the first is that of the site
     folder = posixpath.dirname(config)  # its texts may stand beside it
@@ -85,11 +85,15 @@ def read_outline(files: SourceFiles) -> Outline | None:
     parts: list[ImportedText | ImportedLevel] = []
     for name in usual_paths or [path for path in paths if path in files]:
         files.change("map", "content/course.toml")
-        sidebars = _read_literal(files.read_text(name))
+        text = files.read_text(name)
+        sidebars = _read_literal(_SPREAD.sub("", text))
         if sidebars is None:
             message = "a program: the order of lessons is that of `sidebar_position` and of names"
             files.leave(name, message, "map")
-        for sidebar in sidebars.values() if sidebars else ():
+            continue
+        for words in _SPREAD.findall(text):
+            leave_entry(name, words.rstrip(","), files)
+        for sidebar in sidebars.values():
             parts += _read_sidebar(sidebar, name, docs, files)
     parts = parts or [*read_folder(docs, files)]
     summary = settings.get("tagline", "")
@@ -227,6 +231,9 @@ def read_tree(
 
 # --- Docusaurus
 
+_SPREAD = regex(r"\.\.\.[\w.]+(?:\([^()]*\))?,?")
+"""What a program adds to an object or a list of JavaScript."""
+
 
 def _read_literal(text: str) -> Mapping[str, object] | None:
     """Return the value of an object of JavaScript; `None` where it is not literal."""
@@ -235,9 +242,9 @@ def _read_literal(text: str) -> Mapping[str, object] | None:
     start = re.search(
         r"(?:module\.exports\s*=|sidebars\b[^=\n]*=|export default|\A)\s*(?=\{)", text
     )
-    if start is None or "..." in text or "=>" in text:
-        return None
     end = text.rfind("}")
+    if start is None or re.search(r"\.\.\.|=>", text[start.end() : end]):
+        return None
     # An object of JavaScript whose values are literal is a value of YAML, but for blanks.
     literal = re.sub(r"([\"'\w])\s*:(?=\S)", r"\1: ", text[start.end() : end + 1]).replace(
         "\t", " "
@@ -360,12 +367,13 @@ def read_folder(folder: str, files: SourceFiles) -> Iterator[ImportedText | Impo
     """
     entries: list[tuple[float, str]] = []
     start = f"{folder}/".removeprefix("./")
-    for child in {path[len(start) :].partition("/")[0] for path in files if path.startswith(start)}:
+    texts = (path for path in files if path.startswith(start) and path.endswith(TEXTS))
+    for child in {path[len(start) :].partition("/")[0] for path in texts}:
         path = f"{start}{child}"
-        if path in files and path.endswith(TEXTS) and not child.startswith("_"):
-            position = _front_matter(path, files).get("sidebar_position")
-        elif path not in files:
+        if path not in files:
             position = _category(path, files).get("position")
+        elif not child.startswith("_"):
+            position = _front_matter(path, files).get("sidebar_position")
         else:
             continue
         number = re.match(r"\d+", child)

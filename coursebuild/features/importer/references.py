@@ -109,7 +109,7 @@ def _read(
             whole = _WITH_CONTENT.match(text, span.start)
             end = whole.end() if whole is not None else span.end
             if span.start not in edits:
-                edits[span.start] = Edit(Span(source, span.start, end), "")
+                edits[span.start] = Edit(_with_line(Span(source, span.start, end)), "")
                 tag = shorten(text[span.start : end], 120, placeholder="…")
                 leave(link, "tag of HTML", f"`{tag}`, which a page cannot hold")
         for html in _raw_html(document):
@@ -156,7 +156,16 @@ def _link_to_picture(
     is_named = is_in_link and re.match(r"[^<]*\w", source.text[end:])  # by the words behind it
     words = alt or ("" if is_named else urlsplit(address.text).path.rpartition("/")[2])
     new = words if is_in_link else f'<a href="{address.text}">{words}</a>'
-    return {start: Edit(Span(source, start, end), "" if tag.startswith("<source") else new)}
+    span = Span(source, start, end)
+    return {start: Edit(_with_line(span), "") if tag.startswith("<source") else Edit(span, new)}
+
+
+def _with_line(span: Span) -> Span:
+    """Return the whole line of what stands alone on it: an empty one would end HTML."""
+    text = span.source.text
+    start, end = text.rfind("\n", 0, span.start) + 1, text.find("\n", span.end) + 1
+    rest = text[start : span.start] + text[span.end : end]
+    return span if rest.strip() or not end else Span(span.source, start, end)
 
 
 def _raw_html(document: model.Document) -> Iterator[model.HtmlBlock | model.RawInline]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import re
 import unicodedata
+from collections.abc import Sequence
 from urllib.parse import urlsplit
 
 from coursebuild.api import regex
@@ -34,6 +35,7 @@ _OVER_LINES = regex(
     r"|(?<![\w$\\`])\{[a-z][\w:+.-]*\}`(?=[^`\n]*\n)(?:[^`\n]|\n(?![ \t]*\n))+`"
     r"|\^\[(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
     r"|\[-?@(?=[^\[\]\n]*\n)(?:[^\[\]\n]|\n(?![ \t]*\n))+\]"
+    r"|\{\{<(?=[^{}\n]*\n)(?:[^{}\n]|\n(?![ \t]*\n))+>\}\}"
     r"|(?<=\]\()[^()\s]+[ \t]*\n[ \t]*\)"
     rf"|^[ ]{{0,3}}\[(?!\^)[^\[\]\n]+\]:[ \t]*\n(?!{BLOCK_START})[ \t]*[^\s<\[]\S*"
     r"(?=[ \t]*(?:$|[\"'(]))"
@@ -43,7 +45,7 @@ _OVER_LINES = regex(
     r"|(?<!\\)\\{2}\[(?=[^\n]*\n)(?>(?:(?!\\{2}[\[\]]|\n[ \t]*\n)[\s\S])+)\\{2}\]",
     re.MULTILINE,
 )
-"""Code, a role, a note, a citation, an address or a formula that goes on in the next line."""
+"""Code, a role, a note, a citation, a shortcode, an address or a formula over several lines."""
 
 
 def join_broken_lines(text: str) -> str:
@@ -143,9 +145,9 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
         case _ if _ICON_ROLE.fullmatch(name):
             return ""
         case _:
-            message = f"the role `{{{name}}}`, whose text is code now: write what it stands for"
+            message = f"the role `{{{name}}}`, whose text is shown: write what it stands for"
             context.leave(f"role `{{{name}}}`", message)
-            return f"`{body}`"
+            return words or f"`{body}`"
 
 
 CODE_ROLES = frozenset(
@@ -252,20 +254,25 @@ def draw_emoji(name: str, context: LessonContext) -> str:
     """Return the sign that a name between colons has in Unicode, if its tool draws signs."""
     if not (context.files.mkdocs or context.files.docusaurus):
         return name
-    with contextlib.suppress(KeyError):
-        sign = unicodedata.lookup(name.strip(":").replace("_", " "))
-        if sign >= "\u2600":  # where the pictures begin
-            return sign
+    sign = _find_sign(name.strip(":").replace("_", " "), ("", " sign"))
+    if sign >= "\u2600":  # where the pictures begin
+        return sign
     context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
     return name
 
 
+def _find_sign(name: str, ends: Sequence[str]) -> str:
+    """Return the sign that Unicode calls so, with one of these ends; empty for none."""
+    for end in ends:
+        with contextlib.suppress(KeyError):
+            return unicodedata.lookup(name + end)
+    return ""
+
+
 def write_icon(icon: re.Match[str]) -> str:
     """Return the sign that an icon is, or its name where it is alone in a cell or link."""
-    for kind in ("sign", "mark"):
-        with contextlib.suppress(KeyError):
-            sign = unicodedata.lookup(f"{icon['sign']} {kind}")
-            return rf"\{sign} " if sign.isascii() else f"{sign} "
+    if sign := _find_sign(icon["sign"], (" sign", " mark")):
+        return rf"\{sign} " if sign.isascii() else f"{sign} "
     before, after = icon.string[: icon.start()], icon.string[icon.end() :]
     is_alone = re.search(r"[|\[][ \t]*$", before) and re.match(r"[ \t]*[|\]]", after)
     return f"{title_of_file(icon['sign']).lower()} " if is_alone else ""

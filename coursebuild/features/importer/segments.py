@@ -21,6 +21,7 @@ from coursebuild.api import UsageError, regex
 from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.displays import read_macros
 from coursebuild.features.importer.jsx import COMPONENT, dedent_components, is_mdx
+from coursebuild.features.importer.rst import read_rst
 from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
 
 _MARK = regex(r"(:{3,}|/{3,})[ \t]*(.*?)[ \t]*")
@@ -191,12 +192,6 @@ _ALERT = regex(
     re.MULTILINE | re.DOTALL | re.IGNORECASE,
 )
 """A callout of Jupyter, as its style sheet has it, or a component; or code, in which is none."""
-_HIGHLIGHT = regex(
-    r"^\{[%{][<%-]?[ ]*(?:(highlight)[ ]+|(\w+)[ ]+lang=\"?)(\w+)[^\n]*\n(.*?)\n"
-    r"\{[%{][<%-]?[ ]*(?:end|/)(?:\1|\2)\b[^\n]*$",
-    re.MULTILINE | re.DOTALL,
-)
-"""A block of code of Jekyll or Hugo, whose own shortcodes say so by `lang`."""
 
 
 def _write_alert(alert: re.Match[str]) -> str:
@@ -241,7 +236,7 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
     block.
     """
     text = _HINT.sub(r"::::::\1\n\2\n::::::", _GATES.sub(_join_gates, text))
-    text = _HIGHLIGHT.sub(r"```\3\n\4\n```", _ALERT.sub(_write_alert, text))
+    text = _ALERT.sub(_write_alert, text)
     lines = text.split("\n")
     at = 0
     for (start, end), mark, head, content in (*_find_blocks(text), ([len(lines)] * 2, "", "", "")):
@@ -384,6 +379,8 @@ def _read_cells(
     is_run = any(cell.get("outputs") for cell in cells)
     for number, cell in enumerate(cells, 1):
         place, source = f"cell {number}", join_lines(cell.get("source", ""))
+        metadata = cell.get("metadata") or {}
+        raw_format = str(metadata.get("raw_mimetype") or metadata.get("format") or "")
         if cell.get("cell_type") == "markdown":
             pictures = {}
             for name, kinds in (cell.get("attachments") or {}).items():
@@ -398,7 +395,7 @@ def _read_cells(
             segments += read_markdown(source, place=place)
         elif cell.get("cell_type") == "code" and source.strip():
             outputs = cell.get("outputs") or ()
-            tags = " ".join((cell.get("metadata") or {}).get("tags") or ())
+            tags = " ".join(metadata.get("tags") or ())
             values = [o for o in outputs if o.get("output_type") == "execute_result"]
             value_texts = [(o.get("data") or {}).get("text/plain") or "" for o in values]
             value_texts += ["\n".join(o["traceback"]) for o in outputs if o.get("traceback")]
@@ -421,6 +418,8 @@ def _read_cells(
                 ),
             )
             segments.append(cell_segment)
+        elif raw_format == "text/restructuredtext":
+            segments += read_markdown(read_rst(source), place=place)
         elif source.strip():
             segments.append(Segment(kind="block", place=place, text=source, head="text"))
     return segments, attachments
