@@ -236,6 +236,11 @@ class Session:
         )
         return parsed_document
 
+    @property
+    def imports(self) -> Mapping[str, frozenset[str]]:
+        """The modules that each script imports, by its path, of the texts read so far."""
+        return self._reader.imports
+
     def take_other_saves(self) -> None:
         """Take saves of files other than documents."""
         with self.condition:
