@@ -43,6 +43,7 @@ from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.python_code import find_imports
 from coursebuild.core.text.source import key_of
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.records import imports_of
 
 _KIND, _STYLE = "downloads", "matplotlibrc"
 _MODELS, _EXAMPLES, _LIBRARY = "models/", "examples/", "mjcourse/"
@@ -65,7 +66,8 @@ class _Course:
     ) -> None:
         """`facts` are those of models, by name; `imports`: see `verify`."""
         self.root, self.options = options.root, options
-        self.runs, self._imports = {run.path: run for run in runs}, imports
+        self.runs = {run.path: run for run in runs}
+        self.imports = functools.partial(imports_of, imports=imports)
         self._includes = {f"{_MODELS}{name}.xml": f.includes for name, f in facts if f is not None}
         self._folders = [options.root / package.path for package in course.packages]
         self._prefixes = tuple(f"{package.path.rstrip('/')}/" for package in course.packages)
@@ -75,20 +77,13 @@ class _Course:
             for e in scripts
             if e.script.is_python
         }
-        self._own_names = {name for module in self.modules for name in module.split(".")}
+        self.own_names = {name for module in self.modules for name in module.split(".")}
         self._find_top = functools.cache(self._read_top)
         self.files_of_module = functools.cache(
             functools.partial(module_files, folders=self._folders)
         )
         self.imports_of_module = functools.cache(self._read_imports)
         self.read = functools.cache(functools.partial(read_bytes, options.root))
-
-    def imports(self, extraction: Extraction) -> frozenset[str]:
-        """The top-level modules that a script imports."""
-        if not extraction.script.is_python:
-            return frozenset()
-        modules = self._imports.get(extraction.path)
-        return find_imports(extraction.text) if modules is None else modules
 
     def find_module(self, script: str, name: str) -> CourseModule | None:
         """The module that the script at a path in `examples/` gets by this name."""
@@ -99,10 +94,6 @@ class _Course:
             if module is not None:
                 return module
         return self._find_top(top).get(name)
-
-    def has_any(self, modules: Iterable[str]) -> bool:
-        """Whether the course may have one of these top-level modules."""
-        return any(name in self._own_names or self.files_of_module(name) for name in modules)
 
     def answer(self, script: str, name: str) -> str:
         """A name for the module that a script gets; empty where the course has none."""
@@ -241,8 +232,9 @@ def _one_file(course_files: _Course, extraction: Extraction) -> _OneFile:
     path, name = extraction.path, extraction.path.rpartition("/")[2]
     files, style = course_files.files_of(extraction), course_files.style
     imports = course_files.imports(extraction)
-    has_style = bool(style) and "matplotlib" in imports
-    if not (files or has_style or course_files.has_any(imports)):  # as most
+    has_style = style and "matplotlib" in imports
+    is_own = (n in course_files.own_names or course_files.files_of_module(n) for n in imports)
+    if not (files or has_style or any(is_own)):  # as most
         modules = tuple(sorted(imports - sys.stdlib_module_names))
         return _OneFile(_in_place(extraction.text, path, name), modules, {})
     key = step_key("one file", path, extraction.text, files, style)

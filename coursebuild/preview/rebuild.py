@@ -188,7 +188,7 @@ class BackgroundRebuild:
             session.runs.addresses = addresses
             if not known_runs:  # what else was printed was so for another reason, or by other code
                 session.runs.repeats.clear()
-        keys, imports = script_keys(course), session.imports
+        keys = script_keys(course)
         options = replace(
             self._options,
             run_all=self._run_unless_edited(course),
@@ -203,7 +203,6 @@ class BackgroundRebuild:
                 addresses=addresses,
                 known_runs=known_runs,
                 other_runs=session.runs.other_runs(),
-                imports=imports,
             )
         except BaseException:
             session.runs.is_all_due |= is_all_due
@@ -211,7 +210,11 @@ class BackgroundRebuild:
         finally:
             session.runs.running.clear()
         results, _ = with_downloads(
-            course, verification.results, options.for_course(course), imports, only_known=True
+            course,
+            verification.results,
+            options.for_course(course),
+            session.reader.imports,
+            only_known=True,
         )
         verification = replace(verification, results=results)
         self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once
