@@ -102,6 +102,15 @@ def built_courses(shared: Path, stores: Path) -> BuiltCourses:
 
 
 @pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files."""
+    folder = tmp_path / "tmp"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+@pytest.fixture
 def make(tmp_path: Path, stores: Path) -> Make:
     """Makes a course of these lessons."""
     from support.scratch_course import maker

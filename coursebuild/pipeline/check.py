@@ -15,7 +15,6 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.files.locks import project_lock
-from coursebuild.core.files.write import change_files
 from coursebuild.core.model import Citation, Course, Document, document_scripts, find_inlines
 from coursebuild.core.model.lesson_record import record_path
 from coursebuild.core.model.results import Reports, Results, ScriptRun, TrialLine
@@ -37,8 +36,7 @@ from coursebuild.pipeline.load import Code, load
 from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.proofs import remarks_on_proofs
 from coursebuild.pipeline.reader import Reader
-from coursebuild.pipeline.recordings import read_recorded
-from coursebuild.pipeline.records import record_changes
+from coursebuild.pipeline.records import write_records
 from coursebuild.pipeline.scenes import shown_reports
 from coursebuild.pipeline.scripts import measure_sensitivity
 from coursebuild.pipeline.shards import Shard, write_timings
@@ -137,7 +135,7 @@ class CheckedCourse(Struct, frozen=True):
 
     def write_records(self) -> None:
         """Keep where the values of documents without errors were printed; records nothing."""
-        verification, root = self.verification, self.options.root
+        verification = self.verification
         outputs = PrintedOutputs(verification.results.verdicts, ())
         diagnostics = (*self.diagnostics, *verification.run_diagnostics)
         broken = {diagnostic.span.path for diagnostic in diagnostics if diagnostic.is_error}
@@ -147,10 +145,7 @@ class CheckedCourse(Struct, frozen=True):
             if self.documents is None or document.source.path in self.documents
             if document.source.path not in broken
         ]
-        read = functools.partial(read_recorded, root)
-        at = verification.addresses
-        if changes := list(record_changes(self.course, documents, outputs, at, root, read)):
-            change_files(root, changes, beside_commands=True)
+        write_records(self.course, documents, outputs, verification.addresses, self.options.root)
 
 
 def read_and_verify(

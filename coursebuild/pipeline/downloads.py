@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-
-from msgspec import Struct
 
 from coursebuild.core.engine.digests import file_state
 from coursebuild.core.engine.tool import step_key
@@ -19,47 +17,24 @@ from coursebuild.core.pages import urls, zips
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.theme import dark_colours, dark_drawing
 from coursebuild.core.scripts.figure_data import without_data
-from coursebuild.pipeline.options import Options
-from coursebuild.pipeline.reader import Reader
-from coursebuild.pipeline.script_downloads import make_archives
 
 _DIGEST = hashlib.sha256().digest_size * 2
 
 
-class Downloads(Struct, frozen=True):
-    """The files, and what features make others from."""
-
-    files: tuple[SiteFile, ...]
-    archives: Mapping[str, zips.Archive]
-    """Archives of scripts by site path."""
-
-    @classmethod
-    def of(cls, library: Library, reader: Reader, options: Options) -> Downloads:
-        """The downloads of a course whose documents were read."""
-        options = options.for_course(library.course)
-        archives = {a.path: a for a in make_archives(library, options, reader.imports)}
-        archive_files = (
-            CachedFile(archive.path, step_key("archive", archive.key), archive.pack)
-            for archive in archives.values()
-        )
-        handed_over = {d.path: _handed_over(d) for d in library.results.downloads}
-        scripts = (
-            CachedFile(path, script.code.digest.hex(), script.code.text.encode)
-            for path, (script, _) in library.scripts.items()
-            if path not in handed_over
-        )
-        models = (
-            OutputFile(urls.model_file_path(model.name), model.source.text.encode())
-            for model in library.course.models
-        )
-        files = (
-            *handed_over.values(),
-            *scripts,
-            *models,
-            *_files(library, options.root),
-            *archive_files,
-        )
-        return cls(files, archives)
+def download_files(
+    library: Library, archives: Iterable[zips.Archive], root: Path
+) -> Iterator[SiteFile]:
+    """The files that can be downloaded; `archives` are those of scripts."""
+    handed_over = {d.path: _handed_over(d) for d in library.results.downloads}
+    yield from handed_over.values()
+    for path, (script, _) in library.scripts.items():
+        if path not in handed_over:
+            yield CachedFile(path, script.code.digest.hex(), script.code.text.encode)
+    for model in library.course.models:
+        yield OutputFile(urls.model_file_path(model.name), model.source.text.encode())
+    for archive in archives:
+        yield CachedFile(archive.path, step_key("archive", archive.key), archive.pack)
+    yield from _files(library, root)
 
 
 def _handed_over(download: ScriptDownload) -> OutputFile:

@@ -24,7 +24,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.write import FileChange, change_files, check_writable
 from coursebuild.core.scripts.edit import edited_texts, select_harmless
-from coursebuild.core.text.diagnostics import Diagnostic, Edit
+from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
 from coursebuild.pipeline.check import judge, list_unproven, read_and_verify
 from coursebuild.pipeline.load import Code, load
@@ -231,12 +231,17 @@ class _Fixer:
     def _candidates(self, diagnostics: Collection[Diagnostic]) -> list[Diagnostic]:
         """The diagnostics with edits that may be made and were not tried."""
         doubtful = {d.span.path for d in diagnostics if d.rule in DOUBTFUL}
+
+        def may_change(path: str) -> bool:
+            is_asked = path in self.paths or not self.names
+            return is_asked and path not in doubtful and may_edit(self.options.root, path)
+
         return [
             d
             for d in diagnostics
             if d.edits
             and _key(d) not in self.tried
-            and all(e.span.path not in doubtful and self._may_edit(e) for e in d.edits)
+            and all(may_change(edit.span.path) for edit in d.edits)
         ]
 
     def _make(self, fixes: Sequence[Diagnostic]) -> None:
@@ -254,10 +259,6 @@ class _Fixer:
                 old_lines, new_lines = source.text.splitlines(), new.splitlines()
                 diff = difflib.unified_diff(old_lines, new_lines, n=0, lineterm="")
                 yield from (line for line in list(diff)[2:] if not line.startswith("@@"))
-
-    def _may_edit(self, edit: Edit) -> bool:
-        path = edit.span.path
-        return (not self.names or path in self.paths) and may_edit(self.options.root, path)
 
     def _texts_with(self, fixes: Iterable[Diagnostic]) -> dict[str, str]:
         edits = (edit for diagnostic in fixes for edit in diagnostic.edits)

@@ -9,8 +9,6 @@ import functools
 from collections.abc import Iterable, Mapping
 from typing import TypeAlias
 
-from msgspec import Struct
-
 from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.model import (
@@ -33,11 +31,8 @@ OwnedDocument: TypeAlias = tuple[str, Document]
 """A document with the id of its lesson or page."""
 
 
-class _Held(Struct, frozen=True):
-    """A document in which all held."""
-
-    addresses: tuple[tuple[ShownValue, tuple[Address, ...]], ...]
-    """Where its values were printed."""
+_Printed: TypeAlias = tuple[tuple[ShownValue, tuple[Address, ...]], ...]
+"""Where the values of a document were printed, in which all held."""
 
 
 class HeldDocuments:
@@ -80,11 +75,11 @@ class HeldDocuments:
                 self._known_addresses.get(source.path),
                 [(path, self._script_state(path)) for path in sorted(scripts)],
             )
-            entry = self._store.get_value(_KIND, key, _Held)
+            entry = self._store.get_value(_KIND, key, _Printed)
             if entry is None:
                 changed_documents.append((id, document))
             else:
-                self._addresses |= dict(entry.addresses)
+                self._addresses |= dict(entry)
         return changed_documents
 
     def keep(self, documents: Iterable[OwnedDocument], findings: Iterable[Diagnostic]) -> None:
@@ -93,8 +88,7 @@ class HeldDocuments:
         addresses = self._by_document()
         for path in (document.source.path for _, document in documents):
             if path not in found_paths:
-                entry = _Held(tuple(addresses.get(path, ())))
-                self._store.put_value(_KIND, self._keys[path], entry)
+                self._store.put_value(_KIND, self._keys[path], tuple(addresses.get(path, ())))
 
     def _by_document(self) -> dict[str, list[tuple[ShownValue, tuple[Address, ...]]]]:
         by_document: dict[str, list[tuple[ShownValue, tuple[Address, ...]]]] = {}

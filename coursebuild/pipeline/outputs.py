@@ -20,7 +20,7 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.examples import Obstacle
 from coursebuild.core.files.locks import project_lock
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.files.write import change_files, check_writable, write_atomic
+from coursebuild.core.files.write import check_writable, write_atomic
 from coursebuild.core.model import Course, Document
 from coursebuild.core.model.lesson_record import known_addresses
 from coursebuild.core.model.results import Outcome, ScriptRun, TrialLine
@@ -50,7 +50,7 @@ from coursebuild.pipeline.recordings import (
     record_runs,
     write_figures,
 )
-from coursebuild.pipeline.records import record_changes
+from coursebuild.pipeline.records import write_records
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
     extract_scripts,
@@ -220,11 +220,9 @@ class _Updater:
 
     def _write_records(self, new_course: Course, runs: Sequence[ScriptRun]) -> list[str]:
         """Write what the lessons were recorded with, and where values stand, beside them."""
-        root, documents = self.options.root, self._chosen_documents(new_course, self.reworded)
-        outputs, read = self._outputs(new_course, runs), functools.partial(read_recorded, root)
-        changes = list(record_changes(new_course, documents, outputs, self.addresses, root, read))
-        if changes:
-            change_files(root, changes, beside_commands=True)
+        documents = self._chosen_documents(new_course, self.reworded)
+        outputs, root = self._outputs(new_course, runs), self.options.root
+        changes = write_records(new_course, documents, outputs, self.addresses, root)
         return [f"{'wrote' if change.new else 'removed'} {change.path}" for change in changes]
 
     def _diagnose_updated(self, new_course: Course, runs: Sequence[ScriptRun]) -> list[Diagnostic]:
@@ -232,7 +230,13 @@ class _Updater:
         # What was written above a script has moved it.
         extractions = [e for e in extract_course(new_course).value if e.path in paths]
         if new_course is not self.course:
-            self._carry_addresses(new_course, runs)
+            # The addresses of numbers that were written anew
+            before, now = self._outputs(self.course, runs), self._outputs(new_course, runs)
+            new_documents = {d.source.path: d for d in self._chosen_documents(new_course)}
+            for document in self._chosen_documents(self.course):
+                if (new_document := new_documents.get(document.source.path)) is not None:
+                    old, new = document_values(document, before), document_values(new_document, now)
+                    self.addresses |= carried_addresses(self.addresses, old, new)
         chosen_paths = {document.source.path for document in self._chosen_documents(new_course)}
         chosen_documents = [p for p in new_course.shown_texts if p[1].source.path in chosen_paths]
         verdicts = compare_all(new_course, runs, self.addresses)
@@ -248,15 +252,6 @@ class _Updater:
             ),
             *figure_findings(new_course, runs, functools.partial(read_recorded, self.options.root)),
         ]
-
-    def _carry_addresses(self, new_course: Course, runs: Sequence[ScriptRun]) -> None:
-        """Keep the addresses of numbers that were written anew."""
-        before, now = self._outputs(self.course, runs), self._outputs(new_course, runs)
-        new_documents = {d.source.path: d for d in self._chosen_documents(new_course)}
-        for document in self._chosen_documents(self.course):
-            if (new_document := new_documents.get(document.source.path)) is not None:
-                old, new = document_values(document, before), document_values(new_document, now)
-                self.addresses |= carried_addresses(self.addresses, old, new)
 
 
 def changed_text(verb: str, source: Source, new: str) -> str:

@@ -122,7 +122,7 @@ def make_files(
     if not report.ok:
         return report, None
     course, results = checked_course.course, checked_course.verification.results
-    results, failures = with_downloads(course, results, checked_course.options)
+    results, failures = with_downloads(course, results, checked_course.options, reader.imports)
     assets = Assets(template_texts(), Bundle(), prepared_folder())
     try:
         outputs = make(make_library(course, results, assets, checked_course.reports))

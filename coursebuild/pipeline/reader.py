@@ -131,7 +131,8 @@ class Reader:
     @property
     def imports(self) -> dict[str, frozenset[str]]:
         """The modules that each script imports, by its path; of the documents read so far."""
-        imports = (pair for _, summary in self._summaries.values() for pair in summary.imports)
+        summaries = (*self._summaries.values(),)  # to which another thread may add
+        imports = (pair for _, summary in summaries for pair in summary.imports)
         return {path: frozenset(modules) for path, modules in imports}
 
     def fingerprints(self, course: Course) -> tuple[str | None, str | None]:

@@ -8,7 +8,6 @@ script had run now.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import time
@@ -229,22 +228,21 @@ def check_drawings(course: Course, options: Options) -> Iterator[Diagnostic]:
     """Judge the pictures, which are published as they are: what they are, and all of an SVG."""
     for path in course.files:
         kind = path[path.rfind(".") :].lower()
-        begins = _SIGNATURES.get(kind, b"")
-        if begins and not re.match(begins, read_recorded(options.root, path) or b"", re.DOTALL):
+        is_drawing = kind in (".svg", ".svgz") and course.html != "trusted"
+        if not (is_drawing or kind in _SIGNATURES):
+            continue
+        data = read_recorded(options.root, path) or b""
+        if not re.match(_SIGNATURES.get(kind, b""), data, re.DOTALL):
             message = f"`{path}` is no picture of the kind that its name says"
             help = "save it again in this format, or rename it"
             yield diagnose("image-forbidden", Source(path, "").span(0, 0), message, help=help)
-    if course.html == "trusted":
-        return
-    for path in course.files:
-        if path.lower().endswith((".svg", ".svgz")):
-            data = read_recorded(options.root, path) or b""
+        if is_drawing:
 
             def find_fault(data: bytes = data) -> bytes:
                 drawing = read_svg(data)
                 return drawing.encode() if isinstance(drawing, str) else b""
 
-            key = step_key("drawing", hashlib.sha256(data).hexdigest())
+            key = step_key("drawing", data)
             fault = options.store.get_or_make("drawings", key, find_fault)
             if fault:
                 message = f"`{path}` {fault.decode()}"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import functools
 import posixpath
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from msgspec.structs import replace
 
 from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.read import read_bytes
-from coursebuild.core.files.write import FileChange
+from coursebuild.core.files.write import FileChange, change_files
 from coursebuild.core.model import Course, Document, output_numbers
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.model.lesson_record import (
@@ -52,14 +52,7 @@ def with_provenance(
     new_runs = [
         run for run in runs.values() if run.did_run and run.provenance is None and not run.recorded
     ]
-
-    def find(extraction: Extraction) -> frozenset[str]:
-        return find_imports(extraction.text) if extraction.script.is_python else frozenset()
-
-    imports_by_path = {
-        run.path: imports[run.path] if run.path in imports else find(extractions[run.path])
-        for run in new_runs
-    }
+    imports_by_path = {run.path: imports_of(extractions[run.path], imports) for run in new_runs}
     modules_by_path = {
         run.path: imports_by_path[run.path] if run.trace is None else frozenset(run.trace.modules)
         for run in new_runs
@@ -73,7 +66,7 @@ def with_provenance(
     python = surroundings["Python"].removeprefix("C")
 
     @functools.cache
-    def imports_of(path: str) -> frozenset[str]:
+    def imports_of_file(path: str) -> frozenset[str]:
         try:
             text = read_bytes(options.root, path).decode("utf-8", "replace")
         except EffectError:
@@ -87,7 +80,7 @@ def with_provenance(
         names = {*imports_by_path[run.path]}
         for path in () if run.trace is None else run.trace.files:
             is_of_course = path.endswith(".py") and not path.startswith("mjcourse/")  # our package
-            names |= imports_of(path) if is_of_course else frozenset()
+            names |= imports_of_file(path) if is_of_course else frozenset()
         names |= {"mujoco"} if "mjcourse" in names else set()
         all_packages = _versions(packages, modules_by_path[run.path])
         direct = _versions(packages, names & modules_by_path[run.path])
@@ -98,8 +91,30 @@ def with_provenance(
     return {**runs, **{run.path: replace(run, provenance=provenance(run)) for run in new_runs}}
 
 
+def imports_of(script: Extraction, imports: Mapping[str, frozenset[str]]) -> frozenset[str]:
+    """The top-level modules that a script imports; `imports` has those of some, by path."""
+    if not script.script.is_python:
+        return frozenset()
+    return imports[script.path] if script.path in imports else find_imports(script.text)
+
+
 def _versions(packages: Mapping[str, tuple[str, str]], modules: Iterable[str]) -> Versions:
     return tuple(sorted({packages[module] for module in modules if module in packages}))
+
+
+def write_records(
+    course: Course,
+    documents: Iterable[Document],
+    outputs: PrintedOutputs,
+    addresses: Addresses,
+    root: Path,
+) -> Sequence[FileChange]:
+    """Write what `record_changes` finds, beside other commands; return it."""
+    read = functools.partial(read_recorded, root)
+    changes = [*record_changes(course, documents, outputs, addresses, root, read)]
+    if changes:
+        change_files(root, changes, beside_commands=True)
+    return changes
 
 
 def record_changes(

@@ -8,14 +8,12 @@
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import functools
 import platform
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import cast
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -39,17 +37,19 @@ from coursebuild.core.run.alone import AloneJob, AloneRun, Runner
 from coursebuild.core.run.script_environment import distributions, module_files
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import Extraction, extract
-from coursebuild.core.scripts.module_code import CourseModule, NotOneFileError, is_text
+from coursebuild.core.scripts.module_code import CourseModule, NotOneFileError
 from coursebuild.core.scripts.single_file import Belongings, single_file
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.python_code import find_imports, python_nodes
+from coursebuild.core.text.python_code import find_imports
 from coursebuild.core.text.source import key_of
 from coursebuild.pipeline.options import Options
+from coursebuild.pipeline.records import imports_of
 
 _KIND, _STYLE = "downloads", "matplotlibrc"
 _MODELS, _EXAMPLES, _LIBRARY = "models/", "examples/", "mjcourse/"
 _MOST_DATA = 1 << 16
 """Bytes of data that stand in a file for people to read; more come in an archive."""
+_DOCSTRING = re.compile(r"""(?:\s|#.*\n)*[rRuU]?(?:(\"{3}|'{3})[\s\S]*?\1|"[^"\n]*"|'[^'\n]*')""")
 
 
 class _Course:
@@ -62,11 +62,12 @@ class _Course:
         options: Options,
         runs: Iterable[ScriptRun],
         facts: Iterable[tuple[str, ModelFacts | None]],
-        imports: Mapping[str, frozenset[str]] = {},
+        imports: Mapping[str, frozenset[str]],
     ) -> None:
         """`facts` are those of models, by name; `imports`: see `verify`."""
         self.root, self.options = options.root, options
-        self.runs, self._imports = {run.path: run for run in runs}, imports
+        self.runs = {run.path: run for run in runs}
+        self.imports = functools.partial(imports_of, imports=imports)
         self._includes = {f"{_MODELS}{name}.xml": f.includes for name, f in facts if f is not None}
         self._folders = [options.root / package.path for package in course.packages]
         self._prefixes = tuple(f"{package.path.rstrip('/')}/" for package in course.packages)
@@ -76,19 +77,13 @@ class _Course:
             for e in scripts
             if e.script.is_python
         }
+        self.own_names = {name for module in self.modules for name in module.split(".")}
         self._find_top = functools.cache(self._read_top)
         self.files_of_module = functools.cache(
             functools.partial(module_files, folders=self._folders)
         )
         self.imports_of_module = functools.cache(self._read_imports)
         self.read = functools.cache(functools.partial(read_bytes, options.root))
-
-    def imports(self, extraction: Extraction) -> frozenset[str]:
-        """The top-level modules that a script imports."""
-        if not extraction.script.is_python:
-            return frozenset()
-        modules = self._imports.get(extraction.path)
-        return find_imports(extraction.text) if modules is None else modules
 
     def find_module(self, script: str, name: str) -> CourseModule | None:
         """The module that the script at a path in `examples/` gets by this name."""
@@ -161,10 +156,11 @@ def find_downloads(
     runs: Iterable[ScriptRun],
     models: Iterable[tuple[str, CompileResult]],
     options: Options,
+    imports: Mapping[str, frozenset[str]],
 ) -> tuple[ScriptDownload, ...]:
     """What is handed over of these scripts in Python; nothing of those that fail as they are."""
     facts = ((name, result.facts) for name, result in models)
-    course_files = _Course(course, scripts, options, runs, facts)
+    course_files = _Course(course, scripts, options, runs, facts, imports)
     downloads = []
     for extraction in (e for e in scripts if e.script.is_python):
         run = course_files.runs.get(extraction.path)
@@ -235,6 +231,12 @@ class _OneFile(Struct, frozen=True):
 def _one_file(course_files: _Course, extraction: Extraction) -> _OneFile:
     path, name = extraction.path, extraction.path.rpartition("/")[2]
     files, style = course_files.files_of(extraction), course_files.style
+    imports = course_files.imports(extraction)
+    has_style = style and "matplotlib" in imports
+    is_own = (n in course_files.own_names or course_files.files_of_module(n) for n in imports)
+    if not (files or has_style or any(is_own)):  # as most
+        modules = tuple(sorted(imports - sys.stdlib_module_names))
+        return _OneFile(_in_place(extraction.text, path, name), modules, {})
     key = step_key("one file", path, extraction.text, files, style)
     earlier = course_files.options.store.get_value(_KIND, key, _OneFile)
     if earlier is not None and all(
@@ -255,14 +257,17 @@ def _one_file(course_files: _Course, extraction: Extraction) -> _OneFile:
             belongings = replace(belongings, style=style)
             code = single_file(_dotted(name), extraction.text, find_module, belongings)
         modules = tuple(sorted(find_imports(code) - sys.stdlib_module_names))
-        # The text with the file's new place in its docstring
-        first = next(iter(cast(ast.Module, python_nodes(code)[0]).body), None)
-        end = (first.end_lineno or 0) if first is not None and is_text(first) else 0
-        lines = code.split("\n")
-        text = "\n".join([*(line.replace(path, name) for line in lines[:end]), *lines[end:]])
+        text = _in_place(code, path, name)
     whole = _OneFile(text, modules, answers)
     course_files.options.store.put_value(_KIND, key, whole)
     return whole
+
+
+def _in_place(code: str, path: str, name: str) -> str:
+    """The text of a file that stood at a path, with its new name in its docstring."""
+    docstring = _DOCSTRING.match(code)
+    end = 0 if docstring is None else docstring.end()
+    return code[:end].replace(path, name) + code[end:]
 
 
 def _find_members(

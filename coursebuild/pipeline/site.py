@@ -50,13 +50,14 @@ from coursebuild.core.pages.record import (
 )
 from coursebuild.core.pages.references import Reference, check_links, has_anchor
 from coursebuild.core.pages.theme import FontJob, subset_font
+from coursebuild.core.pages.zips import Archive
 from coursebuild.core.registry import features, parts_by_mark
 from coursebuild.core.syntax.document import read_again
 from coursebuild.core.syntax.html import find_address
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.python_code import find_imports
 from coursebuild.core.text.source import Source, Span, key_of
-from coursebuild.pipeline.downloads import Downloads
+from coursebuild.pipeline.downloads import download_files
 from coursebuild.pipeline.options import Options
 from coursebuild.pipeline.reader import Reader
 from coursebuild.pipeline.requests import (
@@ -65,6 +66,7 @@ from coursebuild.pipeline.requests import (
     SourceText,
     results_fingerprint,
 )
+from coursebuild.pipeline.script_downloads import make_archives
 
 _INDEX = "index"
 """The kind of the entry in the store that has the records of the last build's pages."""
@@ -220,7 +222,8 @@ class Site:
             return prepared_file("copies", key) or self._store.get_or_make("compressed", key, make)
 
         files += compressed_files(files, keep)
-        files += (*self._downloads.files, *self._added_files[0], *self._page_files())
+        files += download_files(self._library, self._archives.values(), self._options.root)
+        files += (*self._added_files[0], *self._page_files())
         files.append(OutputFile(urls.ROBOTS, robots(course)))
         if course.version:
             files.append(OutputFile(urls.VERSIONS, versions(course)))
@@ -252,8 +255,11 @@ class Site:
         return prepared_file("fonts", job.key) or self._store.get_or_make("fonts", job.key, make)
 
     @functools.cached_property
-    def _downloads(self) -> Downloads:
-        return Downloads.of(self._library, self._reader, self._options)
+    def _archives(self) -> Mapping[str, Archive]:
+        """The archives of scripts, by site path."""
+        options = self._options.for_course(self._library.course)
+        archives = make_archives(self._library, options, self._reader.imports)
+        return {archive.path: archive for archive in archives}
 
     @functools.cached_property
     def _added_files(self) -> tuple[list[SiteFile], FileList | None]:
@@ -282,7 +288,7 @@ class Site:
             ),
             lambda path: self._load(path).notes[feature],
             functools.partial(self._store.get_or_make, "parts"),
-            self._downloads.archives,
+            self._archives,
             find_imports,
         )
 

@@ -159,13 +159,21 @@ def verify(
 
 
 def with_downloads(
-    course: Course, results: Results, options: Options, *, only_known: bool = False
+    course: Course,
+    results: Results,
+    options: Options,
+    imports: Mapping[str, frozenset[str]],
+    *,
+    only_known: bool = False,
 ) -> tuple[Results, tuple[Diagnostic, ...]]:
-    """The results with what is handed over of scripts, after its trial; see `try_downloads`."""
+    """The results with what is handed over of scripts, after its trial; see `try_downloads`.
+
+    `imports`: see `verify`.
+    """
     from coursebuild.pipeline.script_downloads import find_downloads, try_downloads  # for a site
 
     scripts, runs = extract(course).value, results.runs
-    downloads = find_downloads(course, scripts, runs, results.models, options)
+    downloads = find_downloads(course, scripts, runs, results.models, options, imports)
     downloads, diagnostics = try_downloads(
         course, scripts, runs, results.verdicts, downloads, options, only_known=only_known
     )

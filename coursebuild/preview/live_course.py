@@ -162,7 +162,7 @@ class FolderWatcher:
 
         for batch in watch(
             *folders,
-            watch_filter=lambda _, path: self._is_source(path),
+            watch_filter=self._is_source,
             stop_event=self._stop,
             debounce=5 * _STEP,
             step=_STEP,
@@ -173,7 +173,7 @@ class FolderWatcher:
             self._new_paths.update(name for kind, name in names if kind is Change.added)
             yield frozenset(name for _, name in names)
 
-    def _is_source(self, path: str) -> bool:
+    def _is_source(self, _: object, path: str) -> bool:
         """Whether a path is a file of the course, and not one of an editor's or of Python's."""
         file = Path(path)
         return file.is_relative_to(self._root) and not any(

@@ -210,7 +210,11 @@ class BackgroundRebuild:
         finally:
             session.runs.running.clear()
         results, _ = with_downloads(
-            course, verification.results, options.for_course(course), only_known=True
+            course,
+            verification.results,
+            options.for_course(course),
+            session.reader.imports,
+            only_known=True,
         )
         verification = replace(verification, results=results)
         self._options.store.fresh = False  # with `--no-cache`, everything is made anew only once

@@ -83,7 +83,10 @@ class PreviewServer(ThreadingHTTPServer):
         super().__init__((str(address), port), _Handler)
         self._address = ipaddress.ip_address(str(self.server_address[0]))
         self._port = int(self.server_address[1])
-        self.access = Access(self._port, _token(session.root), embed)
+        # The same after a restart, of a course and its user
+        key = store_key(str(session.root)) or secrets.token_bytes()
+        name = b"preview\0" + os.fsencode(session.root.resolve())
+        self.access = Access(self._port, hmac.digest(key, name, "sha256").hex()[:32], embed)
         self.is_local = self._address.is_loopback
         self.linked_folder = str(session.root) if self.is_local and not _find_editor() else ""
         """The folder of the files that pages link to for VS Code, where no editor can be started
@@ -129,12 +132,6 @@ class PreviewServer(ThreadingHTTPServer):
         if self._thread.ident is not None:  # otherwise `shutdown` would wait forever
             self.shutdown()
         self.server_close()
-
-
-def _token(root: Path) -> str:
-    """The token of a course and its user, the same after a restart; random without a key."""
-    key = store_key(str(root)) or secrets.token_bytes()
-    return hmac.digest(key, b"preview\0" + os.fsencode(root.resolve()), "sha256").hex()[:32]
 
 
 class _Handler(BaseHTTPRequestHandler):

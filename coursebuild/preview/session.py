@@ -78,7 +78,7 @@ class Session:
         """The course with its results, for drawing; `None` before a map could be read."""
         self.runs = RunHistory()
         quiet_options = replace(options, jobs=1, progress=Progress(quiet=True))
-        self._reader = Reader(quiet_options)
+        self.reader = Reader(quiet_options)
         self._reading_lock = threading.Lock()
         """Held while documents are read: a `Reader` has one text of each."""
         self._assets = Assets(template_texts(), Bundle(), prepared_folder())
@@ -88,7 +88,7 @@ class Session:
         """The diagnostic of a template of the course that failed when a page was drawn."""
         self._targets: LinkTargets | None = None
         self._reports = Reports()
-        self.files = Files(options, self._assets, self._reader, self.mistakes)
+        self.files = Files(options, self._assets, self.reader, self.mistakes)
         self._site = site
 
     def run_code(self) -> None:
@@ -108,7 +108,7 @@ class Session:
     def close(self) -> None:
         """End what typesets formulas: with it running, the process may hang at its end."""
         with self.condition:
-            self._reader.close()
+            self.reader.close()
 
     # --- the state
 
@@ -231,7 +231,7 @@ class Session:
         """Parse a text of a lesson or page, which need not be the one that is saved."""
         assert self.library is not None
         course = self.library.course
-        (parsed_document,) = self._reader.read_documents(
+        (parsed_document,) = self.reader.read_documents(
             [(source, isinstance(owner, Lesson), course.words_of(owner))], course.callout_names
         )
         return parsed_document
@@ -248,7 +248,7 @@ class Session:
 
         `is_saved`: see `edit`.
         """
-        reader = reader or self._reader
+        reader = reader or self.reader
         while True:
             edits = self.edits
             with self._reading_lock:
@@ -271,7 +271,7 @@ class Session:
             sources = read_sources(self.root, sorted(texts)).value
             if all(source.text == texts[source.path] for source in sources):
                 return self.course
-            return load(self.root, self._reader, code=self.code).value
+            return load(self.root, self.reader, code=self.code).value
 
     def _take_course(
         self, course: Course | None, diagnostics: Iterable[Diagnostic], reports: Reports

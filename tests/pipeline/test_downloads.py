@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from support.fixture_cases import fixture_text
-from support.scratch_course import Make, block
+from support.scratch_course import Folder, Make, block
 
 pytestmark = pytest.mark.site
 
@@ -24,6 +24,10 @@ def run(folder: Path, entry: str, *args: str) -> str:
     command = [sys.executable, entry, *args]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     return done.stdout + done.stderr
+
+
+def unpack(folder: Folder, path: str) -> zipfile.ZipFile:
+    return zipfile.ZipFile(io.BytesIO(folder.read(path)))
 
 
 def test_what_a_page_hands_over_runs_alone_or_has_no_button(make: Make, tmp_path: Path) -> None:
@@ -41,6 +45,7 @@ def test_what_a_page_hands_over_runs_alone_or_has_no_button(make: Make, tmp_path
 
     absent = page.partition('data-script="examples/absent.py"')[2].partition("</figure>")[0]
     assert "<code>python absent.py</code>" in absent and "needs torch" in absent
+    assert "python args.py WORD" in folder.text("public/examples/args.py")
     assert "pip install" not in absent and "uv run" not in absent, "the package is not known"
     assert "package of the module torch was not known" in folder.text("public/examples/absent.py")
 
@@ -48,7 +53,7 @@ def test_what_a_page_hands_over_runs_alone_or_has_no_button(make: Make, tmp_path
     assert run(tmp_path, "helped.py") == "a ball 7 1,2\n"
     text = (tmp_path / "helped.py").read_text()
     assert text.startswith("# /// script\n") and '#     "mujoco==' in text
-    with zipfile.ZipFile(io.BytesIO(folder.read("public/examples/zipped.zip"))) as archive:
+    with unpack(folder, "public/examples/zipped.zip") as archive:
         archive.extractall(tmp_path)
     assert run(tmp_path / "zipped", "examples/zipped.py") == "a ball 7 1,2\n"
     assert (tmp_path / "zipped" / "requirements.txt").read_text().startswith("mujoco==")
@@ -90,7 +95,7 @@ def test_an_archive_of_a_lesson_holds_what_its_scripts_need(make: Make, tmp_path
         folder.write(path, text)
     build = folder.main("build")
     assert build.status == 0, build.out
-    with zipfile.ZipFile(io.BytesIO(folder.read("public/lessons/1.1-one.zip"))) as archive:
+    with unpack(folder, "public/lessons/1.1-one.zip") as archive:
         paths = [path for path in archive.namelist() if "/mjcourse/" not in path]
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}
         assert {entry.external_attr >> 16 for entry in archive.infolist()} == {0o100644}
@@ -105,10 +110,10 @@ def test_an_archive_of_a_lesson_holds_what_its_scripts_need(make: Make, tmp_path
     ]
     assert "python examples/helped.py\n" in (unpacked / "README.md").read_text()
 
-    with zipfile.ZipFile(io.BytesIO(folder.read("public/lessons/1.2-two.zip"))) as archive:
+    with unpack(folder, "public/lessons/1.2-two.zip") as archive:
         unknown = archive.read("1.2-two/requirements.txt").decode()
     assert unknown == "# the package of the module torch was not known\n"
-    with zipfile.ZipFile(io.BytesIO(folder.read("public/examples.zip"))) as archive:
+    with unpack(folder, "public/examples.zip") as archive:
         paths = {path.partition("/")[2] for path in archive.namelist()}
     assert paths >= {"examples/absent.py", "examples/helped.py", "runs/data.csv"}
 

@@ -16,7 +16,6 @@ from itertools import groupby
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import (
@@ -96,17 +95,16 @@ def check_formulas(
     commands = {command for _, _, tex in uses for command in _COMMAND.findall(tex.text)}
     in_features = feature_block_ids(document)
     for _, group in groupby(uses, key=lambda use: id(use[0])):
-        typeset_ones: list[tuple[Excerpt, _Signs]] = []
+        typeset_ones: list[tuple[Excerpt, str]] = []
         for block, formula, tex in group:
             result = typeset[formula]
             if isinstance(result, MathError):
                 diagnostics.append(_syntax_error(tex, result))
                 continue
-            if (signs := _read_signs(result)) is not None:
-                typeset_ones.append((tex, signs))
-                # In JSON a backslash may need another one, so that nothing is written there.
-                can_write = id(block) not in in_features
-                diagnostics += _check_letters(tex, signs, letters, commands, can_write)
+            typeset_ones.append((tex, result))
+            # In JSON a backslash may need another one, so that nothing is written there.
+            can_write = id(block) not in in_features
+            diagnostics += _check_letters(tex, result, letters, commands, can_write)
         diagnostics += _check_brackets(block, typeset_ones)
     return tuple(diagnostics)
 
@@ -153,15 +151,6 @@ def _syntax_error(tex: Excerpt, error: MathError) -> Diagnostic:
     return diagnose("math-syntax", span, message, help=help)
 
 
-class _Signs(Struct, frozen=True):
-    """What a formula shows that may be a mistake of its TeX."""
-
-    runs: tuple[str, ...]
-    """The letters that stand beside each other, two at least."""
-    brackets: tuple[tuple[int, ...], ...]
-    """What each of its brackets may be."""
-
-
 @lru_cache(maxsize=256)
 def parse_mathml(mathml: str) -> Element | None:
     """The tree of a formula, which nobody changes; `None` for characters that XML does not have."""
@@ -171,15 +160,10 @@ def parse_mathml(mathml: str) -> Element | None:
         return None
 
 
-@lru_cache(maxsize=1024)
-def _read_signs(mathml: str) -> _Signs | None:
-    """Read the MathML of a formula without its TeX; many lessons have the same ones."""
+def _shown_elements(mathml: str) -> Sequence[Element]:
+    """The elements of a formula without its TeX."""
     tree = parse_mathml(mathml)
-    if tree is None:
-        return None
-    elements = tree[0][:-1]
-    runs = (run for run in _letter_runs(elements) if len(run) > 1)
-    return _Signs(tuple(runs), tuple(_brackets(elements)))
+    return () if tree is None else tree[0][:-1]
 
 
 # --- letters
@@ -203,7 +187,7 @@ def _letter_runs(elements: Iterable[Element], parent: str = "") -> Iterator[str]
 
 
 def _check_letters(
-    tex: Excerpt, signs: _Signs, letters: set[str], commands: set[str], can_write: bool
+    tex: Excerpt, mathml: str, letters: set[str], commands: set[str], can_write: bool
 ) -> Iterator[Diagnostic]:
     """Report commands without their backslash: the formula shows a product of letters.
 
@@ -220,7 +204,8 @@ def _check_letters(
         is_call = name in _FUNCTIONS and (bracket or brace)
         if not (is_name or is_call or (name in _WITH_BRACES and brace)):
             continue
-        if sum(run.count(name) for run in signs.runs) < sum(name == match[2] for match in words):
+        runs = _letter_runs(_shown_elements(mathml))
+        if sum(run.count(name) for run in runs) < sum(name == match[2] for match in words):
             continue
         message = f"`{name}` would be shown as a product of letters"
         help = f"write `\\{name}`, or `\\mathrm{{{name}}}` for a name"
@@ -231,8 +216,14 @@ def _check_letters(
 # --- brackets
 
 
+@lru_cache(maxsize=1024)
+def _formula_brackets(mathml: str) -> tuple[tuple[int, ...], ...]:
+    """What each bracket of a formula may be; many lessons have the same ones."""
+    shown = mathml[: mathml.rfind("<annotation")]
+    return tuple(_brackets(_shown_elements(mathml))) if _STEPS.keys() & {*shown} else ()
+
+
 def _brackets(elements: Iterable[Element]) -> Iterator[tuple[int, ...]]:
-    """What each bracket of a formula may be."""
     children = [*elements]
     for before, child, after in zip(
         (None, *children), children, (*children[1:], None), strict=False
@@ -266,14 +257,13 @@ def _may_match(brackets: Iterable[tuple[int, ...]]) -> bool:
     return 0 in depths
 
 
-def _check_brackets(
-    block: Block, formulas: Sequence[tuple[Excerpt, _Signs]]
-) -> Iterator[Diagnostic]:
+def _check_brackets(block: Block, formulas: Sequence[tuple[Excerpt, str]]) -> Iterator[Diagnostic]:
     """Report brackets that have no other one in any formula of their block."""
     open_ones = [
-        (tex, signs.brackets)
-        for tex, signs in formulas
-        if not _may_match(signs.brackets) and not _NAMED_BRACKET.search(tex.text)
+        (tex, brackets)
+        for tex, mathml in formulas
+        if not _may_match(brackets := _formula_brackets(mathml))
+        and not _NAMED_BRACKET.search(tex.text)
     ]
     at = 0
     while at < len(open_ones):

@@ -9,7 +9,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 from pathlib import Path
 
@@ -147,16 +146,7 @@ def test_children_do_not_inherit_it(tmp_path: Path) -> None:
 NAME = "coursebuild.tmp.abcdefgh"
 
 
-@pytest.fixture
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder for temporary files."""
-    place = tmp_path / "tmp"
-    place.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(place))
-    return place
-
-
-def start(place: Path) -> tuple[subprocess.Popen[str], Path]:
+def start(temporary: Path) -> tuple[subprocess.Popen[str], Path]:
     """A process with a temporary folder, which ends when its input closes."""
     process = subprocess.Popen(
         [sys.executable, "-c", program("hold_folder")],
@@ -164,59 +154,59 @@ def start(place: Path) -> tuple[subprocess.Popen[str], Path]:
         stdout=subprocess.PIPE,
         text=True,
         cwd=SOURCE_TREE,
-        env={**os.environ, "TMPDIR": str(place)},
+        env={**os.environ, "TMPDIR": str(temporary)},
     )
     assert process.stdout is not None
     return process, Path(process.stdout.readline().strip())
 
 
-def test_folders_of_killed_processes_go_and_those_of_others_stay(place: Path) -> None:
-    living, survivor = start(place)
-    killed, left = start(place)
+def test_folders_of_killed_processes_go_and_those_of_others_stay(temporary: Path) -> None:
+    living, survivor = start(temporary)
+    killed, left = start(temporary)
     with living, killed:
         killed.kill()
         killed.wait()
-        assert {*place.iterdir()} == {survivor, left}
+        assert {*temporary.iterdir()} == {survivor, left}
         remove_abandoned_folders()
-        assert [*place.iterdir()] == [survivor]
+        assert [*temporary.iterdir()] == [survivor]
         living.communicate("")
-    assert [*place.iterdir()] == []
+    assert [*temporary.iterdir()] == []
 
 
-def test_what_is_no_temporary_folder_of_this_user_stays(place: Path, tmp_path: Path) -> None:
+def test_what_is_no_temporary_folder_of_this_user_stays(temporary: Path, tmp_path: Path) -> None:
     """A link, a file, a folder that others may read, folders of other names or another user."""
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir(mode=0o700)
     (elsewhere / "precious").touch()
-    (place / NAME).symlink_to(elsewhere)
-    (place / "coursebuild.tmp.aaaaaaaa").touch()
-    (place / "coursebuild.tmp.bbbbbbbb").mkdir(mode=0o755)
+    (temporary / NAME).symlink_to(elsewhere)
+    (temporary / "coursebuild.tmp.aaaaaaaa").touch()
+    (temporary / "coursebuild.tmp.bbbbbbbb").mkdir(mode=0o755)
     for name in ("coursebuild.examples", "coursebuild.tmp.longer_name", "coursebuild"):
-        (place / name).mkdir(mode=0o700)
+        (temporary / name).mkdir(mode=0o700)
     if os.geteuid() == 0:
-        (place / NAME.replace("a", "d")).mkdir(mode=0o700)
-        os.chown(place / NAME.replace("a", "d"), 65534, 65534)
-    link_holder = place / "coursebuild.tmp.cccccccc"
+        (temporary / NAME.replace("a", "d")).mkdir(mode=0o700)
+        os.chown(temporary / NAME.replace("a", "d"), 65534, 65534)
+    link_holder = temporary / "coursebuild.tmp.cccccccc"
     link_holder.mkdir(mode=0o700)
     (link_holder / "link").symlink_to(elsewhere)
-    before = {*place.iterdir()}
+    before = {*temporary.iterdir()}
     remove_abandoned_folders()
-    assert {*place.iterdir()} == before - {link_holder}
+    assert {*temporary.iterdir()} == before - {link_holder}
     assert (elsewhere / "precious").exists()
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o770])
-def test_where_others_can_move_folders_none_is_removed(place: Path, mode: int) -> None:
-    (place / NAME).mkdir(mode=0o700)
-    place.chmod(mode)
+def test_where_others_can_move_folders_none_is_removed(temporary: Path, mode: int) -> None:
+    (temporary / NAME).mkdir(mode=0o700)
+    temporary.chmod(mode)
     remove_abandoned_folders()
-    assert [*place.iterdir()] == [place / NAME]
-    place.chmod(0o1777)
+    assert [*temporary.iterdir()] == [temporary / NAME]
+    temporary.chmod(0o1777)
     remove_abandoned_folders()
-    assert [*place.iterdir()] == []
+    assert [*temporary.iterdir()] == []
 
 
-def test_processes_that_begin_at_once_all_have_their_folders(place: Path) -> None:
+def test_processes_that_begin_at_once_all_have_their_folders(temporary: Path) -> None:
     """None takes another's new folder for an abandoned one."""
     code = """
 import os
@@ -224,23 +214,23 @@ from coursebuild.core.files.locks import remove_abandoned_folders, temporary_fol
 remove_abandoned_folders()
 with temporary_folder() as at: assert os.path.isdir(at)
 """
-    environment = {**os.environ, "TMPDIR": str(place)}
+    environment = {**os.environ, "TMPDIR": str(temporary)}
     processes = [
         subprocess.Popen([sys.executable, "-c", code], cwd=SOURCE_TREE, env=environment)
         for _ in range(12)
     ]
     assert [process.wait() for process in processes] == 12 * [0]
-    assert [*place.iterdir()] == []
+    assert [*temporary.iterdir()] == []
 
 
-def test_threads_each_have_a_folder(place: Path) -> None:
+def test_threads_each_have_a_folder(temporary: Path) -> None:
     barrier = threading.Barrier(3)
     counts: list[int] = []
 
     def work() -> None:
         with temporary_folder() as folder:
             barrier.wait()
-            counts.append(len([*place.iterdir()]))
+            counts.append(len([*temporary.iterdir()]))
             barrier.wait()
             assert Path(folder).is_dir()
 
@@ -250,4 +240,4 @@ def test_threads_each_have_a_folder(place: Path) -> None:
     for thread in threads:
         thread.join()
     assert counts == [3, 3, 3]
-    assert [*place.iterdir()] == []
+    assert [*temporary.iterdir()] == []

@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 from pathlib import Path
 
@@ -19,15 +18,6 @@ from support.runners import SOURCE_TREE, is_alive, wait_until_ended
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.site
-
-
-@pytest.fixture
-def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder for temporary files."""
-    folder = tmp_path / "tmp"
-    folder.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(folder))
-    return folder
 
 
 def make(tmp_path: Path, seconds: float = 120.0) -> JsonChild:

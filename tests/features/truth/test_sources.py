@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from coursebuild.features.truth.claims import check_sources, document_claims, unbound_results
 from coursebuild.pipeline.load import load_course
 from support.fixture_cases import fixture_text
@@ -20,19 +22,16 @@ def test_a_number_of_a_lab_is_in_it_or_in_its_model(tmp_path: Path) -> None:
     assert [d.message for d in diagnostics] == ["`#lab:box` has no number `2.5`"]
 
 
-def test_what_a_lab_or_its_model_holds_is_no_result(tmp_path: Path) -> None:
-    Layout.of(COURSE).write(tmp_path)
-    results = [c.text for _, claims in unbound_results(load_course(tmp_path)) for c in claims]
-    assert results == ["17.3"]
-
-
 MAP = fixture_text("documents/truth_map.txt")
 
 
-def test_what_the_map_states_of_a_lesson_is_bound_or_listed(tmp_path: Path) -> None:
-    Layout.of(MAP).write(tmp_path)
+@pytest.mark.parametrize(("course", "result"), [(COURSE, "17.3"), (MAP, "4.34")])
+def test_what_no_lab_model_or_binding_gives_is_listed(
+    tmp_path: Path, course: str, result: str
+) -> None:
+    Layout.of(course).write(tmp_path)
     results = [c.text for _, claims in unbound_results(load_course(tmp_path)) for c in claims]
-    assert results == ["4.34"]
+    assert results == [result]
 
 
 UNITS = fixture_text("documents/truth_units.txt")
