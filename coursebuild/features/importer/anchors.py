@@ -37,12 +37,16 @@ _LABELLED = regex(
     r"[ \t]*:?(?:name|label):[ \t]*(?P<name>\S+)"
 )
 _KINDS = {"figure": "fig", "table": "tab", "list-table": "tab"}
+_CHUNK = r"^(?:`{3,})?\{r[ \t]+(?P<name>[\w.-]+)[ \t]*(?=[,}])"
 _PLACES = (
     ("", TARGET.pattern),
     ("sec-", r"\{#sec-(?P<name>[\w-]+)"),
     ("", r"^#{1,6}[ \t].*\{#(?P<name>[\w-]+)[^{}\n]*\}[ \t]*$"),
     ("lst:", r"^(?:[`~ \t]*\{#|#\|[ \t]*(?:lst-)?label:[ \t]*)lst-(?P<name>[\w-]+)"),
     ("", r"^[: \t]*\{#(?P<name>(?:fig|tbl)-[\w-]+)"),
+    ("fig-", _CHUNK),
+    ("fig:", _CHUNK + r"[^\n]*\bfig\.cap\b[^\n]*\n\s*(?:knitr::)?include_graphics\("),
+    ("tbl-", _CHUNK),
     ("tab:", r"\{#tbl-(?P<name>[\w-]+)"),
     ("", r"^\s*:(?:label|name):[ \t]*(?P<name>\S+)"),
     ("eq:", r"^\s*:(?:label|name):[ \t]*(?:eq[-:._])?(?P<name>\S+)"),

@@ -36,6 +36,8 @@ _PRINTING = ("r", *_SHELLS)
 _HEAD = regex(
     r"\{code-cell\}[ \t]+(?P<myst>\w+).*|\{(?P<name>\w+)(?:[\s,]+(?P<options>[^{}]*))?\}", re.DOTALL
 )
+_OWN_LABEL = regex(r"\A\{r[ \t]+([\w.-]+)[ \t]*(?:,.*)?\}\Z", re.DOTALL)
+"""The label of a cell as knitr has it, the word behind the language."""
 _MAGIC = regex(r"\A\s*%%(\w+)[^\n]*\n")
 _NESTED = regex(r"^[ \t>]*(?:`{3,}|~{3,})\{(?:code-cell\}[ ]+)?(\w+)", re.MULTILINE)
 """The language of a cell in the text of a block."""
@@ -87,6 +89,11 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     options, kind = _options_of(cell), f"cell of `{language}`"
     code = code_for_readers(_MAGIC.sub("", cell.text, count=1))
     label = options.get("label", "")
+    if own_label := find_group(
+        _OWN_LABEL, cell.head
+    ):  # of which only figures and tables are referred to
+        label = f"fig-{own_label}" if "fig-cap" in options else ""
+        label = label or (f"tbl-{own_label}" if "caption" in code else "")
     if picture := _PICTURE.fullmatch(code):
         words = options.get("fig-cap", "")
         mark = f"{{#{label}}}" if words and label.startswith("fig-") else ""
