@@ -15,6 +15,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from coursebuild.api import UsageError
+from coursebuild.features.importer.bookdown import read_book
 from coursebuild.features.importer.displays import find_macros, read_macros
 from coursebuild.features.importer.outlines import (
     Outline,
@@ -72,6 +73,9 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         return next((" ".join(text.split()) for text in texts if isinstance(text, str)), "")
 
     title = find_setting("title", "site_name")
+    if not title and "_bookdown.yml" in files and "index.Rmd" in files:
+        front_matter, _ = read_front_matter(files.read_text("index.Rmd"))
+        title = str(front_matter.get("title") or "")
     maps = [
         _read_settings("_toc.yml", files),
         value_at(myst, "project"),
@@ -79,7 +83,7 @@ def read_contents(files: SourceFiles) -> ImportedCourse:
         value_at(quarto, "website", "sidebar"),
         value_at(quarto, "book", "appendices"),
     ]
-    parts = [*_read_parts(maps, files)]
+    parts = [*_read_parts(maps, files), *read_book(files)]
     if files.mkdocs:
         folder = posixpath.normpath(str(value_at(mkdocs, "docs_dir") or "docs"))
         nav = value_at(mkdocs, "nav")

@@ -151,7 +151,9 @@ class LessonContext(Struct, frozen=True, kw_only=True):
                 message = f"a link to `{address}`, a lesson that the map does not have"
                 self.leave("link", message)
             return "" if id is None else f"lesson:{id}{route[2] or ''}"
-        if re.match("(?:inv|xref):", address):  # of Sphinx and MyST
+        if re.match("(?:inv|xref):|@ref ", address):  # of Sphinx, MyST and Doxygen
+            if resolved := self.resolve_anchor(to_anchor(address.removeprefix("@ref "))):
+                return resolved
             self.leave("link", f"a link to `{address}`, which its tool finds elsewhere")
             return ""
         if address.startswith("eq") and (resolved := self.resolve_formula(address)):

@@ -337,9 +337,11 @@ def _convert_texts(
         camera_is_position=course.camera_is_position,
         substitutions=course.substitutions,
     )
+    # Of R Markdown, all files of a book are one text
+    book_macros = course.macros + "".join(t.macros for t in texts if t.file == "index.Rmd")
     new = {}
     for text in texts:
-        macros = f"{course.macros}{text.macros}"
+        macros = f"{book_macros}{text.macros}"
         try:
             head = f'<a id="{to_anchor(text.label)}"></a>\n\n' if text.label else ""
             if macros:

@@ -21,6 +21,7 @@ from coursebuild.core.syntax.course_schema import slug_of
 from coursebuild.core.syntax.coursemap import RESERVED_IDS
 from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.account import shorten_value
+from coursebuild.features.importer.bookdown import read_bookdown
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
 from coursebuild.features.importer.pandoc_tables import number_examples
@@ -254,6 +255,8 @@ def _read_file(
         source = files.read_text(text.file)
         if not text.file.endswith(".ipynb"):
             source = expand_includes(source, text.file, files)
+        if text.file.endswith(".Rmd"):
+            source = read_bookdown(source)
         if text.file.endswith((".qmd", ".Rmd")):
             source = number_examples(source)
         if text.file.endswith(".qmd"):  # there a tag need not be apart from a block

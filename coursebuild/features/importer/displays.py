@@ -56,6 +56,8 @@ DEFINITION = regex(
     r"[ ]*\{(?P<body>(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}\s*"
 )
 """A macro of LaTeX; MathJax takes its name without a backslash, too."""
+_DOXYGEN = regex(rf"{_CODE}|\\f(?:\$(?P<inline>[^$]+?)\\f\$|\[(?P<tex>[^$]+?)\\f\])", re.DOTALL)
+"""A formula of Doxygen; or code, in which there is none."""
 _PLACES = (("math",), ("project", "math"), ("sphinx", "config", "mathjax3_config", "tex", "macros"))
 """Where MyST and Sphinx have macros by their names."""
 _OBJECT = regex(r"\b[Mm]acros[\"']?\s*[:=]\s*\{")
@@ -87,7 +89,7 @@ def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
     text = re.sub(r"(?<!\\)\\[ \t]*(?=\n[ \t>]*\$\$)", "", text)  # a blank, at its end
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
-    text = _DISPLAY.sub(_drop_empty, text)
+    text = _DOXYGEN.sub(_write_doxygen, _DISPLAY.sub(_drop_empty, text))
     return _DISPLAY.sub(_label_formula, _ENVIRONMENT.sub(_write_environment, text))
 
 
@@ -96,6 +98,13 @@ def _write_environment(match: re.Match[str]) -> str:
     if words:  # a line of it could begin as that of a list
         tex = " ".join(tex.split("\n"))
     return f"{words}$${tex}$$" if tex else match[0]
+
+
+def _write_doxygen(match: re.Match[str]) -> str:
+    if match["tex"] or match["inline"] is None:
+        return f"$${match['tex']}$$" if match["tex"] else match[0]
+    inline = re.sub(r"\n(?:[ \t]*\n)+", "\n", match["inline"].strip())
+    return "$" + re.sub(r"(\\(?:begin|end)\{align)\*?\}", r"\1ed}", inline) + "$"
 
 
 def display_formula(tex: str, label: str) -> str:

@@ -66,7 +66,7 @@ _LINE = regex(
     rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?P<hover>{_LINK_TITLE})?[ \t]*\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`|(?<!!)\[[^\[\]\n`]*\](?!\())*)\]"
-    rf"\((?P<address>{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
+    rf"\((?P<address>(?:@ref[ ]+)?{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
     r"|(?P<digits>\$(?P<tex>(?!\\\$)[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
     rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
@@ -293,7 +293,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "role":
             return convert_role(match["name"], match["body"], context)
         case "image":
-            dressing = match["dressing"] or ""
+            dressing, hover = match["dressing"] or "", match["hover"] or ""
             alt = match["alt"] or "".join(words for _, words in _ALT.findall(dressing))
             source = match["source"].strip("<>")
             if source.startswith("#"):
@@ -307,9 +307,10 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
                 alt = alt or source.partition("?")[0].rpartition("/")[2] or source
                 return alt if is_in_link else f"[{alt}]({source})"
+            hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             label = dressing if dressing.startswith("{#fig-") else ""
             if address := context.resolve_picture(source):
-                return f"![{alt}]({address}{match['hover'] or ''}){label}"
+                return f"![{alt}]({address}{hover}){label}"
             context.leave("picture", f"the picture `{source}`, which is not in the folder")
             return alt
         case "link":

@@ -192,6 +192,12 @@ _ALERT = regex(
     re.MULTILINE | re.DOTALL | re.IGNORECASE,
 )
 """A callout of Jupyter, as its style sheet has it, or a component; or code, in which is none."""
+_HIGHLIGHT = regex(
+    r"^\{[%{][<%-]?[ ]*(?:(highlight)[ ]+|(\w+)[ ]+lang=\"?)(\w+)[^\n]*\n(.*?)\n"
+    r"\{[%{][<%-]?[ ]*(?:end|/)(?:\1|\2)\b[^\n]*$",
+    re.MULTILINE | re.DOTALL,
+)
+"""A block of code of Jekyll or Hugo, whose own shortcodes say so by `lang`."""
 
 
 def _write_alert(alert: re.Match[str]) -> str:
@@ -236,7 +242,7 @@ def read_markdown(text: str, first_line: int = 1, place: str = "") -> Iterator[S
     block.
     """
     text = _HINT.sub(r"::::::\1\n\2\n::::::", _GATES.sub(_join_gates, text))
-    text = _ALERT.sub(_write_alert, text)
+    text = _HIGHLIGHT.sub(r"```\3\n\4\n```", _ALERT.sub(_write_alert, text))
     lines = text.split("\n")
     at = 0
     for (start, end), mark, head, content in (*_find_blocks(text), ([len(lines)] * 2, "", "", "")):
