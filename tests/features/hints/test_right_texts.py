@@ -97,6 +97,6 @@ def test_slips_of_edited_books_are_told_where_they_are_certain(
     course = make_course(text)
     report = json.loads(course.main("check", "--hints", "--format", "json", "-q").out)
     verdicts: dict[str, set[str]] = {slip: set() for slip in places.values()}
-    for told in report["diagnostics"]:
-        verdicts[places[told["line"]]].add(f"{told['severity']} {told['rule']}")
+    for entry in report["diagnostics"]:
+        verdicts[places[entry["line"]]].add(f"{entry['severity']} {entry['rule']}")
     check_lines(path, lambda slip: sorted(verdicts[slip]) or ["silent"], rewriting=rewriting)
