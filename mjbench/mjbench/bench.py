@@ -200,8 +200,8 @@ def _under_control(declarations: Declarations) -> Declarations:
 def _with_task(
     model: Any, declarations: Declarations, task: str, loop: Loop | None
 ) -> Declarations:
-    wanted, _, name = task.rpartition(":")
-    kinds = (kind for kind in ("sensor", "site", "body") if wanted in ("", kind))
+    prefix, _, name = task.rpartition(":")
+    kinds = (kind for kind in ("sensor", "site", "body") if prefix in ("", kind))
     kind = next((kind for kind in kinds if name in element_names(model, kind)), None)
     if kind is None:
         raise SceneError(f"the model has no sensor, site or body `{task}`")

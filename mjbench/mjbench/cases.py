@@ -74,13 +74,15 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         for integrator in STANDARD
     }
     # The time of a step is that at the longest timestep with which the run went well.
-    timed = []
+    timed_jobs = []
     for integrator, lines in runs.items():
         step = next((line.timestep for line in lines if line.status == "ok"), None)
         if step is not None:
             model = simulation.compile_model(problem.mjcf, integrator, step)
-            timed.append((integrator.value, step, scenario_job(model, [problem.scenario], step)))
-    jobs, duration = [job for *_, job in timed], problem.scenario.duration
+            timed_jobs.append(
+                (integrator.value, step, scenario_job(model, [problem.scenario], step))
+            )
+    jobs, duration = [job for *_, job in timed_jobs], problem.scenario.duration
     timings = time_jobs(jobs, 0, clock, quick=True) if jobs else ()
     report = CaseReport(
         name=problem.name,
@@ -95,7 +97,7 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         errors=tuple(line for lines in runs.values() for line in lines),
         costs=tuple(
             StepCost(name, timing.nanoseconds.scale(1e-9 * step / duration))
-            for (name, step, _), timing in zip(timed, timings, strict=True)
+            for (name, step, _), timing in zip(timed_jobs, timings, strict=True)
         ),
     )
     return derive_case(report)

@@ -75,13 +75,13 @@ def index_map(model: Any, losses: Mapping[str, Collection[int]]) -> IndexMap:
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))
 
-    def left(kind: str, things: Places) -> Places:
+    def keep(kind: str, things: Places) -> Places:
         return np.setdiff1d(things, [*losses.get(kind, ())])
 
-    joints = left("joint", joints)
-    actuators = left("actuator", np.arange(model.nactuator))
-    sensors = left("sensor", np.arange(model.nsensor))
-    geoms = left("geom", np.arange(model.ngeom))
+    joints = keep("joint", joints)
+    actuators = keep("actuator", np.arange(model.nactuator))
+    sensors = keep("sensor", np.arange(model.nsensor))
+    geoms = keep("geom", np.arange(model.ngeom))
     widths = [_WIDTHS.get(int(kind), 1) for kind in model.jnt_type[joints]]
     return {
         "nq": _ranges(model.jnt_qposadr[joints], widths),
@@ -90,7 +90,7 @@ def index_map(model: Any, losses: Mapping[str, Collection[int]]) -> IndexMap:
         "nu": _ranges(model.actuator_ctrladr[actuators], model.actuator_ctrlnum[actuators]),
         "nbody": body,
         "nmocap": mocap[mocap >= 0].astype(np.int64),
-        "neq": left("equality", np.arange(model.neq)),
+        "neq": keep("equality", np.arange(model.neq)),
         "ngeom": geoms[np.isin(model.geom_bodyid[geoms], body)],
         "nsensordata": _ranges(model.sensor_adr[sensors], model.sensor_dim[sensors]),
     }
