@@ -200,11 +200,10 @@ def _under_control(declarations: Declarations) -> Declarations:
 def _with_task(
     model: Any, declarations: Declarations, task: str, loop: Loop | None
 ) -> Declarations:
-    kinds = ("sensor", "site", "body")
-    names = {kind: element_names(model, kind) for kind in kinds}
-    kind, _, name = task.rpartition(":")
-    kind = kind or next((kind for kind in kinds if name in names[kind]), "")
-    if name not in names.get(kind, ()):
+    prefix, _, name = task.rpartition(":")
+    kinds = (kind for kind in ("sensor", "site", "body") if prefix in ("", kind))
+    kind = next((kind for kind in kinds if name in element_names(model, kind)), None)
+    if kind is None:
         raise SceneError(f"the model has no sensor, site or body `{task}`")
     needs_commands = int(mujoco.mjtStage.mjSTAGE_ACC)
     if loop and kind == "sensor" and model.sensor(name).needstage[0] == needs_commands:

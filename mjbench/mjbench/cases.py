@@ -74,14 +74,15 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         for integrator in STANDARD
     }
     # The time of a step is that at the longest timestep with which the run went well.
-    jobs, names, counts = [], [], []
+    timed_jobs = []
     for integrator, lines in runs.items():
         step = next((line.timestep for line in lines if line.status == "ok"), None)
         if step is not None:
             model = simulation.compile_model(problem.mjcf, integrator, step)
-            jobs.append(scenario_job(model, [problem.scenario], step))
-            names.append(integrator.value)
-            counts.append(round(problem.scenario.duration / step))
+            timed_jobs.append(
+                (integrator.value, step, scenario_job(model, [problem.scenario], step))
+            )
+    jobs, duration = [job for *_, job in timed_jobs], problem.scenario.duration
     timings = time_jobs(jobs, 0, clock, quick=True) if jobs else ()
     report = CaseReport(
         name=problem.name,
@@ -95,8 +96,8 @@ def measure_case(problem: Problem, machine: Machine, clock: Clock) -> CaseReport
         orders=tuple(orders(problem, lines) for lines in runs.values() if lines),
         errors=tuple(line for lines in runs.values() for line in lines),
         costs=tuple(
-            StepCost(name, line.nanoseconds.scale(1e-9 / count))
-            for name, count, line in zip(names, counts, timings, strict=True)
+            StepCost(name, timing.nanoseconds.scale(1e-9 * step / duration))
+            for (name, step, _), timing in zip(timed_jobs, timings, strict=True)
         ),
     )
     return derive_case(report)

@@ -75,12 +75,9 @@ def leasts_of(report: ScenarioReport) -> dict[str, float]:
         "seen": report.least_seen,
         "step_error": report.least_seen,
         "contact_model": report.least_seen,
-        "position": place,
-        "attitude": place,
         "velocity": speed,
-        "slip": place,
-        "energy_drift": _ROUNDED,
-        "momentum_drift": _ROUNDED,
+        **dict.fromkeys(("position", "attitude", "slip"), place),
+        **dict.fromkeys(("energy_drift", "momentum_drift"), _ROUNDED),
     }
 
 

@@ -215,11 +215,8 @@ def derive_sweep(report: SweepReport) -> SweepReport:
         return report
     figures = []
     for name in FIGURES:
-        values = []
-        for row in report.rows:
-            value: Interval | float | None = getattr(row, name)
-            if value is not None:
-                values.append(value.value if isinstance(value, Interval) else value)
+        figures_of = (getattr(row, name) for row in report.rows)
+        values = [f.value if isinstance(f, Interval) else f for f in figures_of if f is not None]
         if values and max(values) > 1.01 * min(values):
             figures.append(name)
     return replace(report, show=tuple(figures))

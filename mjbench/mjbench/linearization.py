@@ -161,8 +161,8 @@ def find_rest(model: Any, scenario: Scenario) -> FixedState | None:
     rest = _polished(variant, data)
     if rest is None:
         return None
-    slope = np.concatenate([np.zeros(model.nv), _accelerations(variant, data, rest)])
-    if np.abs(slope).max(initial=0.0) > 1e-6 * max(1.0, float(np.abs(model.opt.gravity).max())):
+    force = np.abs(_accelerations(variant, data, rest)).max(initial=0.0)
+    if force > 1e-6 * max(1.0, float(np.abs(model.opt.gravity).max())):
         return None
     nv, na = int(model.nv), int(model.na)
     inner = _force_derivative(variant, data, rest)

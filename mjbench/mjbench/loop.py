@@ -23,6 +23,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 
@@ -77,7 +78,7 @@ def read_loop(file: Path, period: float | None, delay: float, noise: float) -> L
         )
     if not (0 <= delay < math.inf and 0 <= noise < math.inf):
         raise LoopError("a delay and a noise are 0 or more")
-    return Loop(str(file), code, float(period), delay, noise)
+    return replace(loop, period=float(period))
 
 
 def _names(loop: Loop) -> dict[str, Any]:

@@ -122,13 +122,8 @@ def _with_errors(
     # Where nothing touches there is no model of contacts to tell apart.
     visible = "step_error" if basis.pilot.contact else "seen"
     sizes[visible] = measure.visible_errors(model, scene, states, reference.states)
-    leasts = {
-        "position": scene_report.FLOORS * reference.floor.position,
-        "attitude": scene_report.FLOORS * reference.floor.attitude,
-        "velocity": scene_report.FLOORS * reference.floor.velocity,
-        visible: basis.least_seen,
-        "figure": basis.least_figure,
-    }
+    leasts = {part: FLOORS * size for part, size in asdict(reference.floor).items()}
+    leasts |= {visible: basis.least_seen, "figure": basis.least_figure}
     if measure.quantity_name(model, scene):
         sizes["figure"] = measure.quantity_errors(model, scene, states, reference.states)
     middle = (len(states.times) + 1) // 2

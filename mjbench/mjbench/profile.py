@@ -204,13 +204,9 @@ def profile_text(
         return f"{most}; the verdict rests on the number of steps: {steps} under {rival.name}"
     sign = math.copysign(1.0, after - before)
     phase = max(pairs, key=lambda name: sign * (pairs[name][1] - pairs[name][0]))
-    change = " → ".join(map(_text, pairs[phase]))
+    change = " → ".join(seconds_text(time, 2) for time in pairs[phase])
     phase = "what has no timer" if phase == "other" else phase
     return f"{most}; the verdict rests on {phase}: over the scenario {change} under {rival.name}"
-
-
-def _text(seconds: float) -> str:
-    return seconds_text(seconds, 2)
 
 
 def profile_lines(profiles: Sequence[PhaseProfile], text: str, style: Style) -> Iterator[str]:
@@ -226,7 +222,7 @@ def profile_lines(profiles: Sequence[PhaseProfile], text: str, style: Style) -> 
         times = [_share(profile, name) for name in names]
         counts = [f"{profile.steps}", _counts(profile.contacts), _counts(profile.constraints)]
         means = [f"{profile.iterations:.3g}", f"{profile.islands:.3g}"]
-        columns.append((profile.name, [_text(profile.step), *times, *counts, *means]))
+        columns.append((profile.name, [seconds_text(profile.step, 2), *times, *counts, *means]))
     yield from fitted_table(columns, style.width)
     rounds = min(profile.rounds for profile in profiles)
     yield from style.wrap(
@@ -240,7 +236,7 @@ def _share(profile: PhaseProfile, name: str) -> str:
     if time is None:
         return ""
     share = f"{100 * time / profile.step:.0f} %" if profile.step else ""
-    return f"{_text(time)}  {share}".rstrip()
+    return f"{seconds_text(time, 2)}  {share}".rstrip()
 
 
 def _counts(counts: tuple[float, int]) -> str:

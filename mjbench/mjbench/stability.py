@@ -27,7 +27,7 @@ from msgspec.structs import replace
 from mjbench.detector import Passages, driving_force
 from mjbench.linearization import Theory, find_theory
 from mjbench.parts import Parts
-from mjbench.pilot import MOST_STEPS, Pilot, longer_setup, position_distances
+from mjbench.pilot import MOST_STEPS, Pilot, longer_setup, position_distance
 from mjbench.problem import (
     STANDARD,
     Array,
@@ -336,7 +336,4 @@ def stable_rows(
 
 def _comes_near(motion: KeptMotion, model: Any, rest: Array) -> bool:
     """Whether the motion of small steps comes near to a rest, with these positions."""
-    distances = position_distances(
-        model, motion.states.qpos, np.tile(rest, (len(motion.states.times), 1)), motion.units
-    )
-    return bool(distances.min(initial=math.inf) < 1)
+    return any(position_distance(model, q, rest, motion.units) < 1 for q in motion.states.qpos)

@@ -209,9 +209,10 @@ def engines_text(report: EngineReport, style: Style = _PLAIN) -> str:
     for scenario in report.scenarios:
         rows = scenario.rows
         bits = [f"{row.bits} bits" if row.bits else "" for row in rows]
-        devices = ["" if row.device == "cpu" else row.device for row in rows]
-        parts = zip([row.title for row in rows], bits, devices, strict=True)
-        names = [", ".join(filter(None, part)) for part in parts]
+        names = [
+            ", ".join(filter(None, (row.title, part, row.label)))
+            for row, part in zip(rows, bits, strict=True)
+        ]
         rates = ["; ".join(map(_rate, row.costs)) for row in rows]
         places = [[pair[0] for pair in (row.position, row.attitude) if pair] for row in rows]
         least = FLOORS * scenario.floor * (1 + 1e-9)

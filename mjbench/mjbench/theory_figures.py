@@ -74,9 +74,8 @@ def _check_expected(
     """
 
     def measure(step: float, integrator: str, times: float = 1.0) -> dict[Expected, float | None]:
-        stiff = model if times == 1 else stiffened(model, times)
         fine = replace(baseline, integrator=integrator, timestep=step / times)
-        return _measure_quantities(scene, with_setting(stiff, fine), expected)
+        return _measure_quantities(scene, with_setting(stiffened(model, times), fine), expected)
 
     sources, step = dict[Expected, str](), min(scene.timesteps) / _FINER
     while len(sources) < len(expected):

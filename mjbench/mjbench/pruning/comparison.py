@@ -74,10 +74,14 @@ def index_map(model: Any, losses: Mapping[str, Collection[int]]) -> IndexMap:
     body = np.setdiff1d(np.arange(model.nbody), [*bodies])
     mocap = model.body_mocapid[body]
     joints = np.flatnonzero(np.isin(model.jnt_bodyid, body))
-    joints = np.setdiff1d(joints, [*losses.get("joint", ())])
-    actuators = np.setdiff1d(np.arange(model.nactuator), [*losses.get("actuator", ())])
-    sensors = np.setdiff1d(np.arange(model.nsensor), [*losses.get("sensor", ())])
-    geoms = np.setdiff1d(np.arange(model.ngeom), [*losses.get("geom", ())])
+
+    def keep(kind: str, things: Places) -> Places:
+        return np.setdiff1d(things, [*losses.get(kind, ())])
+
+    joints = keep("joint", joints)
+    actuators = keep("actuator", np.arange(model.nactuator))
+    sensors = keep("sensor", np.arange(model.nsensor))
+    geoms = keep("geom", np.arange(model.ngeom))
     widths = [_WIDTHS.get(int(kind), 1) for kind in model.jnt_type[joints]]
     return {
         "nq": _ranges(model.jnt_qposadr[joints], widths),
@@ -86,7 +90,7 @@ def index_map(model: Any, losses: Mapping[str, Collection[int]]) -> IndexMap:
         "nu": _ranges(model.actuator_ctrladr[actuators], model.actuator_ctrlnum[actuators]),
         "nbody": body,
         "nmocap": mocap[mocap >= 0].astype(np.int64),
-        "neq": np.setdiff1d(np.arange(model.neq), [*losses.get("equality", ())]),
+        "neq": keep("equality", np.arange(model.neq)),
         "ngeom": geoms[np.isin(model.geom_bodyid[geoms], body)],
         "nsensordata": _ranges(model.sensor_adr[sensors], model.sensor_dim[sensors]),
     }
