@@ -180,16 +180,14 @@ def _find_unmarked(
     course: Course, document: Document, runs: Mapping[str, ScriptRun]
 ) -> Iterator[Diagnostic]:
     """Report the texts of a document that are what a script above them printed."""
-    comparison = replace(course.comparison, course_filters=course.filters)
     for block in document.unclaimed:
-        text = Side.of(block.code.text, comparison.filters)
+        text = Side.of(block.code.text, course.filters)
         for script in document_scripts(document):
             run = runs.get(script.path)
             if script.span.start > block.span.start or run is None or run.outcome is not Outcome.OK:
                 continue
-            printed = Side.of(run.stdout, comparison.filters).lines
-            is_printed = text.lines == printed
-            if not is_printed or len(block.code.text.strip()) <= 3:
+            printed = Side.of(run.stdout, course.filters).lines
+            if text.lines != printed or len(block.code.text.strip()) <= 3:
                 continue
             message = f"this is what `{script.path}` printed, and nothing compares the two"
             help = "an output is of kind `output`; if it is none, write `text illustration`"

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache, lru_cache
+from functools import lru_cache
 from itertools import accumulate, chain
 
 from msgspec import Struct
@@ -242,11 +242,10 @@ def always_match(recorded: Number, printed: Number) -> bool:
 
 
 class LineMatcher:
-    """Matches lines for one comparison; caches the skeleton of each line."""
+    """Matches lines for one comparison."""
 
     def __init__(self, comparison: Comparison) -> None:
         self.comparison = comparison
-        self._canonical = cache(canonicalize)
 
     def elides_lines(self, recorded: str) -> bool:
         """Whether a recorded line is a `...` that stands for any lines."""
@@ -284,9 +283,9 @@ class LineMatcher:
     def _pair_numbers(
         self, recorded: str, printed: str, numbers_match: SameNumber
     ) -> tuple[tuple[Number, Number], ...] | None:
-        line = self._canonical(printed)
+        line = canonicalize(printed)
         if not self.elides(recorded):
-            expected = self._canonical(recorded)
+            expected = canonicalize(recorded)
             if expected.skeleton != line.skeleton:
                 return None
             number_pairs = tuple(zip(expected.numbers, line.numbers, strict=True))
