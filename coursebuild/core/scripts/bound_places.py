@@ -32,6 +32,7 @@ from coursebuild.core.scripts.printed_outputs import PrintedOutputs, end_of_body
 from coursebuild.core.scripts.printed_text import PrintedPlace, PrintedText
 from coursebuild.core.scripts.table_cells import ColumnTitle, row_values
 from coursebuild.core.text.diagnostics import Diagnostic, Edit, Note
+from coursebuild.core.text.numbers import part_thousands
 from coursebuild.core.text.quantities import is_same_unit, unit_behind, unit_of_label
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
@@ -270,7 +271,8 @@ class BoundNumber(Struct, frozen=True, dict=True):
     def text(self) -> BoundText:
         """Its text; a comma or a space between its digits may belong to one number, or part two.
 
-        One that may be either is two numbers only where these are recorded, and not the one.
+        One that may be either is two numbers only where these are recorded, and not the one. In a
+        language with a decimal comma, a point parts thousands where a whole number is printed.
         """
         binding, texts = self.binding, [text for group in self.groups for text in group]
         number_text = BoundText.of(binding.text, binding.comma, may_join=True)
@@ -282,7 +284,13 @@ class BoundNumber(Struct, frozen=True, dict=True):
                 and not number_text.is_in(texts)
             ):
                 return several
-        return number_text
+        grouped_text = part_thousands(binding.text)
+        if grouped_text == binding.text or not binding.comma or number_text.is_in(texts):
+            return number_text
+        grouped = replace(BoundText.of(grouped_text), comma=",")
+        places = [_find(address, texts, len(grouped.numbers)) for address in self.addresses]
+        is_whole = any(p and all(n.is_integer for n in p.numbers) for p in places)
+        return grouped if is_whole or grouped.is_in(texts) else number_text
 
     @property
     def following(self) -> str:

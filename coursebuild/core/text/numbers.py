@@ -60,6 +60,7 @@ _WITH_COMMA = regex(
     r"|[0-9]{1,3}(?:\.[0-9]{3}){2,})(?![0-9]|[.,][0-9])"
 )
 _GROUP_SPACE = regex(rf"(?<=[0-9])[ {_SPACES}](?=[0-9]{{3}}(?![0-9]))")
+_POINT_GROUP = regex(r"(?<![\w.,])([1-9][0-9]{0,2})\.([0-9]{3})(?![0-9]|[.,][0-9])")
 _SWAPPED = str.maketrans(",.", ".,")
 _DIGIT_COMMA = regex("[0-9],[0-9]")
 _NOTATION = regex(
@@ -145,6 +146,11 @@ def point_decimals(text: str) -> str:
     it; an ordinary space only where it stands before decimals, as two numbers may have it between.
     """
     return _WITH_COMMA.sub(lambda match: re.sub(r"\s", ",", match[0].translate(_SWAPPED)), text)
+
+
+def part_thousands(text: str) -> str:
+    """A text with a comma for a point that parts thousands, if it is no decimal point: `12.345`."""
+    return _POINT_GROUP.sub(r"\1,\2", text)
 
 
 def join_thousands(text: str) -> str:
