@@ -49,7 +49,6 @@ from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import extract, jobs
 from coursebuild.core.scripts.lines import plain_text
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
-from coursebuild.core.scripts.printed_text import PrintedPlace
 from coursebuild.core.scripts.table_cells import row_values, table_rows
 from coursebuild.core.text.characters import printable
 from coursebuild.core.text.near import nearest
@@ -394,7 +393,11 @@ def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ..
             places = [place for group in bound.groups for place in bound.look_up(group)]
             spans = [place.span for place in places if place.span is not None]
             if not at and any(place.address is None for place in places):
-                texts = tuple(map(_one_of_several, places))
+                texts = tuple(
+                    f"number {place.first + 1} of `{plain_text(place.line.text)}`, which has its "
+                    "words in common with other lines"
+                    for place in places
+                )
         else:
             lines = [line for text in bound.recorded for line in text.lines]
             words = [*text_places(bound.text.before, lines)]
@@ -414,11 +417,6 @@ def value_origins(course: Course, path: str, line: int) -> tuple[ValueOrigin, ..
             span = row[0].cell.span.to(row[-1].cell.span)
             origins.append((span, ValueOrigin(value.text, value.script, texts)))
     return tuple(origin for span, origin in origins if span.line <= line <= span.end_line)
-
-
-def _one_of_several(place: PrintedPlace) -> str:
-    line = plain_text(place.line.text)
-    return f"number {place.first + 1} of `{line}`, which has its words in common with other lines"
 
 
 def origins_text(place: str, origins: tuple[ValueOrigin, ...]) -> str:

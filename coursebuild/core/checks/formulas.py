@@ -219,8 +219,8 @@ def _check_letters(
 @lru_cache(maxsize=1024)
 def _formula_brackets(mathml: str) -> tuple[tuple[int, ...], ...]:
     """What each bracket of a formula may be; many lessons have the same ones."""
-    shown = mathml[: mathml.rfind("<annotation")]
-    return tuple(_brackets(_shown_elements(mathml))) if _STEPS.keys() & {*shown} else ()
+    signs = {*mathml[: mathml.rfind("<annotation")]}
+    return tuple(_brackets(_shown_elements(mathml))) if _STEPS.keys() & signs else ()
 
 
 def _brackets(elements: Iterable[Element]) -> Iterator[tuple[int, ...]]:

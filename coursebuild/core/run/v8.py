@@ -165,9 +165,9 @@ class Isolate:
             raise TypeError(f"{function} returned no string")
         return result
 
-    def buffer(self, name: str) -> memoryview:
-        """The bytes that the scripts' global `buffer(name)` gives, shared with the scripts."""
-        place = self._evaluate(f"buffer({json.dumps(name)})", _START_SECONDS)
+    def beats(self) -> memoryview:
+        """The bytes that the scripts' global `buffer("beats")` gives, shared with the scripts."""
+        place = self._evaluate('buffer("beats")', _START_SECONDS)
         assert isinstance(place, memoryview)
         return place
 

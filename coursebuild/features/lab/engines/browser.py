@@ -72,7 +72,7 @@ class LabEngine(V8Engine):
         isolate = self._running_isolate()
         try:
             isolate.fill("mjb", mjb)
-            progress = Heartbeat(isolate.buffer("beats"), self._patience)
+            progress = Heartbeat(isolate.beats(), self._patience)
             text = isolate.call("trial", json.dumps(request), seconds, progress)
         except LimitError as error:
             return self._end(isolate, "timeout", str(error))
@@ -92,7 +92,7 @@ class LabEngine(V8Engine):
         """
         isolate = self._running_isolate()
         isolate.fill("mjb", mjb)
-        progress = Heartbeat(isolate.buffer("beats"), self._patience)
+        progress = Heartbeat(isolate.beats(), self._patience)
         try:
             text = isolate.call("judge", json.dumps(request), seconds, progress)
         except (LimitError, ScriptError):
