@@ -287,10 +287,10 @@ class BoundNumber(Struct, frozen=True, dict=True):
         grouped_text = part_thousands(binding.text)
         if grouped_text == binding.text or not binding.comma or number_text.is_in(texts):
             return number_text
-        grouped = replace(BoundText.of(grouped_text), comma=",")
-        places = [_find(address, texts, len(grouped.numbers)) for address in self.addresses]
+        single = replace(BoundText.of(grouped_text), comma=",")
+        places = [_find(address, texts, len(single.numbers)) for address in self.addresses]
         is_whole = any(p and all(n.is_integer for n in p.numbers) for p in places)
-        return grouped if is_whole or grouped.is_in(texts) else number_text
+        return single if is_whole or joined.is_in(texts) else number_text
 
     @property
     def following(self) -> str:

@@ -275,6 +275,11 @@ class _Decoder:
         misspelt: set[str] = set()
         for key_node in unknown:
             key, help = key_node.value, ""
+            replacement = getattr(type.cls, "replaced", {}).get(key, "")
+            if replacement:  # said for one release
+                message = f"{format_name(key)} is a field of an earlier version"
+                self.report("field-unknown", key_node.span, message, replacement)
+                continue
             if (likely := nearest(key, set(fields) - set(values) - misspelt)) is not None:
                 misspelt.add(likely)
                 help = propose(key, likely)

@@ -44,6 +44,8 @@ _MARKS = {
     ".. toctree::": ("a directive of reStructuredText", "content/course.toml lists the lessons"),
 }
 """How blocks of other tools begin: what each is, and what to write in its place."""
+_REPLACED = {"truth": "delete it: `coursebuild check --truth` lists what nothing gives"}
+"""Kinds that went in the last release, and what took their place."""
 _FIRST_LETTERS = "".join({mark[0] for mark in _MARKS})
 
 
@@ -75,6 +77,9 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     if package:
         message = f"nothing that is installed reads a block of kind `{fence.kind}`"
         yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
+    if kind.text in _REPLACED:
+        message = f"a block of kind `{kind.text}` is one of an earlier version"
+        yield diagnose("feature-missing", fence.head, message, help=_REPLACED[kind.text])
     words = split_words(fence.info).value
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
