@@ -430,6 +430,7 @@ def test_lab_of_a_kind_of_the_course_runs_two_simulations(lesson: Lesson) -> Non
     twins = lab(page, TWINS, None)
     twins.locator(".lab-play").wait_for()
     views = twins.locator(".lab-view").all()
+    assert len({(view.bounding_box() or {})["y"] for view in views}) == 1, "they stand side by side"
     first = [wait_until_still(page, view) for view in views]
     press(twins, "Play")
     wait_for_condition(page, lambda: time_of(twins) > 0.3)
