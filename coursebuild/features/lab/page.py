@@ -292,9 +292,8 @@ def _gallery_lab(model: MjcfModel) -> Lab:
             title=model.name,
             toggles=_TOGGLES,
             setup=f"{START} {_DRIFT}",
-            verify=Verify(
-                seconds=3
-            ),  # what drifts goes on for ever: the camera shows how it begins
+            # What drifts goes on for ever: the camera shows how it begins.
+            verify=Verify(seconds=3),
         ),
     )
 
