@@ -30,6 +30,7 @@ from support.lab_page import (
     shows,
     state_of,
     time_of,
+    until,
     wait_for_change,
     wait_for_condition,
     wait_until_still,
@@ -428,7 +429,11 @@ def test_every_kind_of_geom_and_overlay_is_drawn_and_a_large_state_fits_into_a_l
 def test_lab_of_a_kind_of_the_course_runs_two_simulations(lesson: Lesson) -> None:
     page = lesson.page
     twins = lab(page, TWINS, None)
-    twins.locator(".lab-play").wait_for()
+    until(  # they stand side by side
+        page,
+        "new Set([...document.querySelectorAll('[data-kind=twin] .lab-view')]"
+        ".map((view) => view.getBoundingClientRect().y)).size === 1",
+    )
     views = twins.locator(".lab-view").all()
     first = [wait_until_still(page, view) for view in views]
     press(twins, "Play")

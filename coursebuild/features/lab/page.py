@@ -282,12 +282,20 @@ _DRIFT = "else if (model.nu === 0 && Math.hypot(...model.opt.gravity) === 0) dat
 
 def _gallery_lab(model: MjcfModel) -> Lab:
     place = model.source.span(0, 0)
-    setup = f"{START} {_DRIFT}"
-    verify = Verify(seconds=3)  # what drifts goes on for ever: the camera shows how it begins
-    fields = SimLab(
-        model=model.name, title=model.name, toggles=_TOGGLES, setup=setup, verify=verify
+    return Lab(
+        place,
+        SIMLAB,
+        place,
+        "",
+        SimLab(
+            model=model.name,
+            title=model.name,
+            toggles=_TOGGLES,
+            setup=f"{START} {_DRIFT}",
+            # What drifts goes on for ever: the camera shows how it begins.
+            verify=Verify(seconds=3),
+        ),
     )
-    return Lab(place, SIMLAB, place, "", fields)
 
 
 def _find_lab(library: Library, model: MjcfModel) -> tuple[Lab, PublishedLab | None]:

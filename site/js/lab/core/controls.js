@@ -86,5 +86,5 @@ function kindOf(control) {
 function initialValue(control) {
   if (control.type === 'button') return null
   if (control.type === 'select') return control.value ?? control.options[0][1]
-  return control.value
+  return control.value ?? null
 }

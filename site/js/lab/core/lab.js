@@ -305,8 +305,7 @@ export class Lab {
     const { timestep } = watch.numbers
     if (this.sampler.due(this.steps, timestep)) this.sampler.record(this.sync())
     tape?.after(numbers, time)
-    const { stopAt } = this.config
-    const late = stopAt === null ? Infinity : stopAt - timestep / 2
+    const late = (this.config.stopAt ?? Infinity) - timestep / 2
     if (before < late && time >= late) return 'stopAt'
     return this.interrupted ? 'code' : null
   }

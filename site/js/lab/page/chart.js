@@ -168,7 +168,7 @@ export class Chart {
     parts.push(draw('path', { class: 'lab-axis', d: `M${left} ${TOP}V${bottom}H${right}` }))
     parts.push(write(plot.ylabel || '', { x: 0, y: 12 * PIXEL }))
     parts.push(write(plot.xlabel || '', { x: (left + right) / 2, y: height - 5, 'text-anchor': 'middle' }))
-    const lines = plot.refLines.filter(({ y }) => y >= low && y <= high)
+    const lines = (plot.refLines ?? []).filter(({ y }) => y >= low && y <= high)
     const places = spread(lines.map(({ y }) => this.scaleY(y) - 4), GAP, TOP + GAP, bottom)
     lines.forEach(({ y, label }, i) => {
       parts.push(draw('path', { class: 'lab-reference', d: `M${left} ${this.scaleY(y)}H${right}` }))

@@ -5,7 +5,7 @@
 import { buildControls, buildReadouts } from './controls.js'
 import { h, prefersStillness } from './dom.js'
 import { formatLabel, formatReadout, formatTime } from './numbers.js'
-import { PLAIN_PLOT, Plot } from './plots.js'
+import { Plot } from './plots.js'
 import { Hands } from './pointer.js'
 import { Shell } from './shell.js'
 import { Simulation } from './simulation.js'
@@ -13,22 +13,8 @@ import { buildTransport } from './transport.js'
 import { View } from './view.js'
 
 const HEIGHT = 240 // CSS pixels
-const PLAIN_LAB = {
-  key: null, camera: null, overlays: [], forceScale: null, autoplay: false, stopAt: null, trail: null, seed: null,
-  controls: [], readouts: [], plots: [],
-} // prettier-ignore
-const PLAIN_CONTROL = {
-  type: 'slider',
-  unit: '',
-  min: 0,
-  max: 1,
-  step: null,
-  value: null,
-  digits: null,
-  options: [],
-  init: false,
-  reset: false,
-}
+const PLAIN_LAB = { controls: [], readouts: [], plots: [] }
+const PLAIN_CONTROL = { type: 'slider', min: 0, max: 1 }
 
 /**
  * Mount a lab with the course's own code.
@@ -113,7 +99,6 @@ class Kit extends Shell {
     const { worker, wasm, module, mjb } = config
     const lab = { ...PLAIN_LAB, worker, wasm, module, mjb, ...fields, id: `${config.id}/${number}`, kind: 'simlab' }
     lab.controls = lab.controls.map((control) => ({ ...PLAIN_CONTROL, ...control }))
-    lab.plots = lab.plots.map((plot) => ({ ...PLAIN_PLOT, ...plot }))
     const name = words('lab.live.view', { title: label })
     const view = picture ? new View({ height, label: words('lab.live.picture', { title: label }), name, words }) : null
     const simulation = new Simulation({ config: lab, base: this.base, view, on: { ...this.faults(lab, view), ...on } })
@@ -133,7 +118,7 @@ class Kit extends Shell {
   }
 
   createPlot(config) {
-    const plot = new Plot({ ...PLAIN_PLOT, ...config }, this.words)
+    const plot = new Plot(config, this.words)
     this.disposals.push(() => plot.dispose())
     return plot
   }

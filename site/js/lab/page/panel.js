@@ -6,7 +6,7 @@
 import { buildControls, buildReadouts } from './controls.js'
 import { h } from './dom.js'
 import { formatNumber } from './numbers.js'
-import { PLAIN_PLOT, Plot } from './plots.js'
+import { Plot } from './plots.js'
 
 const DIGITS = 3 // of sensors
 const MOST_VALUES = 9 // of a sensor or a row that are shown; a matrix has as many
@@ -80,7 +80,7 @@ export class ModelPanel {
         if (!box.checked) return this.closeCurve(i)
         const count = Math.min(size, MOST_VALUES)
         const traces = Array.from({ length: count }, (_, j) => ({ label: size > 1 ? `[${j}]` : name }))
-        const plot = new Plot({ ...PLAIN_PLOT, ylabel: name, xlabel: this.words('lab.time'), window: WINDOW, traces }, this.words, this.actions.seek)
+        const plot = new Plot({ ylabel: name, xlabel: this.words('lab.time'), window: WINDOW, traces }, this.words, this.actions.seek)
         this.curves.set(i, plot)
         place.append(plot.element)
       })

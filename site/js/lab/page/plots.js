@@ -9,19 +9,6 @@ import { formatTime } from './numbers.js'
 const HEIGHT = 170 // CSS pixels where texts have their usual size
 const PLAYING = { time: 0, resting: false, marks: [] }
 
-/** A plot of the lab's JSON with nothing in it. */
-export const PLAIN_PLOT = {
-  xlabel: '',
-  ylabel: '',
-  window: null,
-  ymin: null,
-  ymax: null,
-  height: null,
-  refLines: [],
-  traces: [],
-  log: false,
-}
-
 export class Plot {
   /**
    * @param {any} config a plot of the lab's JSON; `log: true` gives it a logarithmic y axis; with an `x`, whose numbers come behind those
@@ -30,7 +17,7 @@ export class Plot {
    * @param {((time: number) => void) | null} [seek] the reader points at a time (s)
    */
   constructor(config, words, seek = null) {
-    const { traces, window, x } = config
+    const { traces, window = null, x } = config
     this.config = config
     this.count = traces.length + (x ? 1 : 0) // numbers of a sample
     this.recent = new History(this.count, window)
@@ -103,7 +90,7 @@ export class Plot {
   }
 
   timeRange(last) {
-    const { window } = this.config
+    const { window = null } = this.config
     if (window === null || this.now.resting) return [0, Math.max(window ?? 1, last, this.kept?.[0].at(-1) ?? 0)]
     return last <= window ? [0, window] : [last - window, last]
   }
