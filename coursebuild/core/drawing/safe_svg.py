@@ -123,6 +123,7 @@ _TOKEN = re.compile(
     |(?P<mark>[][(){{}};:,.+>~*|=^$!%\#?]|/(?!\*))""",
     re.VERBOSE | re.DOTALL | re.IGNORECASE | re.ASCII,
 )
+_RULE = re.compile(r"(?:\A|(?<=\}))[^{}]*+\{(?:[^{}]++|\{[^{}]*+\})*+\}")
 _PIXELS = re.compile(r"data:image/(?:png|jpe?g|webp);base64,[A-Za-z0-9+/=\s]*")
 _REFERENCE = re.compile(r"""url\(\s*["']?#((?:[\w.:-]|[^\x00-\x7f])+)""", re.IGNORECASE)
 _ENCODINGS = ("utf-8", "utf8", "us-ascii", "ascii")
@@ -275,7 +276,8 @@ class _Reader:
             self._add_style(sheet)
             if fault := _css_fault(sheet, is_sheet=True):
                 self._leave_out(f"{fault} of a style sheet")
-                sheet = _without_faults(sheet)
+                rules = _RULE.findall(sheet)
+                sheet = "".join(rule for rule in rules if not _css_fault(rule, is_sheet=True))
             self._builder.data(sheet)
             self._style = None
         self._depth -= 1
@@ -361,18 +363,6 @@ def _css_fault(css: str, *, is_sheet: bool = False) -> str:
     except _RefusedError as error:
         return str(error)
     return ""
-
-
-def _without_faults(sheet: str) -> str:
-    """Return the rules of a style sheet that may be there; none where these make no sheet."""
-    rules, start, depth = list[str](), 0, 0
-    for brace in re.finditer(r"[{}]", sheet):
-        depth += 1 if brace[0] == "{" else -1
-        if depth <= 0:
-            rule, start = sheet[start : brace.end()], brace.end()
-            rules += [rule] * (not _css_fault(rule, is_sheet=True))
-    rest = "".join(rules)
-    return "" if _css_fault(rest, is_sheet=True) else rest
 
 
 def _css_tokens(css: str) -> Iterator[tuple[str, str]]:

@@ -113,10 +113,7 @@ class TextReader:
     def _read_paragraph(self, token: PositionedToken) -> model.Block | model.SourceMark:
         """A paragraph or what it is the caption of; its source alone, if it is nothing else."""
         self.index += 2
-        return self._read_text(trim(token.text), token)
-
-    def _read_text(self, text: Excerpt, token: PositionedToken) -> model.Block | model.SourceMark:
-        content, mark = split_source_mark(text)
+        content, mark = split_source_mark(trim(token.text))
         if mark is None:
             return self._read_content(content, token)
         if not content.text:
@@ -288,10 +285,9 @@ class TextReader:
                 heading, braces = split_label(head.value.title)
                 title, rest = self.inlines(heading), head.value.rest
                 label = self._take_callout_label(braces)
-                self.index += 3
-                first = self._read_text(rest, first_token) if rest.text else None
-                is_block = first is not None and not isinstance(first, model.SourceMark)
-                blocks = (*((first,) if is_block else ()), *self._read_blocks("blockquote_close"))
+                first_token.text = rest  # and what is below its head is a paragraph as any
+                self.index += 0 if rest.text else 3
+                blocks = self._read_blocks("blockquote_close")
                 return model.Callout(span, kind, place, title, folded, blocks, label=label)
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
 

@@ -89,10 +89,10 @@ def _convert(segment: Segment, context: LessonContext) -> str:
             return _write_callout(name, title, text, context, is_folded)
         case "/":
             name, _, title = (part.strip() for part in head.partition("|"))
-            if name == "tab":
-                return _write_tab(title, text, context)
             options = find_group(r"\A((?:[ ]{4}[\w-]+:.*(?:\n|\Z))+)", text)
             text, name = text[len(options) :], find_group(r" type:[ ]*(\S+)", options) or name
+            if name == "tab":
+                return _write_tab(title, text, context)
             if name in ("html", "define", "") or name.endswith("caption"):
                 return _convert_nested(text, context)
             return _write_callout(name, title, text, context, name == "details")

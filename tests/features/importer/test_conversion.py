@@ -58,13 +58,13 @@ def test_a_tab_loses_the_icon_in_its_title(tmp_path: Path) -> None:
 def test_a_drawing_loses_only_what_none_may_hold(tmp_path: Path) -> None:
     start = '<svg xmlns="http://www.w3.org/2000/svg"'
     text = '<switch><foreignObject><p xmlns="">B</p></foreignObject><text>B</text></switch></svg>'
-    font = "@font-face {src: url('https://c.example/f.woff')}"
-    sheet = f"<style>{font} .r {{fill: red}}</style>"
+    sheet = "<style>@font-face {src: url(f)} .r {fill: red}</style>"
     files = {"a.md": "# One\n\n![B](b.svg)\n", "b.svg": f'{start} host="C">{sheet}{text}'}
     course = convert_files(tmp_path, files)
     drawing = course.files["content/files/b.svg"].decode()
-    style = "<style> .r {fill: red}</style>"
-    assert drawing == f"{start}>{style}<switch><text>B</text></switch></svg>"
+    assert (
+        drawing == f"{start}><style> .r {{fill: red}}</style><switch><text>B</text></switch></svg>"
+    )
     left = "`host` of `<svg>`, a `url()` that leads elsewhere of a style sheet, `<foreignObject>`"
     assert f"  - b.svg: {left}\n" in account_of(course)
 
