@@ -1,4 +1,4 @@
-"""Tables and definitions that Pandoc reads, as the Markdown that all tools read.
+"""Tables, verses and definitions that Pandoc reads, as the Markdown that all tools read.
 
 A grid has its cells between bars and crosses; another table has them below runs of hyphens, and
 empty lines between its rows where these go over several lines. A cell is what stands between the
@@ -48,7 +48,7 @@ class _Table(Struct, frozen=True):
 
 
 def rewrite_tables(text: str, leave: Callable[[int], None]) -> tuple[str, int]:
-    """Return prose with its tables as all tools read them, and how many there were.
+    """Return prose with its tables and verses as all tools read them, and how many there were.
 
     `leave` is told the line, from 0, of a grid whose bars do not stand in columns: it is a text.
     """
@@ -71,13 +71,13 @@ def rewrite_tables(text: str, leave: Callable[[int], None]) -> tuple[str, int]:
 
 
 def _may_begin(lines: Sequence[str], at: int) -> bool:
-    """Whether the line at an index, or the one below it, looks as if a table began."""
+    """Whether the line at an index, or the one below it, looks as if a table or verse began."""
     first, second = (line.lstrip("> ") for line in (*lines[at : at + 2], "")[:2])
-    return first.startswith(("+", "--")) or second.startswith("--")
+    return first.startswith(("+", "|", "--")) or second.startswith("--")
 
 
 def _read_block(lines: Sequence[str]) -> tuple[int, Sequence[str]]:
-    """Return how many lines a table takes, and as many new ones; none for a bad grid."""
+    """Return how many lines a table or verse takes, and as many new ones; none for a bad grid."""
     for pattern, read in _READERS:
         lead = (pattern.match(lines[0]) or [""])[0]
         below = [*_stripped(lines, lead)]
@@ -89,6 +89,8 @@ def _read_block(lines: Sequence[str]) -> tuple[int, Sequence[str]]:
             return size, [(lead + line).rstrip() for line in (*new, *[""] * (size - len(new)))]
     lead = (_INDENT.match(lines[0]) or [""])[0]
     below = [*_stripped(lines, lead)]
+    if verse := _read_verse(below):
+        return len(verse), [lead + line for line in verse]
     return len(_find_grid(below)), ()
 
 
@@ -243,6 +245,20 @@ def _side(text: str, edge: int, start: int, end: int) -> str:
     if is_left or is_right:
         return "" if is_left and is_right else "left" if is_left else "right"
     return "center"
+
+
+# --- verses
+
+
+def _read_verse(lines: Sequence[str]) -> list[str]:
+    """Return the lines of a poem or an address, each behind a bar; none if there is no such."""
+    size = next((n for n, line in enumerate(lines) if not re.match(r"\|[ ]", line)), len(lines))
+    verse = [line[2:].rstrip() for line in lines[:size]]
+    if size < 2 or any(line.endswith("|") or _DELIMITERS.fullmatch(line) for line in verse):
+        return []
+    indented = (re.sub("^ +", lambda blanks: "\u00a0" * len(blanks[0]), line) for line in verse)
+    *first, last = indented
+    return [*(f"{line}\\" for line in first), last]
 
 
 _READERS = ((_INDENT, _read_grid), (_QUOTE, _read_ruled))

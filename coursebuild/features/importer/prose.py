@@ -192,11 +192,11 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
 
     def leave_grid(line: int) -> None:
         message = "a table whose bars do not stand in columns, shown as it was written"
-        context.line_below(line).leave("table of Pandoc", message)
+        context.line_below(line).leave("table or verse of Pandoc", message)
 
     text, count = rewrite_tables(text, leave_grid)
-    change = "its rows between bars, a cell in one line"
-    context.change("table of Pandoc", change, count)
+    change = "its rows between bars, a cell in one line; or a verse in lines that end"
+    context.change("table or verse of Pandoc", change, count)
     if context.is_pandoc:
         text = _SETTINGS.sub("", text)
     for pattern, kind in _KEPT.items():
