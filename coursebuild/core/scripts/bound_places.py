@@ -290,7 +290,7 @@ class BoundNumber(Struct, frozen=True, dict=True):
         single = replace(BoundText.of(grouped_text), comma=",")
         places = [_find(address, texts, len(single.numbers)) for address in self.addresses]
         is_whole = any(p and all(n.is_integer for n in p.numbers) for p in places)
-        return single if is_whole or joined.is_in(texts) else number_text
+        return single if is_whole or single.is_in(texts) else number_text
 
     @property
     def following(self) -> str:
