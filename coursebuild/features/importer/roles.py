@@ -251,11 +251,12 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
 
 
 def draw_emoji(name: str, context: LessonContext) -> str:
-    """Return the sign that a name between colons has in Unicode, if its tool draws signs."""
+    """Return the sign that a name between colons stands for, if its tool draws signs."""
     if not (context.files.mkdocs or context.files.docusaurus):
         return name
-    sign = _find_sign(name.strip(":").replace("_", " "), ("", " sign"))
-    if sign >= "\u2600":  # where the pictures begin
+    import emoji  # needed by texts with such names only
+
+    if (sign := emoji.emojize(name, language="alias")) != name:
         return sign
     context.leave("emoji", f"`{name}`, shown as written: write the sign, if its tool draws one")
     return name
