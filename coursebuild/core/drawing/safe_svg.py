@@ -123,7 +123,7 @@ _TOKEN = re.compile(
     |(?P<mark>[][(){{}};:,.+>~*|=^$!%\#?]|/(?!\*))""",
     re.VERBOSE | re.DOTALL | re.IGNORECASE | re.ASCII,
 )
-_RULE = re.compile(r"(?:\A|(?<=\}))[^{}]*+\{(?:[^{}]++|\{[^{}]*+\})*+\}")
+_RULE = re.compile(r"(?:\A|(?<=\}))[^{}]*+\{(?>(?:[^{}]++|\{[^{}]*+\})*)\}")
 _PIXELS = re.compile(r"data:image/(?:png|jpe?g|webp);base64,[A-Za-z0-9+/=\s]*")
 _REFERENCE = re.compile(r"""url\(\s*["']?#((?:[\w.:-]|[^\x00-\x7f])+)""", re.IGNORECASE)
 _ENCODINGS = ("utf-8", "utf8", "us-ascii", "ascii")
