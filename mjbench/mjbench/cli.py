@@ -8,8 +8,9 @@ import math
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from itertools import groupby, takewhile
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -290,7 +291,8 @@ def _stability(arguments: argparse.Namespace) -> int:
     for name in arguments.problems:
         matches = {n: p for n, p in problems.items() if n == name or n.startswith(f"{name}-")}
         if not matches:
-            raise UsageError(f"no hard case is called `{name}`: {', '.join(problems)}")
+            known = ", ".join(_families(problems))
+            raise UsageError(f"no hard case or family of them is called `{name}`: {known}")
         cases |= matches
     recorded = None
     if arguments.check is not None:
@@ -314,6 +316,13 @@ def _stability(arguments: argparse.Namespace) -> int:
     data = STABILITY.encode(tuple(reports))
     _print(arguments, data, "", failures, record=not failures)
     return _STOPPED if parts.stopped else int(bool(failures))
+
+
+def _families(names: Iterable[str]) -> Iterator[str]:
+    """What cases in a row are called together, such as `stack` for all stacks; of one, its name."""
+    for _, group in groupby(names, key=lambda name: name.partition("-")[0]):
+        words = zip(*(name.split("-") for name in group), strict=False)
+        yield "-".join(word for word, *_ in takewhile(lambda w: len(set(w)) == 1, words))
 
 
 def _diet(arguments: argparse.Namespace) -> int:
@@ -391,6 +400,8 @@ def _print(
         print(remark, file=sys.stderr)
     if arguments.record is not None and record:
         arguments.record.write_bytes(data)
+    elif arguments.record is not None:
+        print(f"{arguments.record} is not written: not all was measured", file=sys.stderr)
 
 
 def _list(departures: Sequence[Departure]) -> bytes:

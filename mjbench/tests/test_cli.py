@@ -134,7 +134,7 @@ def test_a_package_of_urdf_is_the_folder_of_its_name(tmp_path: Path, capsys: Cap
         (["{}", "--quick", "--record", "a"], "", 2, "--quick measures only a part"),
         (["{}", "--engines", "mjocuo"], "", 2, "there is no engine `mjocuo`: known are mujoco, "),
         (["diet", "{}", "--only", "x"], "", 1, "arm.xml: no finding is of the kind `x`"),
-        (["stability", "nope"], "", 2, "no hard case is called `nope`: tumbling-box, "),
+        (["stability", "x"], "", 2, "no hard case or family of them is called `x`: tumbling-box, "),
         (["{}"], SWING.replace("0.1", "0.1001"), 1, "arm.toml: scenario.0.duration: `duration`"),
         (["{}"], SWING + "hold = true\n", 1, "arm.toml: Expected `float | null`, got `bool`"),
     ],
@@ -238,11 +238,15 @@ def test_a_diet_that_is_stopped_says_what_it_has_found(
 
     model.write_text(ENERGY)
     monkeypatch.setattr(survey, "far_bodies", stop)
-    assert main(["diet", str(model), "--quick"]) == 130
+    record = model.with_suffix(".json")
+    assert main(["diet", str(model), "--record", str(record)]) == 130
+    assert not record.exists()
     out, err = capsys.readouterr()
     assert "energy-flag: " in out
     assert "not explained" not in out
-    assert err == "mjbench: stopped; this is what is known\n"
+    assert err == (
+        f"{record} is not written: not all was measured\nmjbench: stopped; this is what is known\n"
+    )
 
 
 def test_minutes_that_are_over_stop_it_as_the_user_does(tmp_path: Path, capsys: Any) -> None:

@@ -12,7 +12,8 @@
    A time that a script finds by looking at every step is right to a timestep only, and what it
    computes of that no better; no shorter steps within its own show that. It is told by runs that
    look a part of a timestep later: they print it alike, or all off by as much, where a state would
-   change little by little and a time that was chosen beforehand not at all.
+   change little by little and a time that was chosen beforehand not at all. Where a script looks
+   at every tenth step, such runs mostly print alike too, and nothing tells it.
 3. The final states of a pair of runs, which began in opposite directions, show how fast states
    part: relative to the largest positions and velocities since the simulation began, not to those
    that it happens to end with.
