@@ -249,7 +249,7 @@ _MILD |= dict.fromkeys(
     draft-empty unit-unproven file-unlisted no-scripts theme-contrast template-outdated heading-skip
     markup-foreign math-brackets math-command symbol-repeated footnote-unused image-alt
     recording-loose script-unrepeatable script-penetration script-writes script-connects
-    output-ambiguous output-noise report-stale bench-unrecorded lab-penetration lab-reset
+    output-noise report-stale bench-unrecorded lab-penetration lab-reset
     package-reduced
     """.split(),
     "warning",
