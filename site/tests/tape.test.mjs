@@ -79,6 +79,22 @@ test('a controller that changes the model is repeated, too', (t) => {
   }
 })
 
+test('a button that changes the model leaves the states before it as they were', (t) => {
+  const fields = { controls: [control({ type: 'button' })] }
+  const lab = taped(t, BALLS, fields, { controls: [{ run: ({ model }) => (model.opt.gravity[2] = 5) }] })
+  const seen = [lab.physics.read()]
+  for (let i = 1; i <= 200; i++) {
+    lab.step(1)
+    if (i === 150) lab.press(0)
+    seen.push(lab.physics.read())
+  }
+  assert.ok(lab.tape.states.length > 3)
+  for (const { step } of lab.tape.states) {
+    lab.tape.go(step)
+    assert.deepEqual(lab.physics.read(), seen[step], `step ${step}`)
+  }
+})
+
 test('a run that goes on from an earlier step goes as it went before', (t) => {
   const lab = taped(t, BALLS, GAIN, CODE)
   const other = taped(t, BALLS, GAIN, CODE)
@@ -102,6 +118,8 @@ test('what is done at an earlier step drops what came after, from the log too', 
   assert.equal(lab.values[0], 2)
   assert.deepEqual(lab.state().log.events, [[0.2, 0, 2]])
   assert.equal(lab.tape.range.end.toFixed(3), '0.600', 'looking drops nothing')
+  lab.step(0)
+  assert.equal(lab.tape.range.end.toFixed(3), '0.280')
   lab.press(1)
   assert.equal(lab.tape.range.end.toFixed(3), '0.280')
   assert.deepEqual(lab.state().log.events, [[0.2, 0, 2], [0.28, 1]])

@@ -285,12 +285,15 @@ class BoundNumber(Struct, frozen=True, dict=True):
             ):
                 return several
         grouped_text = part_thousands(binding.text)
-        if grouped_text == binding.text or not binding.comma or number_text.is_in(texts):
+        if grouped_text == binding.text or not binding.comma:
             return number_text
         single = replace(BoundText.of(grouped_text), comma=",")
-        places = [_find(address, texts, len(single.numbers)) for address in self.addresses]
-        is_whole = any(p and all(n.is_integer for n in p.numbers) for p in places)
-        return single if is_whole or single.is_in(texts) else number_text
+        count, words = len(single.numbers), binding.words
+        places = [place for a in self.addresses if (place := _find(a, texts, count)) is not None]
+        places += (p for text in texts if words for p in text.find_words(words, count))
+        is_whole = bool(places) and all(n.is_integer for p in places for n in p.numbers)
+        is_shown = single.is_in(texts) and not number_text.is_in(texts)
+        return single if is_whole or is_shown else number_text
 
     @property
     def following(self) -> str:

@@ -328,7 +328,7 @@ def find_in_order(
     fits. `lengths` are those of the parts; `fits(part, place)` says whether one stands at a place.
     """
     last, stop = len(lengths) - 1, total - lengths[-1]
-    if stop < 0 or not (fits(0, 0) and fits(last, stop)):
+    if stop < lengths[0] or not (fits(0, 0) and fits(last, stop)):
         return None
     places, at = [0], lengths[0]
     for part in range(1, last):
@@ -338,7 +338,7 @@ def find_in_order(
             return None
         places.append(place)
         at = place + lengths[part]
-    return [*places, stop] if at <= stop else None
+    return [*places, stop]
 
 
 def numbers_fit(

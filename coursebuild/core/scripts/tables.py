@@ -127,13 +127,12 @@ class TableMatcher:
 
     def addresses(self, match: TableMatch) -> RowAddresses:
         """The addresses of the numbers of each row; none of a row that has not all."""
-        rows = []
+        rows, lines = [], self.text.lines
         for row in match.rows:
-            line = self.text.lines[row.line]
             at = [
                 PrintedPlace(self.text, row.line, (number,)).address
                 for _, _, number in row.pairs
-                if number in line.numbers  # the 1 of a unit such as `1/min` is none
+                if number in lines[row.line].numbers  # the 1 of a unit such as `1/min` is none
             ]
             rows.append(tuple(a for a in at if a is not None) if None not in at else ())
         return tuple(rows)
@@ -340,7 +339,7 @@ class TableMatcher:
 
     def misplaced_titles(self, match: TableMatch) -> Iterator[tuple[ColumnTitle, str, bool]]:
         """The titles of other numbers, each with what is printed, and whether it is certain."""
-        for row in match.rows[:1]:
+        for row in (row for row in match.rows[:1] if row.line >= 0):
             line, numbers = self.lines[row.line], self.text.lines[row.line].numbers
             pairs = [(cell.column, n) for cell, _, n in reversed(row.pairs) if n in numbers]
             places = {column: numbers.index(number) for column, number in pairs}

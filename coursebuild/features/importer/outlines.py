@@ -231,8 +231,9 @@ def read_tree(
 
 # --- Docusaurus
 
-_SPREAD = regex(r"\.\.\.[\w.]+(?:\([^()]*\))?,?")
-"""What a program adds to an object or a list of JavaScript."""
+_DOTS = r"(?<![^\s\[{,])\.{3}"
+_SPREAD = regex(rf"{_DOTS}[\w.]+(?:\([^()]*\))?,?")
+"""What a program adds to an object or a list of JavaScript; `More...` is a text."""
 
 
 def _read_literal(text: str) -> Mapping[str, object] | None:
@@ -243,7 +244,7 @@ def _read_literal(text: str) -> Mapping[str, object] | None:
         r"(?:module\.exports\s*=|sidebars\b[^=\n]*=|export default|\A)\s*(?=\{)", text
     )
     end = text.rfind("}")
-    if start is None or re.search(r"\.\.\.|=>", text[start.end() : end]):
+    if start is None or re.search(rf"{_DOTS}|=>", text[start.end() : end]):
         return None
     # An object of JavaScript whose values are literal is a value of YAML, but for blanks.
     literal = re.sub(r"([\"'\w])\s*:(?=\S)", r"\1: ", text[start.end() : end + 1]).replace(

@@ -3,7 +3,7 @@
  *
  * A state holds all that the next step depends on: MuJoCo's numbers, the lab's `ctx`, its controls and its random numbers. What is derived
  * (`xpos`, sensors, contacts) is that of the step before; so the numbers before a step are kept, and the step is made again. Those after it
- * are kept, too, where it need not end as it did: where a controller may have changed the model, or a hand pulled. After
+ * are kept, too, where it need not end as it did: where a controller or a button may change the model, or a hand pulled. After
  * something was done to the lab, the numbers are those before `mj_forward`. (Accelerations are derived with the model as it is now, which
  * is another if a controller changes it.) Between two states steps are repeated, unless a body was
  * pulled there: then the run can be looked at in the states only. When there are too many, every second one goes.
@@ -67,8 +67,9 @@ export class Tape {
 
   /** A step was made. @param {Float64Array | null} numbers of `before` @param {number} time s */
   after(numbers, time) {
-    const { code, drag, physics } = this.lab
-    if (numbers !== null) this.keep(numbers, code.controller || drag.active ? physics.read() : null)
+    const { code, config, drag, physics } = this.lab
+    const endsOtherwise = code.controller || drag.active || config.controls.some(({ type }) => type === 'button')
+    if (numbers !== null) this.keep(numbers, endsOtherwise ? physics.read() : null)
     this.touch(time)
     this.markEnd(time)
   }
@@ -152,7 +153,7 @@ export class Tape {
     this.marks = this.marks.filter(([at]) => at <= time)
     this.touches = this.touches.filter((at) => at <= time)
     this.lab.sampler.cut(time)
-    this.markEnd()
+    this.markEnd(time)
   }
 
   // --- going to a step
