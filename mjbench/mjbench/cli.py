@@ -291,8 +291,8 @@ def _stability(arguments: argparse.Namespace) -> int:
     for name in arguments.problems:
         matches = {n: p for n, p in problems.items() if n == name or n.startswith(f"{name}-")}
         if not matches:
-            known = ", ".join(_families(problems))
-            raise UsageError(f"no hard case or family of them is called `{name}`: {known}")
+            families = ", ".join(_families(problems))
+            raise UsageError(f"no hard case or family of them is called `{name}`: {families}")
         cases |= matches
     recorded = None
     if arguments.check is not None:
