@@ -142,7 +142,7 @@ def _printed_name(text: str, printed: str) -> str:
         return text
     name = "".join(map(_spell, unicodedata.normalize("NFKD", text)))
     names = (name.translate(dict.fromkeys(map(ord, signs))) for signs in ("", "\\{}", "\\{}_^"))
-    return next((name for name in names if name in printed), text)
+    return next((name for name in names if name and name in printed), text)
 
 
 def elides_rows(table: model.Table) -> bool:
