@@ -234,9 +234,10 @@ def cell_matches(recorded: Number, printed: Number, comparison: model.Comparison
 def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
     """A printed number as it replaces a recorded one."""
     has_more = new.place < old.place or only_number(old.text) is None  # `3.9 × 10⁻¹¹`
-    if comparison.mode is model.Mode.DIGITS and old.is_inexact and has_more:
+    is_rounded = comparison.mode is model.Mode.DIGITS and old.is_inexact and has_more
+    if is_rounded and new.is_finite:
         return round_like(old, new.value) or new.text
-    if "," in old.text and new.is_finite:
+    if "," in old.text and re.fullmatch(r"[-+]?[\d.,]+", new.text):
         return format(new.value, "+,f" if new.text.startswith("+") else ",f")
     return new.text
 
