@@ -142,7 +142,7 @@ def _printed_name(text: str, printed: str) -> str:
         return text
     name = "".join(map(_spell, unicodedata.normalize("NFKD", text)))
     names = (name.translate(dict.fromkeys(map(ord, signs))) for signs in ("", "\\{}", "\\{}_^"))
-    return next((name for name in names if name in printed), text)
+    return next((name for name in names if name and name in printed), text)
 
 
 def elides_rows(table: model.Table) -> bool:
@@ -234,9 +234,10 @@ def cell_matches(recorded: Number, printed: Number, comparison: model.Comparison
 def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
     """A printed number as it replaces a recorded one."""
     has_more = new.place < old.place or only_number(old.text) is None  # `3.9 × 10⁻¹¹`
-    if comparison.mode is model.Mode.DIGITS and old.is_inexact and has_more:
+    is_rounded = comparison.mode is model.Mode.DIGITS and old.is_inexact and has_more
+    if is_rounded and new.is_finite:
         return round_like(old, new.value) or new.text
-    if "," in old.text and new.is_finite:
+    if "," in old.text and re.fullmatch(r"[-+]?[\d.,]+", new.text):
         return format(new.value, "+,f" if new.text.startswith("+") else ",f")
     return new.text
 

@@ -339,13 +339,15 @@ class TableMatcher:
 
     def misplaced_titles(self, match: TableMatch) -> Iterator[tuple[ColumnTitle, str, bool]]:
         """The titles of other numbers, each with what is printed, and whether it is certain."""
-        for row in (row for row in match.rows[:1] if row.line >= 0):
+        for row in (row for row in match.rows[:1] if row.pairs):
             line, numbers = self.lines[row.line], self.text.lines[row.line].numbers
             pairs = [(cell.column, n) for cell, _, n in reversed(row.pairs) if n in numbers]
             places = {column: numbers.index(number) for column, number in pairs}
+            if not places:
+                return
             names = self._names(row.line)
             # Where the first number has no name, and words stand behind the last, they all do.
-            tail = line[numbers[-1].end :] if places else ""
+            tail = line[numbers[-1].end :]
             are_behind = bool(words_of(tail)) and not names[0].text
             words = [name.above.rpartition("_")[0] for name in names]  # `mass_kg`
             words = [*(name.before for name in names[1:]), tail] if are_behind else words

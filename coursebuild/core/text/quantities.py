@@ -88,7 +88,7 @@ _SYMBOL_OVER = regex(
     r"(?:\$\s*/\s*(?!\s|\$(?!\\(?:mathrm|text)))|/\s*\\(?:mathrm|text))"
 )
 """`$T$ / s`: what is upright is a unit, and what is not is none, where `T / s` may be one."""
-_BEFORE_UNIT = regex(r"[\s/(\[,]+(?:in\s+)?(?:\\(?:mathrm|text)\s*\{?)?\Z")
+_BEFORE_UNIT = regex(r"[\s/(\[,]+(?:in\s+)?\$?(?:\\(?:mathrm|text)\s*\{?)?\Z")
 _IN_WORDS = regex(r"(?P<symbol>\S+)\s+in\s+(?P<unit>\S+)\Z")
 _SYMBOL = regex(r"\w{1,2}|\\[a-z]+")
 _TO_NUMBER = regex(r"[=:≈]?[\s\[(,;|]*(?:[-+−]?[0-9.]+(?:[eE][-+−]?[0-9]+)?[\s,;|]+)*[-+−]?\Z")

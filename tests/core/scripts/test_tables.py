@@ -132,6 +132,9 @@ def test_a_table_under_digits_keeps_its_decimals() -> None:
     assert table_after(rows, printed, DIGITS) == "| Euler | 6.7 | 9e-04 |\n| RK4 | −2.35 | 5 |"
     # a number with no more of them stays as it is printed
     assert table_after("| a | 0.123 | 4 |", "a 1.50e-01 4\n", DIGITS) == "| a | 1.50e-01 | 4 |"
+    for mode in (EXACT, DIGITS):
+        new = table_after("| a | 1,234.5 | 12,345 |", "a nan 6.20e-04\n", mode)
+        assert new == "| a | nan | 6.20e-04 |"
     assert table_after(rows, printed, tolerance("0.01")) == (
         "| Euler | +6.7021 | 9.12e-04 |\n| RK4 | −2.349 | 5 |"
     )
