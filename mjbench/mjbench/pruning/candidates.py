@@ -100,6 +100,9 @@ KINDS = {
         interface=True,
     ),
     "unused-site": FindingKind("nothing uses the {}", "site", "Site", _UNMOVED, interface=True),
+    "unused-camera": FindingKind(
+        "nothing looks through the {}", "camera", "Camera", _UNMOVED, interface=True
+    ),
     "unused-material": FindingKind("nothing uses the {}", "material", "Material", _UNUSED),
     "unused-texture": FindingKind("nothing uses the {}", "texture", "Texture", _UNUSED),
     "unused-mesh": FindingKind("nothing uses the {}", "mesh", "Mesh", _UNUSED, "npolygonmax"),
@@ -198,8 +201,8 @@ def _unread_kind(text: ModelText, element: Element, commanded: Collection[int]) 
         return "tendon-idle"
     if section == "keyframe" and tag == "key":
         return "unused-keyframe"
-    if ids and thing_kind(element) == "site":
-        return "unused-site"
+    if ids and (kind := thing_kind(element)) in ("site", "camera"):
+        return f"unused-{kind}"
     if section == "asset" and element.get("type") != "skybox" and f"unused-{tag}" in KINDS:
         return f"unused-{tag}"
     if tag == "default" and element.parent is not None and element.parent.tag == "default":

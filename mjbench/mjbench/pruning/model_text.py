@@ -46,14 +46,15 @@ KINDS: Mapping[str, tuple[mujoco.mjtObj, str]] = {
     "joint": (mujoco.mjtObj.mjOBJ_JOINT, "njnt"),
     "geom": (mujoco.mjtObj.mjOBJ_GEOM, "ngeom"),
     "site": (mujoco.mjtObj.mjOBJ_SITE, "nsite"),
+    "camera": (mujoco.mjtObj.mjOBJ_CAMERA, "ncam"),
     "sensor": (mujoco.mjtObj.mjOBJ_SENSOR, "nsensor"),
     "actuator": (mujoco.mjtObj.mjOBJ_ACTUATOR, "nactuator"),
     "tendon": (mujoco.mjtObj.mjOBJ_TENDON, "ntendon"),
     "equality": (mujoco.mjtObj.mjOBJ_EQUALITY, "neq"),
 }
 """Kinds of things that elements become: MuJoCo's type, and the field with their number."""
-_IN_BODIES = {"body": "body", "joint": "joint", "freejoint": "joint", "geom": "geom"}
-_IN_BODIES |= {"site": "site"}
+_IN_BODIES = {kind: kind for kind in ("body", "joint", "geom", "site", "camera")}
+_IN_BODIES |= {"freejoint": "joint"}
 _HOLDERS = frozenset(("worldbody", "body", "frame", "replicate"))
 _SECTIONS = frozenset(("sensor", "actuator", "tendon", "equality"))
 

@@ -380,7 +380,7 @@ class Surveyor(Struct, kw_only=True, eq=False, dict=True):
         trial = trials.prune([*trials.absences, *items])
         # One that is proved may go only with what uses it.
         change = frozenset() if trial is None else trials.difference(trial, rest)
-        timed = not kind.startswith("unused-") or kind == "unused-site"
+        timed = not kind.startswith("unused-") or kind in ("unused-site", "unused-camera")
         reader = self._find_noticing_reader((), views_of(items), change)
         unfixed = self._reason_unfixed(reason, label, edits)
         places = []

@@ -142,6 +142,7 @@ def test_classes_that_no_element_is_of() -> None:
 
 SITES = """<body name="arm" pos="0 0 1"><joint name="j" axis="0 1 0"/><geom size=".1" pos=".3 0 0"/>
       <site name="held"/><site name="read"/><site/><site name="idle"/><site name="sensed"/>
+      <camera name="front"/>
     </body>
     <site name="end"/>"""
 TENDON = """<tendon><spatial stiffness="1"><site site="held"/><site site="end"/></spatial></tendon>
@@ -150,7 +151,7 @@ TENDON = """<tendon><spatial stiffness="1"><site site="held"/><site site="end"/>
   </sensor>"""
 
 
-def test_sites_and_sensors() -> None:
+def test_sites_cameras_and_sensors() -> None:
     """Those of a tendon are used, one that only an unread sensor needs is not, and all stay."""
     survey = run_survey(scene(SITES, rest=TENDON), lesson='print(data.site("read").xpos)')
     findings = findings_by_kind(survey)
@@ -160,7 +161,9 @@ def test_sites_and_sensors() -> None:
         "idle",
         "sensed",
     ]
-    assert findings["sensor-unread"].label == findings["unused-site"].label == INTERFACE_LABEL
+    assert names(findings["unused-camera"]) == ["front"]
+    labels = {findings[kind].label for kind in ("sensor-unread", "unused-site", "unused-camera")}
+    assert labels == {INTERFACE_LABEL}
     assert survey.edits == ()
 
 
