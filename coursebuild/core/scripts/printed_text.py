@@ -41,7 +41,7 @@ from coursebuild.core.text.source import Excerpt, Source, Span
 
 Locate: TypeAlias = Callable[[int, int], Span]
 _Words: TypeAlias = tuple[str, ...]
-"""Words without the signs around them, and numbers behind a `#`."""
+"""Words without the signs around them, and numbers behind a zero character."""
 
 
 _IN_BRACKETS = regex(r"[(\[]([^()\[\]]+)[)\]]")
@@ -375,11 +375,11 @@ class PrintedText:
             return address in addresses and rivals.isdisjoint(addresses)
 
         for context in chain(*self.contexts(place.at, place.first)):
-            numbers = [at for at, word in enumerate(context) if word.startswith("#")]
+            numbers = [at for at, word in enumerate(context) if word.startswith("\0")]
             plain_words = ["#" if at in numbers else word for at, word in enumerate(context)]
             row_words = [*plain_words]
             for at in [at for at in numbers if at >= in_heading][:1]:  # it may name its line
-                row_words[at] = context[at].removeprefix("#") or "#"
+                row_words[at] = context[at].removeprefix("\0")
             for words in (plain_words, row_words):
                 for start in range(len(words) - 1, -1, -1):
                     is_unit = start - 1 in numbers and bool(unit_behind(words[start]))
@@ -395,7 +395,7 @@ class PrintedText:
         if choices:
             return min(choices, key=lambda choice: choice[:3])[3]
         lead = self.leads(place.at)[place.first] or self.title(place.at, place.numbers[0])
-        label = " ".join(word.removeprefix("#") for word in _split(lead))
+        label = " ".join(word.removeprefix("\0") for word in _split(lead))
         is_shared = any(output.is_called(line, first, label) for output, line, first in rivals)
         return "" if is_shared or _FORBIDDEN.search(label) else label
 
@@ -427,7 +427,7 @@ class PrintedText:
 
 
 def _split(text: str) -> _Words:
-    places = ((n.start, n.end, f" #{plain_text(n.text)} ") for n in scan(text))
+    places = ((n.start, n.end, f" \0{plain_text(n.text)} ") for n in scan(text))
     words = (word.strip('=:,;()[]|<>~/"') for word in replace_ranges(text, places).split())
     return tuple(filter(None, words))
 
@@ -435,7 +435,7 @@ def _split(text: str) -> _Words:
 def _ends_with(context: _Words, sought: _Words) -> bool:
     """Whether words end with others, in which `#` is any number."""
     return 0 < len(sought) <= len(context) and all(
-        word == sought_word or (sought_word == "#" and word.startswith("#"))
+        word == sought_word or (sought_word == "#" and word.startswith("\0"))
         for word, sought_word in zip(reversed(context), reversed(sought), strict=False)
     )
 

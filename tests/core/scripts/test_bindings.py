@@ -305,6 +305,10 @@ def test_words_before_a_number_choose_it() -> None:
         assert (mistake is None) is holds, words
     text = f'{script()}{output(printed)}\nHere $x${{value=2.5 out="Euler error"}}.\n'
     assert check(text, make_run(printed)) == ()
+    mistake = find_mistake('`9`{out="robot # #"}', "robot #3: 2.5 N\nrobot #4: 3.5 N\n")
+    assert mistake is not None
+    edits = [edit.text for note in mistake.notes for edit in note.edits]
+    assert edits == ['{out="4"}', '{out="3"}'], "a `#` that is printed is a word"
 
 
 def test_numbers_with_labels_of_their_own_are_different_quantities() -> None:
