@@ -211,13 +211,13 @@ def output_receipt(page: PageContext, block: model.Recording) -> Receipt:
             text = words("receipt.verified", versions=versions)
             if run.recorded:
                 text = words("receipt.once", when=run.recorded)
-            if run.unrepeated:
-                return Receipt("unverified", words("receipt.unrepeated", versions=versions))
             text = f"{text} {_describe_comparison(words, verdict.comparison)}."
+            if run.unrepeated:
+                text = words("receipt.unrepeated", versions=versions)
             rows, printed_rows = verdict.rows
             if rows < printed_rows:
                 text += f" {words('receipt.rows', count=rows, printed=printed_rows)}"
-            return Receipt("verified", text)
+            return Receipt("unverified" if run.unrepeated else "verified", text)
         case "volatile":
             return Receipt("volatile", words("receipt.volatile", versions=versions))
         case "drift":
