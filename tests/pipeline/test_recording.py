@@ -70,12 +70,16 @@ def test_a_new_script_runs_once_until_it_is_measured(course: Folder) -> None:
 
 
 def test_a_table_says_how_many_printed_rows_it_shows(make: Make) -> None:
-    code = "```python file=examples/a.py\nfor n in range(5):\n    print('n', n, 'square', n * n)\n```"
-    table = "| n | square |\n| --- | --- |\n| 1 | 1 |\n| 3 | 9 |"
-    course = make(f"## One\n\n{code}\n\nOutput, as a table:\n\n{table}\n")
-    assert course.main("update").status == course.main("build").status == 0
-    text = course.text("public/lessons/1.1-one.html")
-    assert "Recorded, not yet repeated" in text and "It shows 2 of 5 printed rows." in text
+    code = "for n in range(1, 6):\n    print('n', n, 'square', n * n)"
+    script = f"```python file=examples/a.py\n{code}\n```"
+    table = "| n | square |\n| --- | --- |\n| 1 | 1 |\n| 3 | 8 |"
+    course = make(f"## One\n\n{script}\n\nOutput, as a table:\n\n{table}\n")
+    receipts = {("update",): "not yet repeated:", ("check", "--sensitivity"): "Verified with"}
+    for arguments, receipt in receipts.items():
+        course.main(*arguments)
+        assert course.main("build").status == 0
+        page = course.text("public/lessons/1.1-one.html")
+        assert receipt in page and "It shows 2 of 5 printed rows." in page
 
 
 def test_a_changed_script_runs_once(course: Folder) -> None:
