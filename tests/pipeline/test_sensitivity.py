@@ -85,7 +85,7 @@ def test_what_holds_and_what_does_not(course: Folder, by_path: dict[str, Any]) -
     assert script["amplification"] < 1e4
     assert script["numbers"] == 3
     [flip] = by_path["examples/limit.py"]["flips"]  # other words are printed near a threshold
-    assert (flip["printed"], flip["other"]) == ("", "left or ")
+    assert (flip["printed"], flip["other"]) == ("", "left or")
     doubts = by_path["examples/loose.py"]["doubts"]
     assert doubts and not any(doubt["compared"] for doubt in doubts)
     assert "(allowed for)" in course.main("check", "--sensitivity").out

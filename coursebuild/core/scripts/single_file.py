@@ -115,7 +115,8 @@ class _File:
         )
         new_imports = {line for line in self._imports if "__future__" not in line}
         new_imports -= {*own_imports.split("\n")}
-        imports = (own_imports, "\n".join(sorted(new_imports)))
+        new_lines = sorted(new_imports, key=lambda line: (line.startswith("from "), line.lower()))
+        imports = (own_imports, "\n".join(new_lines))
         parts = ["\n".join(opening), *imports, *sections, "\n".join(lines[end:])]
         text, last = "", ""
         for part in filter(None, (part.strip("\n") for part in parts)):

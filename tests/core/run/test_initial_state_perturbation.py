@@ -228,8 +228,7 @@ print(json.dumps(ends))
         x += timestep * v
     result = run(SPRING_HEAD + text, perturbation=-3)
     assert json.loads(result.stdout) == pytest.approx([1.0, x, 0.2, 0.1] * 2), result.stderr
-    assert result.trace is not None
-    assert (result.trace.is_perturbed, result.trace.timesteps) == (True, (0.1,))
+    assert result.trace is not None and result.trace.is_perturbed
 
 
 def test_steps_are_divided_however_they_are_made(run: Run) -> None:

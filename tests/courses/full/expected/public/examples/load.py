@@ -4,10 +4,10 @@
 #     "mujoco==MUJOCO",
 # ]
 # ///
+import mujoco
+
 import tempfile
 from pathlib import Path
-
-import mujoco
 
 MODELS = {
     "box.xml": """\
