@@ -252,7 +252,9 @@ def convert_substitution(whole: str, context: LessonContext, is_statement: bool)
 
 def draw_emoji(name: str, context: LessonContext) -> str:
     """Return the sign that a name between colons stands for, if its tool draws signs."""
-    if not (context.files.mkdocs or context.files.docusaurus):
+    # MkDocs draws them by an extension; Zensical, whose settings are a project's, has it.
+    has_signs = re.search(r"emoji|INHERIT|^\[project\]", context.files.mkdocs, re.MULTILINE)
+    if not (has_signs or context.files.docusaurus):
         return name
     import emoji  # needed by texts with such names only
 

@@ -29,7 +29,7 @@ FOLDERS = {
     "sphinx": {"conf.py": ""},
     "mkdocs": {
         **PICTURE,
-        "mkdocs.yml": "site_name: A",
+        "mkdocs.yml": "site_name: A\nmarkdown_extensions: [pymdownx.emoji]",
         "hidden/.b.md": "C\nD\n",
         "hidden/c.py": "d = 1\n",
         ".obsidian/app.json": "{}",
