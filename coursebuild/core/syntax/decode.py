@@ -21,7 +21,6 @@ from coursebuild.core.model.fields import NOT_BLANK
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
     BoolNode,
-    ErrorNode,
     Format,
     Node,
     NullNode,
@@ -105,8 +104,6 @@ class _Decoder:
     def report_wrong_type(
         self, node: Node, type: inspect.Type, name: str, help: str = ""
     ) -> object:
-        if isinstance(node, ErrorNode):  # the parser has reported it
-            return _INVALID
         message = wrong_type_message(node, name, type, self.format)
         help = help or type_help(node, type) or _field_help(name, type)
         return self.report("field-type", node.mark, message, help)

@@ -72,10 +72,6 @@ class DateNode(_PositionedNode, eq=False):
     """A date or time of TOML. No field takes one."""
 
 
-class ErrorNode(_PositionedNode, eq=False):
-    """Stands for a value that could not be read and was reported."""
-
-
 class _Container(_PositionedNode, eq=False):
     """A value that holds others; one of TOML grows until the end of its text."""
 
@@ -138,9 +134,7 @@ class Member(Struct, frozen=True):
     value: Node
 
 
-Node: TypeAlias = (
-    ObjectNode | ArrayNode | StringNode | NumberNode | BoolNode | NullNode | DateNode | ErrorNode
-)
+Node: TypeAlias = ObjectNode | ArrayNode | StringNode | NumberNode | BoolNode | NullNode | DateNode
 
 
 _LETTERS = regex(r"[A-Za-z]+")

@@ -15,7 +15,7 @@ import tree_sitter
 import tree_sitter_toml
 
 from coursebuild.core.syntax import nodes
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source
 
@@ -215,9 +215,9 @@ _TOKEN = regex(
 _SCALAR = regex(r"[^\n,\]}#]*")
 _WORD = regex(r"[\w.+-]+|\S")
 _CURLY_QUOTES = tuple("“”„‟‘’‚‛«»")
-_BOOLEANS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
-_NULLS = frozenset(("null", "None", "nil", "Null", "NULL"))
 _QUOTES_HELP = "TOML knows only the straight quotes `\"` and `'`"
+_WORDS_HELP = "the only words without quotes are `true` and `false`"
+_NUMBERS_HELP = "a number has no leading zeros, and digits on both sides of its point"
 
 
 def error_offset(text: str, message: str) -> int:
@@ -241,49 +241,31 @@ _Mistake = tuple[int, int, str, str]
 
 def _describe_mistake(text: str, message: str) -> _Mistake:
     at = error_offset(text, message)
-    char, words = text[at : at + 1], _PLACE.sub("", message)
+    char, words = text[at : at + 1], _PLACE.sub("", message).replace("'", "`")
     if odd := "a lone carriage return" if char == "\r" else nodes.odd_character(char):
         help: str = Fix("replace it by a plain space, or remove it", " ", safe=char != "\r")
-        if at == 0:
-            encoding = "save the file as UTF-8 without a byte order mark"
-            help = Fix(encoding if char == "\ufeff" else "remove it", "", safe=True)
+        help = help if at else Fix("remove it", "", safe=True)
         return at, at + 1, f"{odd} is not allowed here in TOML", help
     opening = _innermost_opening(text, at)
-    bracket = text[opening] if opening is not None else ""
-    if opening is not None and bracket in "\"'":
-        quote = text[opening]
-        if text.startswith(quote * 3, opening):
-            return opening, opening + 3, f"`{quote * 3}` is never closed", ""
-        end = opening + len(text[opening:].split("\n", 1)[0])
-        help = f"close it with `{quote}`; text of several lines stands between three quotes"
-        return opening, end, "the string is not closed on its line", help
+    if opening is not None and (at >= len(text) or text[opening] in "\"'"):
+        help = "text of several lines stands between three quotes" if at < len(text) else ""
+        return opening, opening + 1, f"`{text[opening]}` is never closed", help
     if re.match("Unescaped|Escaped|Invalid hex", words):
         start = text.rindex("\\", 0, at)
         help = double_backslash(nodes.tex_word(text, start + 1))
         return start, start + 2, f"`{text[start : start + 2]}` is not an escape of TOML", help
-    if opening is not None and at >= len(text):
-        return opening, opening + 1, f"`{bracket}` is never closed", ""
-    if opening is not None and bracket == "{" and char == "\n":
-        help = "a longer table has a `[header]` of its own"
-        return opening, opening + 1, "a table in braces stands on one line", help
+    before = re.search(r"[\w.+:-]*\Z", text[:at])
+    is_inside = before is not None and before[0] and char.strip(",#") and not char.isspace()
     if words.startswith(("Invalid value", "Invalid date")):
         return _wrong_value(text, at)
-    if words.startswith(("Expected newline", "Unclosed")):
-        closer = "]" if words == "Unclosed array" else "}" if bracket else ""
-        before = re.search(r"[\w.+:-]*\Z", text[:at])
-        if before and before[0] and not text[at].isspace() and text[at] not in ",#":
-            return _wrong_value(text, before.start())
-        noun, help = "the end of the line", "each `key = value` stands on a line of its own"
-        if closer:
-            noun, help = f"`,` or `{closer}`", "values in brackets have commas between them"
-        return _expected_instead(text, at, noun, help)
+    if before is not None and is_inside and words.startswith(("Expected newline", "Unclosed")):
+        return _wrong_value(text, before.start())
     help = Fix("TOML writes `key = value`", " =", safe=True) if char == ":" else ""
     help = _QUOTES_HELP if char in _CURLY_QUOTES else help
-    if words.startswith("Invalid"):
-        return _expected_instead(text, at, "a key", help)
-    if words.startswith("Expected "):
-        return _expected_instead(text, at, words.removeprefix("Expected ").replace("'", "`"), help)
-    return at, at, words[:1].lower() + words[1:], help
+    help = "values in brackets have commas between them" if words[:8] == "Unclosed" else help
+    word = _WORD.match(text, at)
+    end, name = (at, "the end of the line") if word is None else (word.end(), f"`{word[0]}`")
+    return at, end, f"{words[:1].lower()}{words[1:]}, found {name}", help
 
 
 def _innermost_opening(text: str, at: int) -> int | None:
@@ -305,22 +287,14 @@ def _wrong_value(text: str, start: int) -> _Mistake:
     if not value:
         return start, start, "a value is missing", 'an empty text is written `""`'
     help = ""
-    if value in _BOOLEANS:
-        help = write(_BOOLEANS[value])
-    elif value in _NULLS:
-        help = "TOML has no such value; leave the field out"
+    if value.lower() in ("true", "false", "null", "none", "nil"):
+        help = _WORDS_HELP
     elif value[0] in _CURLY_QUOTES:
         help = _QUOTES_HELP
     elif re.fullmatch(r"[+-]?[0-9]*\.?[0-9]*", value):
-        help = "a number has no leading zeros, and digits on both sides of its point"
+        help = _NUMBERS_HELP
     elif '"' not in value and "'" not in value:
         new = None if "\\" in value or "#" in value else f'"{value}"'
         help = Fix(f'text needs quotes: `"{nodes.shorten(value)}"`', new, safe=True)
     message = f"`{nodes.shorten(value)}` is not a valid TOML value"
     return start, start + len(value), message, help
-
-
-def _expected_instead(text: str, at: int, noun: str, help: str) -> _Mistake:
-    word = _WORD.match(text, at)
-    quotation = f"`{nodes.shorten(word[0])}`" if word else "the end of the line"
-    return at, word.end() if word else at, f"expected {noun}, found {quotation}", help

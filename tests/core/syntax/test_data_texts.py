@@ -306,17 +306,15 @@ def test_notes_point_at_the_first_key_and_at_the_bracket() -> None:
     ]
 
 
-def test_deep_nesting_and_long_numbers_are_reported() -> None:
+def test_deep_nesting_is_reported() -> None:
     diagnostics = [
         *parse("[" * 100_000).diagnostics,
         *parse('{"a":' * 100_000).diagnostics,
-        *parse("[" + "9" * 5000 + "]").diagnostics,
         *read_toml("a = " + "[" * 9_999)[1],
     ]
     assert [(d.span.start, d.message) for d in diagnostics] == [
         (64, DEEP),
         (320, DEEP),
-        (1, "a number of 5000 digits is too long"),
         (0, "tables, arrays or keys are nested too deeply"),
     ]
 
