@@ -48,8 +48,10 @@ _PROGRAM_VALUES = ("timeout", "args", "writes", "record")
 _SHOWS: tuple[Show, ...] = ("open", "folded", "hidden")
 _WHOLE_STATEMENTS = "a part holds whole statements: a function or a loop stands in one part"
 _NUMBER = regex(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
-_DEVICE = regex(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
-_UNPORTABLE = regex(r'[\x00-\x1f\x7f<>:"|?*;&$!#%`{}\'\ud800-\udfff]')
+_PORTABLE = regex(
+    r"(?!(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\.|\Z))(?! ).*[^. ]", re.IGNORECASE
+)
+_UNPORTABLE = regex(r'[\x00-\x1f\x7f<>:"|?*;&$!#%`{}\'\\\ud800-\udfff]')
 _UNUSABLE_NAMES = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - set(
     "code test this".split()
 )
@@ -273,30 +275,17 @@ _LISTS: dict[str, tuple[Callable[[str], bool], str, str]] = {
 
 def path_mistake(path: str, *, is_python: bool = True) -> str:
     """Why a script cannot have this path; empty if it can."""
-    parts = path.split("/")
-    stem = parts[-1].removesuffix(".py")
-    if any(ord(char) < 32 or ord(char) == 127 for char in path):
-        return "the path of a script must not hold control characters"
-    if "\\" in path:
-        return f"`{path}` has a backslash; folders are separated by `/`"
-    if path.startswith("/") or re.match(r"[A-Za-z]:", path):
-        return f"`{path}` is absolute; the path of a script is relative to the project"
-    if ".." in parts:
-        return f"`{path}` leads out of its folder by `..`"
-    if "" in parts or "." in parts:
-        return f"`{path}` has a part that is empty or `.`"
-    if parts[0] != "examples" or len(parts) < 2:
+    folder, *parts = path.split("/")
+    stem = path.rpartition("/")[2].removesuffix(".py")
+    if folder != "examples" or not parts:
         return f"`{path}` is not below `examples/`"
-    if is_python and (not path.endswith(".py") or not stem):
-        return f"`{path}` does not end in `.py`" if stem else f"`{path}` has no name before `.py`"
+    if is_python and not path.endswith(".py"):
+        return f"`{path}` does not end in `.py`"
     if not is_python and path.lower().endswith((".py", ".pyc", ".pyd", ".so")):
         return f"`{path}` would be imported by Python scripts beside it"
-    if _UNPORTABLE.search(path) or any(part[-1] in ". " or part[0] == " " for part in parts):
-        return f"`{path}` has a character that not every file system and shell takes"
-    if any(len(part.encode()) > 255 for part in parts):
-        return "a part of the path is longer than 255 bytes"
-    if device := next((part for part in parts if _DEVICE.fullmatch(part)), None):
-        return f"`{device}` is a reserved name on some systems"
+    is_portable = stem and not _UNPORTABLE.search(path) and all(map(_PORTABLE.fullmatch, parts))
+    if not is_portable or max(len(part.encode()) for part in parts) > 255:
+        return f"`{path}` has a part that not every file system and shell takes"
     if is_python and stem in _UNUSABLE_NAMES:
         return f"`{path}` would be imported in place of the module `{stem}` by its neighbours"
     return ""

@@ -221,11 +221,6 @@ _FENCED = regex(
     re.MULTILINE,
 )
 """A block of code as a whole."""
-_CONFLICT_NOTES = {
-    "|": "the text that both versions changed begins here",
-    "=": "the other version begins here",
-    ">": "the conflict ends here",
-}
 
 
 def find_conflict(source: Source) -> Diagnostic | None:
@@ -244,26 +239,13 @@ def find_conflict(source: Source) -> Diagnostic | None:
         for match in _CONFLICT_MARK.finditer(text)
         if not any(start <= match.start() < end for start, end in examples)
     ]
-    first = next((i for i, mark in enumerate(marks) if mark.text[0] in "<>"), None)
-    if first is None:
+    if not any(mark.text[0] in "<>" for mark in marks):
         return None
-    conflict = [marks[first]]
-    for mark in marks[first + 1 :] if marks[first].text[0] == "<" else ():
-        if mark.text[0] == "<":
-            break
-        conflict.append(mark)
-        if mark.text[0] == ">":
-            break
-    message = "this line was left behind by a merge conflict"
-    if len(conflict) > 1:
-        lines = [str(mark.line) for mark in conflict]
-        message = "a merge conflict was left here: its marks are lines "
-        message += f"{', '.join(lines[:-1])} and {lines[-1]}"
-    more_count = sum(mark.text[0] == "<" for mark in marks[first + 1 :])
-    notes = [Note(_CONFLICT_NOTES[mark.text[0]], mark) for mark in conflict[1:]]
-    if more_count:
-        notes.append(Note(f"conflicts further down in this file: {more_count}"))
+    lines = ", ".join(str(mark.line) for mark in marks)
+    message = f"a merge conflict was left here: its marks are in lines {lines}"
+    if len(marks) == 1:
+        message = "this line was left behind by a merge conflict"
     help = "keep one of the versions, or join them, and delete the marks"
     if is_markdown:
         help += "; to show a conflict to readers, put all of it into a block of code"
-    return diagnose("merge-conflict", conflict[0], message, help=help, notes=notes)
+    return diagnose("merge-conflict", marks[0], message, help=help)

@@ -32,7 +32,6 @@ from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 _WORD = regex(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
-_SPACED_OPTION = regex(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
 _KIND = regex(r"\s*(\S*)")
 _NOT_SPACE = regex(r"\S")
 _REST = regex(r"\S*")
@@ -116,27 +115,14 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
         if misquoted := check_quotes(info, at, "fence-info"):
             diagnostic, end = misquoted
             diagnostics.append(diagnostic)
-        elif spaced_word := _SPACED_OPTION.match(text, at):
-            equals, end = spaced_word.start(spaced_word.lastindex or 0), spaced_word.end()
-            message = "there is a space beside the `=` of a key"
-            spaced = info.span(at, end)
-            edit = Edit(spaced, re.sub(r"\s*=\s*", "=", spaced.text, count=1))
-            help = Fix("remove it", edits=(edit,), safe=True)
-            place = info.span(equals, equals + 1)
-            diagnostics.append(diagnose("fence-info", place, message, help=help))
         elif end < len(text) and not text[end].isspace():
-            start, rest = at, _REST.match(text, end)
-            advice: str
-            if text[end] == '"' and text.count('"', end) == 1:
-                start, end, message = end, len(text), "a quoted value is never closed"
-                advice = Fix('close it with `"`', edits=(Edit(info.span(end, end), '"'),))
-            else:
-                end = rest.end() if rest else end
-                message = f"`{text[at:end]}` cannot be read"
-                advice = 'write `key=value`, `key="value with spaces"` or a flag, '
-                advice += "with spaces between them"
-            place = info.span(start, end)
-            diagnostics.append(diagnose("fence-info", place, message, help=advice))
+            rest = _REST.match(text, end)
+            end = rest.end() if rest else end
+            message = f"`{text[at:end]}` cannot be read"
+            help = (
+                'write `key=value`, `key="value with spaces"` or a flag, with spaces between them'
+            )
+            diagnostics.append(diagnose("fence-info", info.span(at, end), message, help=help))
         elif not match[1]:
             message = f"`{match[0]}` has no key before the `=`"
             diagnostics.append(diagnose("fence-info", info.span(at, end), message))
