@@ -23,7 +23,7 @@ from coursebuild.core.model import Recording
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
 from coursebuild.core.scripts.diff import limit_notes, shorten
 from coursebuild.core.scripts.extract import Extraction
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, propose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
@@ -117,10 +117,6 @@ def failure_diagnostic(
         label = shorten(error, _LABEL)
         matches = ((pattern.match(error), advice) for pattern, advice in _HELPS)
         help = next((match.expand(advice) for match, advice in matches if match), "")
-        slip = re.search(r"'(\w+)'(?: is not defined)?\. Did you mean: '(\w+)'\?", error)
-        if slip is not None:
-            fix = propose(slip[1], slip[2])
-            help = Fix(help, fix.new, slip[1])
         missing = _MISSING_MODULE.search(error)
         file = find_module(missing[1]) if missing else ""
         folder = file.removesuffix("/__init__.py").rpartition("/")[0] or "."

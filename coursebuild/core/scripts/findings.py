@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 
@@ -304,14 +303,7 @@ def drift_diagnostic(
     notes = limit_notes(differences, _MAX_NOTES, noun)
     notes += (Note(_describe_dependence(d), d.binding.text_span) for d in dependents)
     help = f"if the change is intended, run {update}"
-    fraction = re.match(r",(\d+)", first.span.source.text[first.span.end : first.span.end + 40])
-    if any("\x1b" in change.recorded and "\x1b" not in change.printed for change in changes):
-        help = "what is recorded has the colour codes of a terminal: remove them"
-    elif fraction and f"{first.recorded}.{fraction[1]}" == first.printed:
-        help = f"Python prints a decimal point: write `{first.printed}`"
-    elif (
-        isinstance(body := recording.body, Table) and first.span.start < body.rows[0][0].span.start
-    ):
+    if isinstance(body := recording.body, Table) and first.span.start < body.rows[0][0].span.start:
         help = HEADER_HELP
     elif isinstance(body, Table) and first.kind is DriftKind.MISSING:
         help = f"{help}; {ROW_HELP}"

@@ -35,7 +35,7 @@ from coursebuild.core.syntax.other_tools import check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.python_syntax import check_syntax
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 
@@ -228,12 +228,8 @@ def _read_timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
     seconds = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0
     if 0 < seconds <= MAX_TIMEOUT:
         return seconds
-    message = f"`{word.value}` is not a number of seconds above 0"
-    if seconds > MAX_TIMEOUT:
-        message = f"`{word.value}` s is more than a day"
-    number = re.fullmatch(rf"({_NUMBER.pattern})\s?s(?:ec)?", word.value)
-    help = "" if number is None else write(number[1])
-    diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
+    message = f"`{word.value}` is not a number of seconds above 0, of a day at most"
+    diagnostics.append(diagnose("fence-key-value", word.value_span, message))
     return DEFAULT_TIMEOUT
 
 

@@ -269,26 +269,21 @@ class _Decoder:
                 values[key] = self.decode_value(member.value, fields[key].type, key)
             elif type.forbid_unknown_fields and not (variants and key == type.tag_field):
                 unknown.append(member.key)
-        misspelt: set[str] = set()
         for key_node in unknown:
-            key, help = key_node.value, ""
+            key = key_node.value
             replacement = getattr(type.cls, "replaced", {}).get(key, "")
             if replacement:  # said for one release
                 message = f"{format_name(key)} is a field of an earlier version"
                 self.report("field-unknown", key_node.span, message, replacement)
                 continue
-            if (likely := nearest(key, set(fields) - set(values) - misspelt)) is not None:
-                misspelt.add(likely)
-                help = propose(key, likely)
-            elif owners := _variants_with_field(key, variants or {}):
+            help = did_you_mean(key, set(fields) - set(values))
+            if owners := _variants_with_field(key, variants or {}):
                 names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
                 help = f"it is a field of {names}"
-            else:
-                help = did_you_mean(key, fields)
             self.report("field-unknown", key_node.span, f"unknown field {format_name(key)}", help)
         missing = [field for field in type.fields if field.required and field.name not in values]
         for absent in missing:
-            if absent.name not in misspelt:  # a misspelt field is one mistake
+            if not any(nearest(key.value, [absent.name]) for key in unknown):  # one mistake
                 help = _field_help(absent.name, absent.type)
                 self.report("field-missing", node.mark, f"`{absent.name}` is missing", help)
         if missing or _INVALID in values.values():

@@ -208,16 +208,11 @@ def check_stray_keys(fence: Fence, state: ParsingState) -> None:
 def _read_tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | None:
     if word is None or word.value is None:
         return None
-    value, help = Decimal(word.value) if _NUMBER.fullmatch(word.value) else None, ""
-    if value is None:
-        message = f"`{word.value}` is not a number"
-    elif value < 0:
-        message = f"`{word.key}` must not be negative"
-    elif word.key == "rtol" and value >= 1:
-        message = f"`rtol` must be less than 1, not {word.value}"
-        help = "it is a share of the number; 1 would take 0 for it"
-    else:
+    value = Decimal(word.value) if _NUMBER.fullmatch(word.value) else Decimal(-1)
+    if value >= 0 and (word.key == "atol" or value < 1):
         return value
+    help = "`atol` is a number from 0 on, `rtol` a share of the recorded one from 0 to less than 1"
+    message = f"`{word.value}` is no tolerance"
     diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
     return None
 
