@@ -15,7 +15,7 @@ import tree_sitter
 import tree_sitter_toml
 
 from coursebuild.core.syntax import nodes
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source
 
@@ -42,8 +42,8 @@ def parse_toml(
         diagnostic = diagnose(rule, body.span(0, 0), "tables, arrays or keys are nested too deeply")
     except ValueError as error:
         start, end, message, help = _describe_mistake(body.text, str(error))
-        mistake = diagnose(rule, body.span(start, end), message, help=help)
-        diagnostic = _diagnose_repeated_key(body, str(error)) or mistake
+        rule = "field-repeated" if message == _REPEATED else rule
+        diagnostic = diagnose(rule, body.span(start, end), message, help=help)
     return Parsed(None, (diagnostic,))
 
 
@@ -52,28 +52,8 @@ def toml_string(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _diagnose_repeated_key(body: Excerpt, message: str) -> Diagnostic | None:
-    if not message.startswith(("Cannot", "Duplicate")):
-        return None
-    end = body.text.find("\n", error_offset(body.text, message))
-    reader = _Reader(body.slice(0, end if end >= 0 else len(body.text)))
-    if reader.root.has_error:
-        return None
-    reader.read_document()
-    if reader.repetition is None:
-        return None
-    key, first = reader.repetition
-    notes = (Note("the first one is here", first.span),)
-    message = f"`{key.value}` is given twice"
-    spans = (first.span, key.span)
-    first_header, header = (span.source.line_text(span.line).strip() for span in spans)
-    is_array = first_header.startswith("[") and re.match(r"\[[^\[]+\.", header)
-    help = f"if there are several, write each header with two brackets: `[{header}]`"
-    return diagnose("field-repeated", key.span, message, notes=notes, help=help if is_array else "")
-
-
 class _Reader:
-    """Makes nodes of the syntax tree of a text that is TOML, except that keys may be repeated."""
+    """Makes nodes of the syntax tree of a text that is TOML."""
 
     def __init__(self, body: Excerpt) -> None:
         self.body = body
@@ -82,8 +62,6 @@ class _Reader:
         # these, offsets in the tree are offsets in the text.
         plain = _NOT_ASCII.sub("x", body.text).encode()
         self.root = tree_sitter.Parser(_LANGUAGE).parse(plain).root_node
-        self.repetition: tuple[nodes.StringNode, nodes.StringNode] | None = None
-        """The key that the last statement repeats, and its first occurrence."""
         self.diagnostics: list[Diagnostic] = []
 
     def read_document(self) -> nodes.ObjectNode:
@@ -106,7 +84,6 @@ class _Reader:
         opening = (start, end)
         if pairs:
             end = pairs[-1].named_children[1].end_byte
-        self.repetition = None
         *outer, last = self.read_key_path(name)
         parent = self.open_table(root, outer, end)
         table = nodes.ObjectNode(self.body, start, end, opening, {})
@@ -124,7 +101,6 @@ class _Reader:
     def read_pair(self, table: nodes.ObjectNode, pair: tree_sitter.Node) -> None:
         """Read `key = value` in a table."""
         name, value_node = pair.named_children[:2]
-        self.repetition = None
         value = self.read_value(value_node)
         *outer, last = self.read_key_path(name)
         self.add(self.open_table(table, outer, value.end), last, value)
@@ -144,11 +120,8 @@ class _Reader:
         return table
 
     def add(self, table: nodes.ObjectNode, key: nodes.StringNode, value: nodes.Node) -> nodes.Node:
-        """Give a key its value; return that which it has, another one if the key is repeated."""
-        member = table.members.setdefault(key.value, nodes.Member(key, value))
-        if member.key is not key:
-            self.repetition = (key, member.key)
-        return member.value
+        """Give a key its value, unless it has one above; return that which it has."""
+        return table.members.setdefault(key.value, nodes.Member(key, value)).value
 
     # ------------------------------------------------------------------------------------ values
 
@@ -207,14 +180,10 @@ def _value_of(text: str) -> Any:
 
 
 _PLACE = regex(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
-_TOKEN = regex(
-    r'#[^\n]*|"""(?:[^\\]|\\.)*?"{3,5}|' + r"'''.*?'{3,5}|"
-    r'"(?!"")(?:[^"\\\n]|\\[^\n])*"|' + r"'(?!'')[^'\n]*'|[\[\]{}\"']",
-    re.DOTALL,
-)
 _SCALAR = regex(r"[^\n,\]}#]*")
 _WORD = regex(r"[\w.+-]+|\S")
 _CURLY_QUOTES = tuple("“”„‟‘’‚‛«»")
+_REPEATED = "this is given twice"
 _QUOTES_HELP = "TOML knows only the straight quotes `\"` and `'`"
 _WORDS_HELP = "the only words without quotes are `true` and `false`"
 _NUMBERS_HELP = "a number has no leading zeros, and digits on both sides of its point"
@@ -246,10 +215,14 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
         help: str = Fix("replace it by a plain space, or remove it", " ", safe=char != "\r")
         help = help if at else Fix("remove it", "", safe=True)
         return at, at + 1, f"{odd} is not allowed here in TOML", help
-    opening = _innermost_opening(text, at)
-    if opening is not None and (at >= len(text) or text[opening] in "\"'"):
-        help = "text of several lines stands between three quotes" if at < len(text) else ""
-        return opening, opening + 1, f"`{text[opening]}` is never closed", help
+    if words.startswith(("Cannot", "Duplicate")):
+        start = text.rfind("\n", 0, at) + 1
+        line = text[start:].split("\n", 1)[0]
+        help = "if there are several, each header has two brackets, as in `[[level]]`"
+        return start, start + len(line), _REPEATED, help if line.startswith("[") else ""
+    if words.startswith("Illegal") and char == "\n":
+        help = "text of several lines stands between three quotes"
+        return at, at, "the string is not closed on its line", help
     if re.match("Unescaped|Escaped|Invalid hex", words):
         start = text.rindex("\\", 0, at)
         help = double_backslash(nodes.tex_word(text, start + 1))
@@ -266,19 +239,6 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
     word = _WORD.match(text, at)
     end, name = (at, "the end of the line") if word is None else (word.end(), f"`{word[0]}`")
     return at, end, f"{words[:1].lower()}{words[1:]}, found {name}", help
-
-
-def _innermost_opening(text: str, at: int) -> int | None:
-    """The offset of the innermost bracket open at `at`, or of a quote that is never closed."""
-    openings: list[int] = []
-    for token in _TOKEN.finditer(text):
-        if token.start() >= at:
-            break
-        if token[0] in ("[", "{", '"', "'"):
-            openings.append(token.start())
-        elif token[0] in ("]", "}") and openings:
-            openings.pop()
-    return openings[-1] if openings else None
 
 
 def _wrong_value(text: str, start: int) -> _Mistake:

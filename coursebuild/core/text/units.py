@@ -61,7 +61,6 @@ COMMON = tuple(
     """.split()
 )
 """Those that are proposed for what is no unit."""
-_PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
 _WORD = r"(?:°[ \u00a0\u202f]?[CF](?![^\W\d_])|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰′″])"
@@ -379,12 +378,8 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
         word = match[0]
         if find_symbol(word) or word in (*UNITS, *NAMES, *PER):
             continue
-        units = (unit for unit in COMMON if unit.casefold() == word.casefold())
-        pairs = ((first, word.removeprefix(first)) for first in _PRODUCT_UNITS)
-        products = (f"{a} {b}" for a, b in pairs if b != word and b in _PRODUCT_UNITS)
-        likely = next(units, None) or next(products, None) or nearest(word, (*COMMON, *NAMES))
         help = "leave it out, and name in words what is counted"
-        if likely is not None:
+        if (likely := nearest(word, (*COMMON, *NAMES))) is not None:
             likely = NAMES.get(likely, likely)
             help = Fix(f"did you mean `{likely}`?", likely)
         message = f"there is no unit `{word}`"

@@ -50,10 +50,11 @@ def test_scripts_become_files() -> None:
 
 
 def test_paths_that_clash() -> None:
-    for first, second, message in (
-        ("é.py", "e\u0301.py", "`{two}` and `{one}` are one file where case does not count"),
-        ("a.py", "a.py/b.py", "one of `{two}` and `{one}` would be a folder of the other"),
-        ("a.py/c/b.py", "A.py", "one of `{two}` and `{one}` would be a folder of the other"),
+    message = "`{two}` and `{one}` cannot both be written everywhere"
+    for first, second in (
+        ("é.py", "e\u0301.py"),
+        ("a.py", "a.py/b.py"),
+        ("a.py/c/b.py", "A.py"),
     ):
         first, second = f"examples/{first}", f"examples/{second}"
         extraction = extract(course_of(block(first) + block(second)))
