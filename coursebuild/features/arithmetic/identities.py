@@ -154,7 +154,17 @@ def _try_identity(
             if not domain.contains(values):
                 continue
             if key not in agreements:
-                _compare_at(left, right, values)
+                lhs, rhs = (evaluate(side, values) for side in (left, right))
+                if conflict := find_conflict(lhs, rhs):
+                    raise WrongDimensions(conflict, right.start, right.end)
+                difference = lhs.value - rhs.value
+                if difference.sign():
+                    texts = ", ".join(f"{name} = {x.value:.6g}" for name, x in values.items())
+                    numbers = " and ".join(_format_apart(lhs.value, rhs.value))
+                    reason = f"the sides are {numbers} where {texts}"
+                    raise _Refuted(reason, right.start, right.end)
+                if not difference.is_negligible(lhs.value, rhs.value):
+                    raise right.not_understood(UNDECIDED)
                 agreements.add(key)
             count += 1
         except NotUnderstood as error:
@@ -169,26 +179,6 @@ def _try_identity(
         reason = f"it can be tried at {count} points only: elsewhere {skip.reason}"
         raise NotUnderstood(reason, skip.start, skip.end)
     raise skip
-
-
-def _compare_at(
-    left: Expression, right: Expression, values: Mapping[str, PhysicalQuantity]
-) -> None:
-    """Compare two sides at a point.
-
-    Raises:
-        NotUnderstood: they differ, or one is not known, or not closely enough to agree.
-    """
-    lhs, rhs = (evaluate(side, values) for side in (left, right))
-    if conflict := find_conflict(lhs, rhs):
-        raise WrongDimensions(conflict, right.start, right.end)
-    difference = lhs.value - rhs.value
-    if difference.sign():
-        points = ", ".join(f"{name} = {x.value:.6g}" for name, x in values.items())
-        sides = " and ".join(_format_apart(lhs.value, rhs.value))
-        raise _Refuted(f"the sides are {sides} where {points}", right.start, right.end)
-    if not difference.is_negligible(lhs.value, rhs.value):
-        raise right.not_understood(UNDECIDED)
 
 
 def _format_apart(left: Real, right: Real) -> tuple[str, str]:
