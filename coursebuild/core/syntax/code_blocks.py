@@ -30,6 +30,7 @@ from coursebuild.core.syntax.fence import (
     TextParser,
     Word,
     split_words,
+    with_line_end,
 )
 from coursebuild.core.syntax.other_tools import check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
@@ -140,7 +141,7 @@ def _build_part(
     show = _read_show(keys, diagnostics)
     if not _check_path(fence, file, diagnostics):
         return None
-    path, place, code = file.value or "", file.value_span, _code_of(fence)
+    path, place, code = file.value or "", file.value_span, with_line_end(fence.body)
     return ScriptPart(fence.span, path, place, code, fence.prefix, fence.body_span, show)
 
 
@@ -165,13 +166,6 @@ def _read_show(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Show:
         assert place is not None
         diagnostics.append(diagnose("fence-key-value", place, message))
     return shows[0] if shows else "open"
-
-
-def _code_of(fence: Fence) -> Excerpt:
-    body = fence.body
-    if body.text.endswith("\n"):
-        return body
-    return Excerpt(body.source, body.text + "\n", body.pieces)
 
 
 def _build_script(
@@ -204,7 +198,7 @@ def _build_script(
         fence.span,
         file.value or "",
         file.value_span,
-        _code_of(fence),
+        with_line_end(fence.body),
         fence.prefix,
         timeout,
         tuple(dict.fromkeys(requires)),

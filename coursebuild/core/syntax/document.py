@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 
 from msgspec.structs import replace
 
@@ -64,20 +64,41 @@ def parse_document(
     anchor = "" if title is None else slug(title.text)
     is_free = not state.anchors.has(anchor)
     document = model.Document(source, blocks, state.notes.finish(), anchor if is_free else "")
-    unclaimed = tuple(_unclaimed_blocks(document, state.diagnostics))
+    # Quizzes show what is wrong as well, and what has a mistake in its first line is mended first.
+    mistakes, in_features = (
+        {d.span.line for d in state.diagnostics if d.is_error},
+        feature_block_ids(document),
+    )
+    all_blocks = tuple(model.document_blocks(document))
+    scripts = (at for at, block in enumerate(all_blocks) if isinstance(block, model.Script))
+    unclaimed = tuple(
+        block
+        for block in all_blocks[next(scripts, len(all_blocks)) :]
+        if isinstance(block, model.CodeBlock)
+        and block.language in _TEXTS
+        and ILLUSTRATION not in block.info.split()
+        and id(block) not in in_features
+        and block.span.line not in mistakes
+    )
     document = replace(document, unclaimed=unclaimed, comma=state.has_decimal_comma)
     conflict = find_conflict(source)
     if conflict is not None:  # the rest follows from it
         return Parsed(document, (conflict,))
     state.diagnostics += (*_check_placement(document), *_check_ids(document))
-    state.diagnostics += _check_scripts(document, state.diagnostics)
+    places = [d.span for d in state.diagnostics if d.rule == "python-syntax"]
+    for script in model.document_scripts(document):  # that their parts parse is known
+        parts = script.parts
+        if parts and not any(part.span.contains(span) for part in parts for span in places):
+            state.diagnostics += check_syntax(script.code)
+        if script.is_python and not (script.figures or script.norun):
+            state.diagnostics += find_windows(script.code)
     if (at := source.text.find("\0")) >= 0:
         message = "the text contains a NUL character"
         places = [match.start() for match in re.finditer("\0", source.text)]
         edits = tuple(Edit(source.span(place, place + 1), "") for place in places)
         help = Fix("delete it; readers would see `\ufffd`", edits=edits, safe=True)
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
-    for block in model.document_blocks(document):  # readers would see it otherwise than it runs
+    for block in all_blocks:  # readers would see it otherwise than it runs
         match block:
             case model.Recording():
                 state.diagnostics += find_reordering(block.body_span, is_code=True)
@@ -100,19 +121,6 @@ def read_again(course: model.Course, owner: model.Owner, summary: model.Document
     ).value
 
 
-def _check_scripts(
-    document: model.Document, diagnostics: Sequence[Diagnostic]
-) -> Iterator[Diagnostic]:
-    """Report what is wrong with scripts as a whole; that their parts parse is known."""
-    for script in model.document_scripts(document):
-        parts = script.parts
-        mistakes = [d for d in diagnostics if d.rule == "python-syntax"]
-        if parts and not any(p.span.contains(d.span) for p in parts for d in mistakes):
-            yield from check_syntax(script.code)
-        if script.is_python and not (script.figures or script.norun):
-            yield from find_windows(script.code)
-
-
 def find_reordering(place: Span, *, is_code: bool) -> Iterator[Diagnostic]:
     """Report the first character of a text by which a browser shows others in another order."""
     if character := (ISOLATING if is_code else REORDERING).search(place.text):
@@ -130,27 +138,6 @@ _TEXTS = frozenset(
     """.split()
 ) | {""}
 """Kinds of code blocks that may show an output."""
-
-
-def _unclaimed_blocks(
-    document: model.Document, diagnostics: Iterable[Diagnostic]
-) -> Iterator[model.CodeBlock]:
-    """The texts below a script of which nothing says what they are.
-
-    Quizzes show what is wrong as well, and of a block with a mistake in its first line that is
-    to be mended first.
-    """
-    in_features = feature_block_ids(document)
-    mistakes = {d.span.line for d in diagnostics if d.is_error}
-    has_script = False
-    for block in model.document_blocks(document):
-        if isinstance(block, model.Script):
-            has_script = True
-        if not (has_script and isinstance(block, model.CodeBlock)):
-            continue
-        is_free = id(block) not in in_features and block.span.line not in mistakes
-        if is_free and block.language in _TEXTS and ILLUSTRATION not in block.info.split():
-            yield block
 
 
 _FORMULAS = (model.Math, model.MathBlock)

@@ -220,8 +220,8 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     is_closed, body = token.meta["closed"], token.text
     if body is NO_TEXT:
         body = base.slice(info_end + 1, info_end + 1)
-    elif not body.text.endswith("\n"):
-        body = Excerpt(base.source, body.text + "\n", body.pieces)
+    else:
+        body = with_line_end(body)
     span = base.span(token.start, token.end)
     head = base.span(token.start, info_start + len(token.info.rstrip()))
     body_span, prefix = body.span(), ""
@@ -236,6 +236,11 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
         if (match := re.search(opening, body.text, re.MULTILINE)) is not None:
             inner = body.span(*match.span(1))
     return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner, label)
+
+
+def with_line_end(text: Excerpt) -> Excerpt:
+    """A text that ends with a line end, which stands for the end of its last line."""
+    return text if text.text.endswith("\n") else replace(text, text=text.text + "\n")
 
 
 def line_prefix(place: Span) -> str:
