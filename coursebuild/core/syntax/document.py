@@ -85,10 +85,10 @@ def parse_document(
     if conflict is not None:  # the rest follows from it
         return Parsed(document, (conflict,))
     state.diagnostics += (*_check_placement(document), *_check_ids(document))
-    places = [d.span for d in state.diagnostics if d.rule == "python-syntax"]
+    syntax_errors = [d.span for d in state.diagnostics if d.rule == "python-syntax"]
     for script in model.document_scripts(document):  # that their parts parse is known
         parts = script.parts
-        if parts and not any(part.span.contains(span) for part in parts for span in places):
+        if parts and not any(part.span.contains(span) for part in parts for span in syntax_errors):
             state.diagnostics += check_syntax(script.code)
         if script.is_python and not (script.figures or script.norun):
             state.diagnostics += find_windows(script.code)
