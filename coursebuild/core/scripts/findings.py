@@ -33,9 +33,8 @@ from coursebuild.core.scripts.lines import ELLIPSIS, Side
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.table_cells import HEADER_HELP, ROW_HELP, cell_text, table_rows
 from coursebuild.core.scripts.tables import TableMatcher
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.numbers import only_number, scan, within_tolerance
-from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 _MAX_NOTES = 3
@@ -190,13 +189,8 @@ def _find_unmarked(
                 continue
             message = f"this is what `{script.path}` printed, and nothing compares the two"
             help = "an output is of kind `output`; if it is none, write `text illustration`"
-            if (head := _FENCE_HEAD.match(block.span.text)) is not None:
-                help = Fix(help, f"{head[1]}output", head[0])
             yield diagnose("output-unmarked", block.span.first_line(), message, help=help)
             break
-
-
-_FENCE_HEAD = regex(r"(`{3,}|~{3,})[ \t]*[^\s`]*")
 
 
 def find_instability(

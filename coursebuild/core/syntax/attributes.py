@@ -20,7 +20,6 @@ from coursebuild.core.model import (
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Edit,
     Fix,
     Note,
     Parsed,
@@ -39,10 +38,7 @@ LABEL = regex(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 missing."""
 _GIVEN = regex(r'(?:^|(?<=\s))\{given="([^{}"]*\S[^{}"]*)"\}$')
 _LAST_LABEL = regex(r"(?:^|(?<=\s))\{#[^{}$\n]{0,200}\}?$")
-_PAIR = regex(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
-_MISQUOTED = regex(
-    r"""[^\s={}"]+=([“”„‟‘’‚‛«»'`])[^{}"“”„‟‘’‚‛«»'`\n]*([“”„‟‘’‚‛«»'`])(?=[\s}]|$)"""
-)
+_PAIR = regex(r"""\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}“”„‟‘’‚‛«»'`]+)))?(?=\s|$)""")
 _SPACES = regex(r"\s+")
 _NUMBER = regex(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
 _RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?!\{{?[,\d])((?s:.*))\Z")
@@ -67,17 +63,6 @@ def collapse_spaces(text: str) -> str:
     return _SPACES.sub(" ", text).strip()
 
 
-def check_quotes(text: Excerpt, start: int, rule: str) -> tuple[Diagnostic, int] | None:
-    """The diagnostic of a value in other quotes than `"`, and where it ends; `None` without."""
-    match = _MISQUOTED.match(text.text, start)
-    if match is None:
-        return None
-    places = [text.span(*match.span(group)) for group in (1, 2)]
-    help = Fix('write `"`', edits=tuple(Edit(place, '"') for place in places), safe=True)
-    message = f"`{match[1]}` does not quote a value"
-    return diagnose(rule, places[0], message, help=help), match.end()
-
-
 def read_pairs(
     braces: Excerpt, keys: tuple[str, ...], rule: str, help: str
 ) -> dict[str, Excerpt | None] | Diagnostic:
@@ -94,8 +79,6 @@ def read_pairs(
             message = f"`{collapse_spaces(rest.text)}` cannot be read"
             return diagnose(rule, rest.span(), message, help=help)
         key, span = pair[1], braces.span(*pair.span(1))
-        if misquoted := check_quotes(braces, pair.start(1), rule):
-            return misquoted[0]
         if key not in keys:
             suggestion = (did_you_mean(key, keys) if len(keys) > 1 else "") or help
             return diagnose(rule, span, f"`{key}` is not a known key here", help=suggestion)

@@ -16,7 +16,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Block, CodeBlock, Inline, NumberBinding
-from coursebuild.core.syntax.attributes import check_quotes, split_label
+from coursebuild.core.syntax.attributes import split_label
 from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
@@ -31,7 +31,7 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
-_WORD = regex(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
+_WORD = regex(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"“”„‟‘’‚‛«»'`]*)))?""")
 _KIND = regex(r"\s*(\S*)")
 _NOT_SPACE = regex(r"\S")
 _REST = regex(r"\S*")
@@ -112,10 +112,7 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
         match = _WORD.match(text, at)
         assert match is not None
         end = match.end()
-        if misquoted := check_quotes(info, at, "fence-info"):
-            diagnostic, end = misquoted
-            diagnostics.append(diagnostic)
-        elif end < len(text) and not text[end].isspace():
+        if end < len(text) and not text[end].isspace():
             rest = _REST.match(text, end)
             end = rest.end() if rest else end
             message = f"`{text[at:end]}` cannot be read"
