@@ -21,7 +21,6 @@ from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Edit,
     Fix,
     Note,
     Parsed,
@@ -56,14 +55,6 @@ class Word(Struct, frozen=True):
     def value_span(self) -> Span:
         """Where the value stands; the word itself when it has none."""
         return self.span if self.value_text is None else self.value_text.span()
-
-    @property
-    def removal(self) -> tuple[Edit]:
-        """The edit that takes the word away, with the blanks before it."""
-        source, start = self.span.source, self.span.start
-        while source.text[start - 1] in " \t":
-            start -= 1
-        return (Edit(source.span(start, self.span.end), ""),)
 
     def parts(self) -> list[Excerpt]:
         """The parts of a value between its commas, without white space at their ends."""
@@ -185,8 +176,7 @@ class Fence(Struct, frozen=True):
                 diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
             elif key in words_by_key:
                 notes = [Note("first given here", words_by_key[key].key_span)]
-                message, is_same = f"`{key}` is given twice", words_by_key[key].value == word.value
-                help = Fix("delete one of them", edits=word.removal if is_same else (), safe=True)
+                message, help = f"`{key}` is given twice", "delete one of them"
                 diagnostics.append(
                     diagnose("fence-key-repeated", word.key_span, message, help=help, notes=notes)
                 )

@@ -16,7 +16,7 @@ from coursebuild.core.model.course import Words
 from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
 from coursebuild.core.syntax.other_tools import is_known_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.patterns import pattern_mistake, replacements
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
@@ -94,7 +94,6 @@ def record_fence(
     if mark is not None:
         message = "a recorded output is not an illustration"
         help = f"leave `{ILLUSTRATION}` out, or write `text {ILLUSTRATION}` without a caption"
-        help = Fix(help, edits=mark.removal)
         diagnostics.append(diagnose("recording-keys", mark.span, message, help=help))
     own_words = tuple(word for word in keys.value.words if word is not mark)
     comparison = _read_comparison(FenceKeys(None, own_words), diagnostics)

@@ -76,7 +76,7 @@ _TOKEN = (
 """Compiled when it is needed, as few pages do: it takes longer than the table."""
 _TWO_UNITS = (
     rf"(?<![^\W\d_])(?:m(?=[^\W\d_m]{_POWER})"
-    rf"|(?:kg|[kMGmµμunp]?(?:Pa|[NWVAJ]))(?=(?:[mc]?m|s|h|K|A)(?![^\W\d_])))"
+    rf"|(?:kg|[kMGmµμunp]?(?:Pa|[NWVAJ]))(?=(?:[mc]?m|s|h|K|A)(?![^\W\d_²³⁻¹⁴-⁹])))"
     rf"|(?<=[^\W\d_]){_POWER}(?=[^\W\d_])"
 )
 """After what a space may be missing: `ms⁻¹`, `kgm²`, `mPas`, `W/m2K`."""
@@ -369,6 +369,8 @@ def is_name(word: str) -> bool:
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
     """Yield what is wrong with a unit, which may be empty."""
     text = _with_signs(" ".join(unit.text.split()))
+    if find_units(text):
+        return
     if len(text) > _LONGEST or not _parse(text or "1", find=lambda word: (ONE,)):
         message = f"`{text}` cannot be read as a unit"
         help = "write it as in `kg m^2`, `m/s²` or `N m/rad`"
