@@ -7,9 +7,8 @@ from collections.abc import Iterable
 
 from msgspec import Struct
 
-from coursebuild.core.model.results import Change, DriftKind
-from coursebuild.core.scripts.diff import shorten
-from coursebuild.core.scripts.findings import closeness
+from coursebuild.core.model.results import Change
+from coursebuild.core.scripts.findings import describe_difference
 from coursebuild.core.text.characters import printable, printable_lines
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.report.text import BOLD, FAINT, GREEN, RED, YELLOW, Style, location
@@ -27,7 +26,6 @@ _STATUSES = {
 _COLOURS = {"same": GREEN, "changed": RED, "fails": RED}
 _MOST_CHANGES = 20
 """Differences of one script that are listed."""
-_WIDTH = 60
 
 
 class ScriptComparison(Struct, frozen=True):
@@ -148,21 +146,7 @@ def _script(script: ScriptComparison, version: str, style: Style) -> list[str]:
         lines.append(printable(f"  {span.path}:{span.line}: {message}{label}"))
     changes = sorted(script.changes, key=lambda change: (change.span.path, change.span.start))
     for change in changes[:_MOST_CHANGES]:
-        first_lines = (text.strip().split("\n")[0] for text in (change.recorded, change.printed))
-        recorded, printed = (shorten(line, _WIDTH) for line in first_lines)
-        match change.kind:
-            case DriftKind.ROUNDING | DriftKind.NUMERIC:
-                distance = closeness(change)
-                text = f"recorded {recorded}; {engine} printed {printed}"
-                text += f" ({distance})" if distance else ""
-            case DriftKind.TEXT:
-                text = f"recorded `{recorded}`; {engine} printed `{printed}`"
-            case DriftKind.MISSING:
-                count = plural(change.recorded.count("\n") + 1, "line")
-                text = f"{engine} did not print {count} from `{recorded}` on"
-            case DriftKind.EXTRA:
-                count = plural(change.printed.count("\n") + 1, "more line")
-                text = f"{engine} printed {count} here: `{printed}`"
+        text = describe_difference(change, engine)
         lines.append(printable(f"  {location(change.span)}: {text}"))
     if len(changes) > _MOST_CHANGES:
         lines.append(f"  and {plural(len(changes) - _MOST_CHANGES, 'more difference')}")

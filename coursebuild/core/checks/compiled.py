@@ -5,7 +5,6 @@ A file that only other models include need not compile by itself.
 
 from __future__ import annotations
 
-import contextlib
 import math
 import re
 import textwrap
@@ -29,12 +28,9 @@ from coursebuild.core.model.scenarios import DURATION, MOST_STEPS, DeclaredSweep
 from coursebuild.core.registry import features, kind_of_block
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Edit,
-    Fix,
     Note,
     diagnose,
     did_you_mean,
-    propose,
 )
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.regex import regex
@@ -129,12 +125,12 @@ def check_compiled(
     for model in course.models:
         result = models[model.name]
         if result.error and model.name not in included:
-            diagnostics.append(diagnose_model(model, result, readable, course.models))
+            diagnostics.append(diagnose_model(model, result, readable))
         elif not result.error:
             diagnostics += _find_fault(_text_of(model))
     facts: dict[tuple[str, int], ModelFacts] = {}
     for text, result in texts:
-        diagnostics += _check_text(text, result, readable, course.models)
+        diagnostics += _check_text(text, result, readable)
         if result.facts is not None:
             facts[text.place.path, text.place.start] = result.facts
 
@@ -155,19 +151,10 @@ def check_compiled(
 
 
 def diagnose_model(
-    model: MjcfModel,
-    result: CompileResult,
-    readable: Callable[[str], str],
-    models: Sequence[MjcfModel] = (),
+    model: MjcfModel, result: CompileResult, readable: Callable[[str], str]
 ) -> Diagnostic:
-    """The diagnostic of a model that does not compile; `models` may be included by it."""
-    text, help = model.source.text, ""
-    closing = "</mujoco>\n" if text.endswith("\n") else "\n</mujoco>\n"
-    with contextlib.suppress(expat.ExpatError):  # as where it has one already
-        expat.ParserCreate().Parse(f"{text}{closing}".encode(), True)
-        edit = Edit(model.source.span(len(text)), closing)
-        help = Fix("end it with `</mujoco>`", edits=(edit,), safe=True)
-    return _diagnose_failure(_text_of(model), result, readable, models, help)
+    """The diagnostic of a model that does not compile."""
+    return _diagnose_failure(_text_of(model), result, readable)
 
 
 def _text_of(model: MjcfModel) -> MjcfText:
@@ -175,11 +162,7 @@ def _text_of(model: MjcfModel) -> MjcfText:
 
 
 def _diagnose_failure(
-    text: MjcfText,
-    result: CompileResult,
-    readable: Callable[[str], str],
-    models: Sequence[MjcfModel],
-    help: str,
+    text: MjcfText, result: CompileResult, readable: Callable[[str], str], help: str = ""
 ) -> Diagnostic:
     if result.timeout:
         help = "make it smaller, or set `models` in `[limits]` of the map: seconds for all models"
@@ -189,30 +172,8 @@ def _diagnose_failure(
     notes = []
     if opening is not None:
         notes = [Note(f"<{opening[2]}> begins here", text.line_span(int(opening[1])))]
-    place, help = _propose_name(result, text, models) or (text.line_span(result.line), help)
-    return text.diagnose(f"does not compile: {readable(result.error)}", place, help, notes)
-
-
-def _propose_name(
-    result: CompileResult, text: MjcfText, models: Sequence[MjcfModel]
-) -> tuple[Span, Fix] | None:
-    """Where a name is misspelt that the compiler does not know, also in another model, and how."""
-    if (misspelling := result.misspelling) is None:
-        return None
-    code, offset = text.code, text.text.index("\n") + 1 if text.lines_before else 0
-    if misspelling.path:
-        sources = (m.source for m in models if m.source.path == misspelling.path)
-        code, offset = next((Excerpt.of_span(s.span()) for s in sources), code), 0
-    word, likely = misspelling.word, misspelling.candidates[0]
-    parts = [code.slice(a - offset, b - offset) for a, b in misspelling.places if a >= offset]
-    if len(parts) < len(misspelling.places) or any(part.text != word for part in parts):
-        return None
-    place, *copies = (part.span() for part in parts)
-    fix = propose(word, likely)
-    if fix.new is not None:
-        edits = tuple(Edit(span, likely) for span in copies)
-        fix = Fix(fix, fix.new, fix.old, edits=edits)
-    return place, fix
+    message = f"does not compile: {readable(result.error)}"
+    return text.diagnose(message, text.line_span(result.line), help, notes)
 
 
 def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagnostic:
@@ -254,14 +215,8 @@ def _find_fault(text: MjcfText) -> Iterator[Diagnostic]:
         yield text.diagnose(f"holds {fault}", place, help)
 
 
-_TEMPLATE = regex(r"\{\{|\{%|\$\{|\$\((?:arg|find)\b|\bxacro:")
-
-
 def _check_text(
-    text: MjcfText,
-    result: CompileResult,
-    readable: Callable[[str], str],
-    models: Sequence[MjcfModel],
+    text: MjcfText, result: CompileResult, readable: Callable[[str], str]
 ) -> Iterator[Diagnostic]:
     block, help = text.block, ""
     if isinstance(block, Mjcf) and block.error is not None and not result.timeout:
@@ -279,10 +234,7 @@ def _check_text(
     elif result.error:
         if isinstance(block, Mjcf) and block.fragment is None and "<mujoco" not in text.text:
             help = 'if it is a part of a model say so: `fragment="worldbody"`'
-        if _TEMPLATE.search(text.text):
-            help = "what Jinja or xacro fills in first is no model yet: show it as a block of "
-            help += "kind `xml`, and name a file otherwise, as `arm.xml.j2`"
-        yield _diagnose_failure(text, result, readable, models, help)
+        yield _diagnose_failure(text, result, readable, help)
     else:
         yield from _find_fault(text)
 

@@ -14,11 +14,9 @@ from coursebuild.core import model
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Fix,
     Note,
     diagnose,
     did_you_mean,
-    propose,
 )
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.regex import regex
@@ -219,22 +217,18 @@ class _Checker(Struct, frozen=True):
             yield from _check_document_anchor(span, parts.fragment, self.document, "this page")
 
     def check_file(self, url: str, span: Span) -> Iterator[Diagnostic]:
+        files = self.targets.files
         path = model.local_file(url, self.document.source.path)
-        if path not in self.targets.files:
-            help = self.suggest_file(path, url.partition("#")[0])
-            yield diagnose("link-file", span, f"no file `{path}`", help=help)
-
-    def suggest_file(self, path: str, address: str) -> str:
-        targets, name = self.targets, posixpath.basename(path)
+        if path in files:
+            return
+        help, name = "files that pages may use lie in content/", posixpath.basename(path)
+        names = {posixpath.basename(file): file for file in files if not file.endswith(".md")}
+        likely = name if name in names else nearest(name, names)
         if name.endswith(".md"):
-            return "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
-        files = {posixpath.basename(f): f for f in targets.files if not f.endswith(".md")}
-        likely = name if name in files else nearest(name, files)
-        if likely is None:
-            return "files that pages may use lie in content/"
-        new = posixpath.relpath(files[likely], posixpath.dirname(self.document.source.path))
-        fix = propose(name, likely)
-        return Fix(f"did you mean `{files[likely]}`?", fix.new and new, address)
+            help = "link to a lesson by its id (`lesson:4.3`) and to a page by `page:about`"
+        elif likely is not None:
+            help = f"did you mean `{names[likely]}`?"
+        yield diagnose("link-file", span, f"no file `{path}`", help=help)
 
     def check_media(self, subject: str, url: str, span: Span) -> Iterator[Diagnostic]:
         parts = urlsplit_or_none(url)

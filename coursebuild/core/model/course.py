@@ -60,9 +60,6 @@ class Words(Struct, frozen=True):
 
 ENGLISH = Words()
 
-MJCF_KEYWORDS = frozenset("true false auto enable disable degree radian local global".split())
-"""Keywords of MJCF that have no name in MuJoCo's enumerations."""
-
 
 # --- the course
 

@@ -248,18 +248,6 @@ Mathml: TypeAlias = Callable[[str, bool], str]
 """Typesets a formula, given whether on a line of its own; empty for one with an error."""
 
 
-class Misspelling(Struct, frozen=True):
-    """A name in MJCF that its compiler does not know."""
-
-    path: str
-    """The file where it stands, if that is not the text that was compiled."""
-    places: tuple[tuple[int, int], ...]
-    """Where it stands, start and end; what is wrong first, such as a tag before its end tag."""
-    word: str
-    candidates: tuple[str, ...]
-    """The likely names with which the compiler gets further, the likeliest first."""
-
-
 class CompileResult(Struct, frozen=True):
     """The result of compiling a piece of MJCF; `error` is empty if it compiled."""
 
@@ -269,8 +257,6 @@ class CompileResult(Struct, frozen=True):
     facts: ModelFacts | None = None
     timeout: bool = False
     """Whether there was no time to compile it, which `error` says as the end of a sentence."""
-    misspelling: Misspelling | None = None
-    """What `error` is about, if it is known what may have been meant."""
     includes: tuple[str, ...] = ()
     """Files that a text with an error includes, as `ModelFacts` has those of a right one."""
 

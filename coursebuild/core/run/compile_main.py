@@ -4,8 +4,7 @@ It is run as a file in a temporary folder, where MuJoCo may leave its log. The p
 lines, after `ready`. A request is the path where the model stands, or would (includes and assets
 are relative to it), texts by their paths, which hide files that are there, and seconds of processor
 time, after which SIGPROF ends this process. The reply is a message, empty where it compiles, the
-facts of `results.ModelFacts`, and the seconds taken. A request for no model is answered by what
-MuJoCo says of names in MJCF.
+facts of `results.ModelFacts`, and the seconds taken.
 """
 
 from __future__ import annotations
@@ -33,13 +32,6 @@ def main() -> None:
     print("ready", file=replies, flush=True)
     for line in sys.stdin:
         path, texts, seconds = json.loads(line)
-        if path is None:
-            enums = (enum for name, enum in vars(mujoco).items() if name.startswith("mjt"))
-            members = [name for enum in enums for name in getattr(enum, "__members__", ())]
-            keywords = sorted({name.partition("_")[2] for name in members} - {""})
-            schema = mujoco.mj_printSchema(False, False)
-            print(json.dumps((schema, keywords)), file=replies, flush=True)
-            continue
         start = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, seconds)
         reply = _compile(mujoco, path, texts)

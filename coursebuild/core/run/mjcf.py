@@ -8,37 +8,30 @@
 4. A result, also an error, is kept under a hash of the text, its place, and the state of every
    other file that MuJoCo looks for (`model_key`). If one of these changed meanwhile, or time was
    up, nothing is kept.
-5. Where a message is about a name, the model is compiled with similar names in its place: those of
-   the schema, keywords, names of the model. What gets further may have been meant.
 """
 
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import re
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import TypeAlias
+from typing import NamedTuple
 from xml.parsers import expat
 
 import msgspec
-from msgspec import Struct
-from msgspec.structs import replace
 
 from coursebuild.core.engine.digests import SPECIAL, file_state
 from coursebuild.core.engine.store import Store
 from coursebuild.core.model import Limits
-from coursebuild.core.model.course import MJCF_KEYWORDS
-from coursebuild.core.model.results import CompileResult, Misspelling, ModelFacts
+from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.run import mujoco_files
 from coursebuild.core.run.child import LIMITS, JsonChild
 from coursebuild.core.run.mujoco_files import ATTRIBUTE, MARKUP, ModelFiles
 from coursebuild.core.run.script_environment import engine_version
-from coursebuild.core.text.near import near
 from coursebuild.core.values import fingerprint
 
 _ONE = 0.5
@@ -123,36 +116,31 @@ class _Compiler(JsonChild):
 
     def compile(self, path: str, text: str) -> CompileResult:
         is_shared = self._process is not None
-        result = self._try(path, {path: text})
+        result = self._try(path, text)
         if is_shared and result.error.startswith(OWN_FAULT) and not result.timeout:
-            result = self._try(path, {path: text})  # alone: MuJoCo keeps meshes of other models
-        if not result.error or result.timeout or result.error.startswith(OWN_FAULT):
-            return result
-        return replace(result, misspelling=self._find_misspelling(path, text, result))
+            result = self._try(path, text)  # alone: MuJoCo keeps meshes of other models
+        return result
 
-    def _try(self, path: str, texts: Mapping[str, str]) -> CompileResult:
-        """Compile the model at a path, with these texts in place of files."""
-        text = texts[path]
-        for name, content in texts.items():
-            if file := _outer_file(self.root, name, content):
-                # Its content, or that it exists, is nothing for those who wrote the course.
-                lines = (
-                    tag.line
-                    for tag in read_tags(text)
-                    for _, _, value, _ in tag.attributes
-                    if value and Path(value).name == Path(file).name
-                )
-                return CompileResult(f"'{file}' leads out of the course", next(lines, None))
-        files = {f for name in texts for f in model_files(self.root, name, texts[name])}
-        for file in sorted(files):
+    def _try(self, path: str, text: str) -> CompileResult:
+        """Compile a text as the model at a path."""
+        if file := _outer_file(self.root, path, text):
+            # Its content, or that it exists, is nothing for those who wrote the course.
+            lines = (
+                tag.line
+                for tag in read_tags(text)
+                for _, value, _ in tag.attributes
+                if value and Path(value).name == Path(file).name
+            )
+            return CompileResult(f"'{file}' leads out of the course", next(lines, None))
+        for file in model_files(self.root, path, text):
             if file_state(str(self.root / file)) == SPECIAL:  # to read it may take for ever
                 return CompileResult(f"'{file}' is a device or a pipe")
         limit = min(_ONE * self.seconds, self.left)
         if limit < _LEAST:
             return self._no_time_left()
         start = time.monotonic()
-        full_texts = {str(self.root / file): content for file, content in texts.items()}
-        reply = self.ask((str(self.root / path), full_texts, limit), limit)
+        full_path = str(self.root / path)
+        reply = self.ask((full_path, {full_path: text}, limit), limit)
         if reply is None:
             death = self.death()
             if not self.timed_out:
@@ -185,44 +173,6 @@ class _Compiler(JsonChild):
     def _no_time_left(self) -> CompileResult:
         message = f"was not compiled: others took the {self.seconds:g} s that all may take"
         return CompileResult(message, timeout=True)
-
-    def _find_misspelling(self, path: str, text: str, result: CompileResult) -> Misspelling | None:
-        texts = {path: text}
-        if result.line is None or _PARSER.search(result.error):
-            for file in existing_files(self.root, path, text):
-                is_near = file.endswith(".xml") and not Path(file).is_absolute()
-                if is_near and (self.root / file).stat().st_size <= mujoco_files.LONGEST:
-                    texts[file] = (self.root / file).read_bytes().decode("utf-8", "replace")
-        schema, keywords = self._vocabulary
-        names = {name for content in texts.values() for name in _NAMES.findall(content)}
-        for file, content in texts.items():
-            for places, known_names in _suspects(result, content, schema, (*names, *keywords)):
-                word = content[slice(*places[0])]
-                likely = near(word, known_names)[:_TRIED]
-                passing, changing = list[str](), list[str]()
-                for candidate in likely:
-                    new_text = content
-                    for start, end in sorted(places, reverse=True):
-                        new_text = new_text[:start] + candidate + new_text[end:]
-                    trial = self._try(path, {**texts, file: new_text})
-                    if trial.timeout or trial.error.startswith(OWN_FAULT):
-                        break
-                    if trial.error.replace(f"'{candidate}'", f"'{word}'") != result.error:
-                        is_further = not trial.error or trial.line != result.line
-                        (passing if is_further else changing).append(candidate)
-                if candidates := tuple(passing or changing):
-                    return Misspelling("" if file == path else file, places, word, candidates)
-        return None
-
-    @functools.cached_property
-    def _vocabulary(self) -> tuple[dict[str, dict[str, list[str]]], frozenset[str]]:
-        answer = self.ask((None, {}, 0.0))
-        if answer is None:
-            self.death()
-            return {}, frozenset()
-        schema, words = answer
-        forms = {form for w in words for form in (w.lower(), w.capitalize(), w.upper())}
-        return read_schema(schema), frozenset((*forms, *MJCF_KEYWORDS))
 
 
 def model_files(root: Path, path: str, text: str) -> tuple[str, ...]:
@@ -288,30 +238,13 @@ def error_line(message: str, text: str) -> int | None:
 # --- names in MJCF
 
 _SCHEMA_LINE = re.compile(r"( *)(?:\((\w+)\))?(\w+) \(.\) +(.*)|( {20,})(\S.*)")
-_TRIED = 5
-"""The most names that are tried in the place of another one."""
-_NAMES = re.compile(r"""\b(?:name|class)\s*=\s*["']([^"'<>]+)["']""")
-_QUOTED = re.compile("'([^']+)'")
-_SUBJECTS = (
-    ("attribute", re.compile(r"unrecognized attribute: '([^']+)'\s+Element '([^']+)'")),
-    ("missing", re.compile(r"required attribute missing: '([^']+)'\s+Element '([^']+)'")),
-    ("element", re.compile(r"unrecognized (?:model )?element\s[^\n]*\n?Element '([^']+)'")),
-    ("element", re.compile(r"Unrecognized XML model type: '([^']+)'")),
-    ("end", re.compile("MISMATCHED_ELEMENT")),
-)
-"""What messages are about: an attribute, an element, an end tag; others are about a value."""
-
-_Place: TypeAlias = tuple[int, int]
 
 
-class _Tag(Struct):
+class _Tag(NamedTuple):
     name: str
-    place: _Place
     line: int
-    attributes: list[tuple[str, _Place, str, _Place]]
-    """Each with its place, and its value with that one's."""
-    end_name: str = ""
-    end_place: _Place | None = None
+    attributes: list[tuple[str, str, tuple[int, int]]]
+    """Each with its value, and the place of that."""
 
 
 def read_schema(text: str) -> dict[str, dict[str, list[str]]]:
@@ -337,83 +270,19 @@ def read_schema(text: str) -> dict[str, dict[str, list[str]]]:
     return elements
 
 
-def _suspects(
-    result: CompileResult,
-    text: str,
-    schema: Mapping[str, Mapping[str, Sequence[str]]],
-    values: Collection[str],
-) -> Iterator[tuple[tuple[_Place, ...], Collection[str]]]:
-    """The places of a name that a message may be about, and the names that there are.
-
-    `values`: what values of attributes may be.
-    """
-    matches = ((subject, pattern.search(result.error)) for subject, pattern in _SUBJECTS)
-    subject, match = next(((s, m) for s, m in matches if m), ("value", None))
-    word, element = (*(match.groups() if match else ()), "", "")[:2]
-    tags = [t for t in read_tags(text) if subject == "end" or result.line in (None, t.line)]
-    match subject:
-        case "end":
-            for tag in tags:
-                if tag.end_place is not None and tag.end_name != tag.name:
-                    pairs = [((tag.end_place,), [tag.name]), ((tag.place,), [tag.end_name])]
-                    yield from pairs if tag.name in schema else reversed(pairs)
-                    return
-        case "element":
-            named_tags = [tag for tag in tags if tag.name == word]
-            ends = [tag.end_place for tag in named_tags if tag.end_place]
-            if named_tags:
-                yield (*(tag.place for tag in named_tags), *ends), schema
-        case "attribute" | "missing":
-            known_names = {word} if subject == "missing" else set()
-            for names in () if known_names else schema.get(element, {}).values():
-                known_names.update(names)
-            attributes = [a for tag in tags if tag.name == element for a in tag.attributes]
-            for name, place, _, _ in attributes:
-                if name == word:
-                    yield tuple(p for n, p, _, _ in attributes if n == word), known_names
-                    return
-                if subject == "missing":
-                    yield (place,), known_names
-        case _:
-            for value in dict.fromkeys(_QUOTED.findall(_PLACE.sub("", result.error))):
-                places = [
-                    place
-                    for tag in tags
-                    for name, _, text, place in tag.attributes
-                    if text == value and name != "name" and (tag.name, name) != ("default", "class")
-                ]
-                if places:
-                    yield tuple(places), values
-
-
-def read_tags(text: str) -> list[_Tag]:
-    """The tags of a text, each with its end tag, up to the first one that ends another."""
-    tags: list[_Tag] = []
-    open_tags: list[_Tag] = []
+def read_tags(text: str) -> Iterator[_Tag]:
+    """The tags with which elements of a text begin."""
     line, offset = 1, 0
     for match in MARKUP.finditer(text):
         line, offset = line + text.count("\n", offset, match.start()), match.start()
-        if match["name"] is None:
+        if match["name"] is None or match["end"]:
             continue
-        if match["end"]:
-            if not open_tags:
-                break
-            tag = open_tags.pop()
-            tag.end_name, tag.end_place = match["name"], match.span("name")
-            if tag.end_name != tag.name:
-                break
-            continue
-        start = match.start("rest")
-        attributes = [
-            (a[1], (start + a.start(1), start + a.end(1)), a[number], place)
-            for a in ATTRIBUTE.finditer(match["rest"])
-            for number in (2 if a[2] is not None else 3,)
-            for place in ((start + a.start(number), start + a.end(number)),)
-        ]
-        tags.append(_Tag(match["name"], match.span("name"), line, attributes))
-        if not match["rest"].endswith("/"):
-            open_tags.append(tags[-1])
-    return tags
+        start, attributes = match.start("rest"), []
+        for attribute in ATTRIBUTE.finditer(match["rest"]):
+            number = 2 if attribute[2] is not None else 3
+            place = (start + attribute.start(number), start + attribute.end(number))
+            attributes.append((attribute[1], attribute[number], place))
+        yield _Tag(match["name"], line, attributes)
 
 
 # --- messages

@@ -11,7 +11,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Sequence
 from decimal import Context, Decimal
 from itertools import chain, islice
@@ -30,7 +29,6 @@ from coursebuild.core.scripts.bound_numbers import (
 from coursebuild.core.scripts.bound_places import (
     BoundNumber,
     bound_values,
-    mark_edits,
     place_note,
     reworded_addresses,
 )
@@ -75,7 +73,7 @@ def check_bindings(
     for binding, value in bound_values(document, outputs):
         diagnostic, places = _check(BoundNumber(binding, outputs, addresses.get(value, ())))
         if diagnostic is not None:
-            diagnostics.append(_with_likely_script(document, binding, outputs, diagnostic))
+            diagnostics.append(diagnostic)
         at = tuple(address for place in places if (address := place.address) is not None)
         if at and len(at) == len(places):
             addresses[value] = tuple(dict.fromkeys(at))
@@ -84,31 +82,6 @@ def check_bindings(
         places_of_rows = zip(rows, verdict.row_addresses, strict=False)
         addresses |= {value: at for value, at in places_of_rows if at}
     return tuple(diagnostics)
-
-
-def _with_likely_script(
-    document: model.Document,
-    binding: model.NumberBinding,
-    outputs: PrintedOutputs,
-    finding: Diagnostic,
-) -> Diagnostic:
-    """A diagnostic that also says which other output has the number, if one alone does."""
-    is_open = finding.rule == "binding-mismatch" and not finding.help
-    if not is_open or binding.script is not None or binding.words:
-        return finding
-    text = BoundNumber(binding, outputs).text
-    paths = {
-        verdict.recording.script or ""
-        for verdict in outputs.of_document(document)
-        if verdict.recording.span.start < binding.span.start
-        and verdict.comparison.mode is not model.Mode.VOLATILE
-        and text.is_in([outputs.text(verdict)])
-    }
-    if len(paths) != 1:
-        return finding
-    mark = binding.mark(paths.pop())
-    help = f"an output further up has it: write `{mark}`"
-    return replace(finding, help=help, edits=mark_edits(binding, mark))
 
 
 def _check(bound: BoundNumber) -> tuple[Diagnostic | None, Sequence[PrintedPlace]]:
@@ -306,8 +279,6 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
     """The diagnostic of a binding that none of its outputs bears out."""
     binding, path, bound_text = bound.binding, bound.path, bound.text
     outputs = bound.groups[-1]
-    pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", binding.text)
-    with_point = BoundText.of(pointed)
     bare, stray, label = bound_text.bare, bound_text.stray, ""
     message = f"`{binding.text}` is not what `{path}` printed, rounded to the digits shown"
     if not bound_text.numbers:
@@ -320,9 +291,6 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
         help = Fix(f"remove the `{stray}`", "", stray)
     elif mismatch := _wrong_unit(bound, bare, bare.shown_places(outputs)):
         return mismatch
-    elif pointed != binding.text and with_point.numbers and with_point.is_in(outputs):
-        message = f"`{binding.text}` has a comma where outputs have a decimal point"
-        help = Fix(f"write `{pointed}`", pointed)
     else:
         label, help = _nearest(bound_text, outputs), ""
     return diagnose("binding-mismatch", binding.text_span, message, label=label, help=help)

@@ -99,10 +99,8 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
                     end = script.span.first_line().end
                     edits = (Edit(script.span.source.span(end, end), " part"),)
                     help = Fix(f"{help}, or say `part` if it goes on with the file", edits=edits)
-            elif key in files:
-                message = f"`{path}` and `{first_path}` are one file where case does not count"
             else:
-                message = f"one of `{path}` and `{first_path}` would be a folder of the other"
+                message = f"`{path}` and `{first_path}` cannot both be written everywhere"
             notes = [Note(note, first.script.path_span)]
             diagnostics.append(
                 diagnose("script-repeated", script.path_span, message, help=help, notes=notes)

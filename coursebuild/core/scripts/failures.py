@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import posixpath
 import re
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TypeAlias, assert_never
@@ -23,7 +22,8 @@ from coursebuild.core.model import Recording
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
 from coursebuild.core.scripts.diff import limit_notes, shorten
 from coursebuild.core.scripts.extract import Extraction
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose, propose
+from coursebuild.core.syntax.python_syntax import check_syntax
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
@@ -111,16 +111,12 @@ def failure_diagnostic(
             span = (extraction.line_span(int(place[1])) if place else None) or fence
         label = "" if span is fence else "it was here"
     if run.outcome is Outcome.FAILED and extraction.script.is_python:
-        if not (_parses(source) and _parses(extraction)):
+        if any(any(check_syntax(script.script.code)) for script in (source, extraction)):
             return None
         error = _last_message(stderr)
         label = shorten(error, _LABEL)
         matches = ((pattern.match(error), advice) for pattern, advice in _HELPS)
         help = next((match.expand(advice) for match, advice in matches if match), "")
-        slip = re.search(r"'(\w+)'(?: is not defined)?\. Did you mean: '(\w+)'\?", error)
-        if slip is not None:
-            fix = propose(slip[1], slip[2])
-            help = Fix(help, fix.new, slip[1])
         missing = _MISSING_MODULE.search(error)
         file = find_module(missing[1]) if missing else ""
         folder = file.removesuffix("/__init__.py").rpartition("/")[0] or "."
@@ -169,16 +165,6 @@ def silence_diagnostic(recording: Recording, run: ScriptRun) -> Diagnostic:
     message = f"an output is recorded here, but {subject} printed nothing"
     help = "print what is recorded, or remove the recorded output"
     return diagnose("script-silent", recording.caption_span, message, help=help)
-
-
-def _parses(extraction: Extraction) -> bool:
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            compile(extraction.text, "", "exec", dont_inherit=True)
-    except (SyntaxError, ValueError, MemoryError, RecursionError, OverflowError):
-        return False
-    return True
 
 
 def _last_message(stderr: str) -> str:

@@ -219,7 +219,8 @@ def _part_difference(old: DrawnPart, new: DrawnPart, axes: Axes) -> str:
         return f"says {_quote(new.words)} where {_quote(old.words)} is recorded"
     if old.shape != new.shape:
         return f"has {_size(new.shape)} values where {_size(old.shape)} are recorded"
-    return _value_difference(old, new) or _style_difference(old, new)
+    is_alike = (old.style, old.sizes) == (new.style, new.sizes)
+    return _value_difference(old, new) or ("" if is_alike else "has another style")
 
 
 def _value_difference(old: DrawnPart, new: DrawnPart) -> str:
@@ -234,17 +235,6 @@ def _value_difference(old: DrawnPart, new: DrawnPart) -> str:
         place = _index(first, old.shape)
         suffix = f", and {len(different) - 1} more differ" if len(different) > 1 else ""
         return f"has the value {now:.4g} at {place} where {before:.4g} is recorded{suffix}"
-    return ""
-
-
-def _style_difference(old: DrawnPart, new: DrawnPart) -> str:
-    for name, before in old.style.items():
-        now = new.style.get(name, "")
-        if before != now:
-            words = [", ".join(v[:5]) if isinstance(v, list) else v for v in (now, before)]
-            return f"has the {name} {words[0]} where {words[1]} is recorded"
-    if old.sizes != new.sizes:
-        return "has markers of other sizes"
     return ""
 
 

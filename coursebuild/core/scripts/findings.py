@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from decimal import Decimal
 
@@ -34,9 +33,8 @@ from coursebuild.core.scripts.lines import ELLIPSIS, Side
 from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.scripts.table_cells import HEADER_HELP, ROW_HELP, cell_text, table_rows
 from coursebuild.core.scripts.tables import TableMatcher
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.numbers import only_number, scan, within_tolerance
-from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
 _MAX_NOTES = 3
@@ -191,13 +189,8 @@ def _find_unmarked(
                 continue
             message = f"this is what `{script.path}` printed, and nothing compares the two"
             help = "an output is of kind `output`; if it is none, write `text illustration`"
-            if (head := _FENCE_HEAD.match(block.span.text)) is not None:
-                help = Fix(help, f"{head[1]}output", head[0])
             yield diagnose("output-unmarked", block.span.first_line(), message, help=help)
             break
-
-
-_FENCE_HEAD = regex(r"(`{3,}|~{3,})[ \t]*[^\s`]*")
 
 
 def find_instability(
@@ -300,18 +293,11 @@ def drift_diagnostic(
     changes = verdict.changes
     first, *rest = sorted(changes, key=lambda change: change.span.start)
     noun = "more difference" if len(rest) == _MAX_NOTES + 1 else "more differences"
-    differences = [Note(_describe_difference(change), change.span) for change in rest]
+    differences = [Note(describe_difference(change), change.span) for change in rest]
     notes = limit_notes(differences, _MAX_NOTES, noun)
     notes += (Note(_describe_dependence(d), d.binding.text_span) for d in dependents)
     help = f"if the change is intended, run {update}"
-    fraction = re.match(r",(\d+)", first.span.source.text[first.span.end : first.span.end + 40])
-    if any("\x1b" in change.recorded and "\x1b" not in change.printed for change in changes):
-        help = "what is recorded has the colour codes of a terminal: remove them"
-    elif fraction and f"{first.recorded}.{fraction[1]}" == first.printed:
-        help = f"Python prints a decimal point: write `{first.printed}`"
-    elif (
-        isinstance(body := recording.body, Table) and first.span.start < body.rows[0][0].span.start
-    ):
+    if isinstance(body := recording.body, Table) and first.span.start < body.rows[0][0].span.start:
         help = HEADER_HELP
     elif isinstance(body, Table) and first.kind is DriftKind.MISSING:
         help = f"{help}; {ROW_HELP}"
@@ -332,29 +318,32 @@ def classes(changes: Sequence[Change]) -> str:
     return ", ".join(f"{kind.value}: {count}" for kind, count in counts.items() if count)
 
 
-def _label(change: Change) -> str:
+def _label(change: Change, subject: str = "this run") -> str:
     match change.kind:
         case DriftKind.ROUNDING | DriftKind.NUMERIC:
-            wording = closeness(change)
-            suffix = f" ({wording})" if wording else ""
-            return f"this run printed {shorten(change.printed, _WIDTH)}{suffix}"
+            printed = f"{subject} printed {shorten(change.printed, _WIDTH)}"
+            if change.relative_error is None:
+                return printed
+            agree = {None: "", 0: ", no digit agrees", 1: ", 1 digit agrees"}
+            digits = agree.get(change.digits, f", {change.digits} digits agree")
+            return f"{printed} (relative error {change.relative_error:.1e}{digits})"
         case DriftKind.TEXT if not (change.recorded.strip() or change.printed.strip()):
-            return "this run printed white space of another width here"
+            return f"{subject} printed white space of another width here"
         case DriftKind.TEXT if not change.printed.strip():
-            return "this run printed nothing here"
+            return f"{subject} printed nothing here"
         case DriftKind.TEXT if _is_same_value(change):
             number = shorten(change.printed, _WIDTH)
-            return f"this run printed {number} (the same value, written in another way)"
+            return f"{subject} printed {number} (the same value, written in another way)"
         case DriftKind.TEXT:
-            return f"this run printed {quote(change.printed, _WIDTH)}"
+            return f"{subject} printed {quote(change.printed, _WIDTH)}"
         case DriftKind.MISSING:
             count = change.recorded.count("\n") + 1
             lines = "this line" if count == 1 else f"these {count} lines"
-            return f"this run did not print {lines}"
+            return f"{subject} did not print {lines}"
         case DriftKind.EXTRA:
             first, *rest = change.printed.split("\n")
             rest_text = f" and {len(rest)} more line{'s' if len(rest) > 1 else ''}" if rest else ""
-            return f"this run printed {quote(first, _WIDTH)}{rest_text} here"
+            return f"{subject} printed {quote(first, _WIDTH)}{rest_text} here"
 
 
 def _is_same_value(change: Change) -> bool:
@@ -362,27 +351,16 @@ def _is_same_value(change: Change) -> bool:
     return recorded is not None and printed is not None and recorded.value == printed.value
 
 
-def closeness(change: Change) -> str:
-    """How near a printed number is to the recorded one, in words; empty if that has no meaning."""
-    if change.relative_error is None:
-        return ""
-    error = f"relative error {change.relative_error:.1e}"
-    if change.digits is None:
-        return error
-    agree = {0: "no digit agrees", 1: "1 digit agrees"}
-    return f"{error}, {agree.get(change.digits, f'{change.digits} digits agree')}"
-
-
-def _describe_difference(change: Change) -> str:
-    """A further difference, for a note: unlike a label it must quote what is recorded."""
+def describe_difference(change: Change, subject: str = "this run") -> str:
+    """A difference with what is recorded; `subject` has printed the other text."""
     if change.kind is DriftKind.MISSING:
         first = change.recorded.split("\n")[0]
-        return f"recorded {quote(first, _WIDTH)}; {_label(change)}"
+        return f"recorded {quote(first, _WIDTH)}; {_label(change, subject)}"
     if change.kind is DriftKind.EXTRA or not change.recorded.strip():
-        return _label(change)
+        return _label(change, subject)
     numeric = change.kind is not DriftKind.TEXT or _is_same_value(change)
     recorded = shorten(change.recorded, _WIDTH) if numeric else quote(change.recorded, _WIDTH)
-    return f"recorded {recorded}; {_label(change)}"
+    return f"recorded {recorded}; {_label(change, subject)}"
 
 
 def _describe_dependence(dependent: bindings.DependentBinding) -> str:

@@ -51,7 +51,10 @@ def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
     (span, label), *rest = warnings
     notes = limit_notes([Note(text, place) for place, text in rest], _MAX_NOTES)
     if sensitivity.chaotic:
-        notes.append(Note(f"its simulation is chaotic: {describe_growth(sensitivity)}"))
+        size, growth = sensitivity.amplification, "its states part without bounds"
+        if size is not None and math.isfinite(size):
+            growth = f"states end {size:.0e} times as far apart as they began"
+        notes.append(Note(f"its simulation is chaotic: {growth}"))
     yield diagnose(
         "output-noise",
         span,
@@ -65,11 +68,3 @@ def noise_warnings(sensitivity: Sensitivity) -> Iterator[Diagnostic]:
         ),
         notes=notes,
     )
-
-
-def describe_growth(sensitivity: Sensitivity) -> str:
-    """How fast the states of a script part, in words."""
-    size = sensitivity.amplification
-    if size is None or not math.isfinite(size):
-        return "its states part without bounds"
-    return f"states end {size:.0e} times as far apart as they began"

@@ -20,7 +20,6 @@ from coursebuild.core.model import (
 from coursebuild.core.syntax.spans import trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Edit,
     Fix,
     Note,
     Parsed,
@@ -39,10 +38,7 @@ LABEL = regex(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 missing."""
 _GIVEN = regex(r'(?:^|(?<=\s))\{given="([^{}"]*\S[^{}"]*)"\}$')
 _LAST_LABEL = regex(r"(?:^|(?<=\s))\{#[^{}$\n]{0,200}\}?$")
-_PAIR = regex(r'\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}]+)))?(?=\s|$)')
-_MISQUOTED = regex(
-    r"""[^\s={}"]+=([“”„‟‘’‚‛«»'`])[^{}"“”„‟‘’‚‛«»'`\n]*([“”„‟‘’‚‛«»'`])(?=[\s}]|$)"""
-)
+_PAIR = regex(r"""\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}“”„‟‘’‚‛«»'`]+)))?(?=\s|$)""")
 _SPACES = regex(r"\s+")
 _NUMBER = regex(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
 _RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?!\{{?[,\d])((?s:.*))\Z")
@@ -67,17 +63,6 @@ def collapse_spaces(text: str) -> str:
     return _SPACES.sub(" ", text).strip()
 
 
-def check_quotes(text: Excerpt, start: int, rule: str) -> tuple[Diagnostic, int] | None:
-    """The diagnostic of a value in other quotes than `"`, and where it ends; `None` without."""
-    match = _MISQUOTED.match(text.text, start)
-    if match is None:
-        return None
-    places = [text.span(*match.span(group)) for group in (1, 2)]
-    help = Fix('write `"`', edits=tuple(Edit(place, '"') for place in places), safe=True)
-    message = f"`{match[1]}` does not quote a value"
-    return diagnose(rule, places[0], message, help=help), match.end()
-
-
 def read_pairs(
     braces: Excerpt, keys: tuple[str, ...], rule: str, help: str
 ) -> dict[str, Excerpt | None] | Diagnostic:
@@ -94,8 +79,6 @@ def read_pairs(
             message = f"`{collapse_spaces(rest.text)}` cannot be read"
             return diagnose(rule, rest.span(), message, help=help)
         key, span = pair[1], braces.span(*pair.span(1))
-        if misquoted := check_quotes(braces, pair.start(1), rule):
-            return misquoted[0]
         if key not in keys:
             suggestion = (did_you_mean(key, keys) if len(keys) > 1 else "") or help
             return diagnose(rule, span, f"`{key}` is not a known key here", help=suggestion)
@@ -161,14 +144,8 @@ def read_meaning(
             braces.span(), value.text, value.span(), script, origin, unit, comma, words
         )
     elif value is not None or "out" in values:
-        text = "" if value is None else value.text
-        reason = f"`{text}` is no value of a symbol"
-        if is_number:
-            reason = "a value is either given or printed by a script"
-        elif value is None:
-            reason = "`out` binds a number, and the formula ends with none that is written in it"
-        place = braces if value is None else value
-        report(diagnose("symbol-attribute", place.span(), reason, help=_VALUE_HELP))
+        message = "this says no value that is either given or printed by a script"
+        report(diagnose("symbol-attribute", (value or braces).span(), message, help=_VALUE_HELP))
         return None, source, None
     if not values.keys() & {"symbol", "unit"}:
         return None, source, number
@@ -349,39 +326,22 @@ class Anchors(Struct):
 
 def check_heading(
     span: Span, level: int, previous: int | None, children: tuple[Inline, ...], *, lesson: bool
-) -> list[Diagnostic]:
+) -> Iterator[Diagnostic]:
     """Check a heading; `previous` is the level of the heading before it, if it must fit to that."""
-    diagnostics: list[Diagnostic] = []
     if not plain_text(children).strip() and not any(
         isinstance(inline, Image) for inline in walk_inlines(children)
     ):
-        diagnostics.append(diagnose("heading-empty", span, "the heading has no text"))
-    before = span.source.text[: span.start].rstrip().rpartition("\n")[2]
-    if before == "---" and re.fullmatch(r"[a-z][\w-]*: .*\n-+", span.text.strip(), re.DOTALL):
-        message, help = "front matter stands in the text, which would show it", "delete it"
-        diagnostics.append(diagnose("front-matter", span.first_line(), message, help=help))
+        yield diagnose("heading-empty", span, "the heading has no text")
     if level == 1:
         help = "the title comes from the course map; begin with `## `"
-        help = Fix(help, edits=_deepen(span, 1))
-        if span.text.rstrip().endswith("\n======="):
-            help = "a merge conflict may have left the line of `=` behind: delete it"
         message = "a lesson cannot have a heading of level 1"
         if not lesson:
             message = "a page can have no heading of level 1 but its title, at its top"
-        diagnostics.append(diagnose("heading-top", span, message, help=help))
+        yield diagnose("heading-top", span, message, help=help)
     if previous is not None and level > previous + 1:
         message = f"a heading of level {level} follows one of level {previous}"
         if lesson and previous == 1:
             message = f"a heading of level {level} comes before any of level 2"
-        help = f"begin it with `{'#' * (previous + 1)} `"
-        fix = Fix(help, edits=_deepen(span, previous + 1 - level))
-        diagnostics.append(diagnose("heading-skip", span, message, help=fix))
-    return diagnostics
-
-
-def _deepen(heading: Span, levels: int) -> tuple[Edit, ...]:
-    marks = re.match("#+", heading.text)
-    if marks is None:
-        return ()
-    place = heading.source.span(heading.start, heading.start + marks.end())
-    return (Edit(place, "#" * (marks.end() + levels)),)
+        yield diagnose(
+            "heading-skip", span, message, help=f"begin it with `{'#' * (previous + 1)} `"
+        )

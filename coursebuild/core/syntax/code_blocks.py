@@ -30,12 +30,13 @@ from coursebuild.core.syntax.fence import (
     TextParser,
     Word,
     split_words,
+    with_line_end,
 )
 from coursebuild.core.syntax.other_tools import check_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
 from coursebuild.core.syntax.python_syntax import check_syntax
 from coursebuild.core.syntax.recording import check_stray_keys, record_fence
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 
@@ -48,8 +49,10 @@ _PROGRAM_VALUES = ("timeout", "args", "writes", "record")
 _SHOWS: tuple[Show, ...] = ("open", "folded", "hidden")
 _WHOLE_STATEMENTS = "a part holds whole statements: a function or a loop stands in one part"
 _NUMBER = regex(r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
-_DEVICE = regex(r"(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\..*)?", re.IGNORECASE)
-_UNPORTABLE = regex(r'[\x00-\x1f\x7f<>:"|?*;&$!#%`{}\'\ud800-\udfff]')
+_PORTABLE = regex(
+    r"(?!(?:aux|con|nul|prn|com[0-9¹²³]|lpt[0-9¹²³])(?:\.|\Z))(?! ).*[^. ]", re.IGNORECASE
+)
+_UNPORTABLE = regex(r'[\x00-\x1f\x7f<>:"|?*;&$!#%`{}\'\\\ud800-\udfff]')
 _UNUSABLE_NAMES = (frozenset(sys.stdlib_module_names) | {"mjcourse", "mujoco", "numpy"}) - set(
     "code test this".split()
 )
@@ -138,7 +141,7 @@ def _build_part(
     show = _read_show(keys, diagnostics)
     if not _check_path(fence, file, diagnostics):
         return None
-    path, place, code = file.value or "", file.value_span, _code_of(fence)
+    path, place, code = file.value or "", file.value_span, with_line_end(fence.body)
     return ScriptPart(fence.span, path, place, code, fence.prefix, fence.body_span, show)
 
 
@@ -163,13 +166,6 @@ def _read_show(keys: FenceKeys, diagnostics: list[Diagnostic]) -> Show:
         assert place is not None
         diagnostics.append(diagnose("fence-key-value", place, message))
     return shows[0] if shows else "open"
-
-
-def _code_of(fence: Fence) -> Excerpt:
-    body = fence.body
-    if body.text.endswith("\n"):
-        return body
-    return Excerpt(body.source, body.text + "\n", body.pieces)
 
 
 def _build_script(
@@ -202,7 +198,7 @@ def _build_script(
         fence.span,
         file.value or "",
         file.value_span,
-        _code_of(fence),
+        with_line_end(fence.body),
         fence.prefix,
         timeout,
         tuple(dict.fromkeys(requires)),
@@ -226,12 +222,8 @@ def _read_timeout(word: Word | None, diagnostics: list[Diagnostic]) -> float:
     seconds = float(word.value) if _NUMBER.fullmatch(word.value) else 0.0
     if 0 < seconds <= MAX_TIMEOUT:
         return seconds
-    message = f"`{word.value}` is not a number of seconds above 0"
-    if seconds > MAX_TIMEOUT:
-        message = f"`{word.value}` s is more than a day"
-    number = re.fullmatch(rf"({_NUMBER.pattern})\s?s(?:ec)?", word.value)
-    help = "" if number is None else write(number[1])
-    diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
+    message = f"`{word.value}` is not a number of seconds above 0, of a day at most"
+    diagnostics.append(diagnose("fence-key-value", word.value_span, message))
     return DEFAULT_TIMEOUT
 
 
@@ -273,30 +265,17 @@ _LISTS: dict[str, tuple[Callable[[str], bool], str, str]] = {
 
 def path_mistake(path: str, *, is_python: bool = True) -> str:
     """Why a script cannot have this path; empty if it can."""
-    parts = path.split("/")
-    stem = parts[-1].removesuffix(".py")
-    if any(ord(char) < 32 or ord(char) == 127 for char in path):
-        return "the path of a script must not hold control characters"
-    if "\\" in path:
-        return f"`{path}` has a backslash; folders are separated by `/`"
-    if path.startswith("/") or re.match(r"[A-Za-z]:", path):
-        return f"`{path}` is absolute; the path of a script is relative to the project"
-    if ".." in parts:
-        return f"`{path}` leads out of its folder by `..`"
-    if "" in parts or "." in parts:
-        return f"`{path}` has a part that is empty or `.`"
-    if parts[0] != "examples" or len(parts) < 2:
+    folder, *parts = path.split("/")
+    stem = path.rpartition("/")[2].removesuffix(".py")
+    if folder != "examples" or not parts:
         return f"`{path}` is not below `examples/`"
-    if is_python and (not path.endswith(".py") or not stem):
-        return f"`{path}` does not end in `.py`" if stem else f"`{path}` has no name before `.py`"
+    if is_python and not path.endswith(".py"):
+        return f"`{path}` does not end in `.py`"
     if not is_python and path.lower().endswith((".py", ".pyc", ".pyd", ".so")):
         return f"`{path}` would be imported by Python scripts beside it"
-    if _UNPORTABLE.search(path) or any(part[-1] in ". " or part[0] == " " for part in parts):
-        return f"`{path}` has a character that not every file system and shell takes"
-    if any(len(part.encode()) > 255 for part in parts):
-        return "a part of the path is longer than 255 bytes"
-    if device := next((part for part in parts if _DEVICE.fullmatch(part)), None):
-        return f"`{device}` is a reserved name on some systems"
+    is_portable = stem and not _UNPORTABLE.search(path) and all(map(_PORTABLE.fullmatch, parts))
+    if not is_portable or max(len(part.encode()) for part in parts) > 255:
+        return f"`{path}` has a part that not every file system and shell takes"
     if is_python and stem in _UNUSABLE_NAMES:
         return f"`{path}` would be imported in place of the module `{stem}` by its neighbours"
     return ""

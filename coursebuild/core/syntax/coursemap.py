@@ -199,6 +199,7 @@ def _read_id(node: Node | None) -> str:
 # ---------------------------------------------------------------------------------------- checks
 
 RESERVED_IDS = frozenset({"index", "404"})
+_PAGE_FILE = regex(r"(?!~|[A-Za-z]:)(?:(?!\.{0,2}/)[^\x00-\x1f\\/]+/)*(?!\.md)[^\x00-\x1f\\/]*\.md")
 
 
 def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diagnostic]:
@@ -227,19 +228,8 @@ def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:
             message = f"a page cannot have the id `{fields.id}`"
             help = "the site has a file of this name already"
             yield diagnose("field-value", node.place("id"), message, help=help)
-        path, parts, problem = fields.file, fields.file.split("/"), ""
-        if "\\" in path:
-            problem = "has a backslash: folders are separated by `/`"
-        elif path.startswith(("/", "~")) or re.match(r"[A-Za-z]:", path):
-            problem = "is not relative to the project"
-        elif ".." in parts:
-            problem = "leads out of its folder by `..`"
-        elif "" in parts or "." in parts or any(ord(char) < 32 for char in path):
-            problem = "is not a plain path"
-        elif not path.endswith(".md"):
-            problem = "is no Markdown file: its name ends in `.md`"
-        if problem:
-            message = f"`{shorten(path)}` {problem}"
+        if not _PAGE_FILE.fullmatch(fields.file):
+            message = f"`{shorten(fields.file)}` is no path of a Markdown file"
             help = "a path relative to the project, as in `content/pages/about.md`"
             yield diagnose("field-value", place, message, help=help)
     yield from check_unique(files, "field-value", "two pages have the file `{}`")

@@ -21,7 +21,6 @@ from coursebuild.core.model.fields import NOT_BLANK
 from coursebuild.core.syntax.nodes import (
     ArrayNode,
     BoolNode,
-    ErrorNode,
     Format,
     Node,
     NullNode,
@@ -105,8 +104,6 @@ class _Decoder:
     def report_wrong_type(
         self, node: Node, type: inspect.Type, name: str, help: str = ""
     ) -> object:
-        if isinstance(node, ErrorNode):  # the parser has reported it
-            return _INVALID
         message = wrong_type_message(node, name, type, self.format)
         help = help or type_help(node, type) or _field_help(name, type)
         return self.report("field-type", node.mark, message, help)
@@ -272,26 +269,21 @@ class _Decoder:
                 values[key] = self.decode_value(member.value, fields[key].type, key)
             elif type.forbid_unknown_fields and not (variants and key == type.tag_field):
                 unknown.append(member.key)
-        misspelt: set[str] = set()
         for key_node in unknown:
-            key, help = key_node.value, ""
+            key = key_node.value
             replacement = getattr(type.cls, "replaced", {}).get(key, "")
             if replacement:  # said for one release
                 message = f"{format_name(key)} is a field of an earlier version"
                 self.report("field-unknown", key_node.span, message, replacement)
                 continue
-            if (likely := nearest(key, set(fields) - set(values) - misspelt)) is not None:
-                misspelt.add(likely)
-                help = propose(key, likely)
-            elif owners := _variants_with_field(key, variants or {}):
+            help = did_you_mean(key, set(fields) - set(values))
+            if owners := _variants_with_field(key, variants or {}):
                 names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)
                 help = f"it is a field of {names}"
-            else:
-                help = did_you_mean(key, fields)
             self.report("field-unknown", key_node.span, f"unknown field {format_name(key)}", help)
         missing = [field for field in type.fields if field.required and field.name not in values]
         for absent in missing:
-            if absent.name not in misspelt:  # a misspelt field is one mistake
+            if not any(nearest(key.value, [absent.name]) for key in unknown):  # one mistake
                 help = _field_help(absent.name, absent.type)
                 self.report("field-missing", node.mark, f"`{absent.name}` is missing", help)
         if missing or _INVALID in values.values():

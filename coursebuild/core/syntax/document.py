@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 
 from msgspec.structs import replace
 
@@ -64,20 +64,41 @@ def parse_document(
     anchor = "" if title is None else slug(title.text)
     is_free = not state.anchors.has(anchor)
     document = model.Document(source, blocks, state.notes.finish(), anchor if is_free else "")
-    unclaimed = tuple(_unclaimed_blocks(document, state.diagnostics))
+    # Quizzes show what is wrong as well, and what has a mistake in its first line is mended first.
+    mistakes, in_features = (
+        {d.span.line for d in state.diagnostics if d.is_error},
+        feature_block_ids(document),
+    )
+    all_blocks = tuple(model.document_blocks(document))
+    scripts = (at for at, block in enumerate(all_blocks) if isinstance(block, model.Script))
+    unclaimed = tuple(
+        block
+        for block in all_blocks[next(scripts, len(all_blocks)) :]
+        if isinstance(block, model.CodeBlock)
+        and block.language in _TEXTS
+        and ILLUSTRATION not in block.info.split()
+        and id(block) not in in_features
+        and block.span.line not in mistakes
+    )
     document = replace(document, unclaimed=unclaimed, comma=state.has_decimal_comma)
     conflict = find_conflict(source)
     if conflict is not None:  # the rest follows from it
         return Parsed(document, (conflict,))
     state.diagnostics += (*_check_placement(document), *_check_ids(document))
-    state.diagnostics += _check_scripts(document, state.diagnostics)
+    syntax_errors = [d.span for d in state.diagnostics if d.rule == "python-syntax"]
+    for script in model.document_scripts(document):  # that their parts parse is known
+        parts = script.parts
+        if parts and not any(part.span.contains(span) for part in parts for span in syntax_errors):
+            state.diagnostics += check_syntax(script.code)
+        if script.is_python and not (script.figures or script.norun):
+            state.diagnostics += find_windows(script.code)
     if (at := source.text.find("\0")) >= 0:
         message = "the text contains a NUL character"
         places = [match.start() for match in re.finditer("\0", source.text)]
         edits = tuple(Edit(source.span(place, place + 1), "") for place in places)
         help = Fix("delete it; readers would see `\ufffd`", edits=edits, safe=True)
         state.report(diagnose("control-character", source.span(at, at + 1), message, help=help))
-    for block in model.document_blocks(document):  # readers would see it otherwise than it runs
+    for block in all_blocks:  # readers would see it otherwise than it runs
         match block:
             case model.Recording():
                 state.diagnostics += find_reordering(block.body_span, is_code=True)
@@ -100,19 +121,6 @@ def read_again(course: model.Course, owner: model.Owner, summary: model.Document
     ).value
 
 
-def _check_scripts(
-    document: model.Document, diagnostics: Sequence[Diagnostic]
-) -> Iterator[Diagnostic]:
-    """Report what is wrong with scripts as a whole; that their parts parse is known."""
-    for script in model.document_scripts(document):
-        parts = script.parts
-        mistakes = [d for d in diagnostics if d.rule == "python-syntax"]
-        if parts and not any(p.span.contains(d.span) for p in parts for d in mistakes):
-            yield from check_syntax(script.code)
-        if script.is_python and not (script.figures or script.norun):
-            yield from find_windows(script.code)
-
-
 def find_reordering(place: Span, *, is_code: bool) -> Iterator[Diagnostic]:
     """Report the first character of a text by which a browser shows others in another order."""
     if character := (ISOLATING if is_code else REORDERING).search(place.text):
@@ -130,27 +138,6 @@ _TEXTS = frozenset(
     """.split()
 ) | {""}
 """Kinds of code blocks that may show an output."""
-
-
-def _unclaimed_blocks(
-    document: model.Document, diagnostics: Iterable[Diagnostic]
-) -> Iterator[model.CodeBlock]:
-    """The texts below a script of which nothing says what they are.
-
-    Quizzes show what is wrong as well, and of a block with a mistake in its first line that is
-    to be mended first.
-    """
-    in_features = feature_block_ids(document)
-    mistakes = {d.span.line for d in diagnostics if d.is_error}
-    has_script = False
-    for block in model.document_blocks(document):
-        if isinstance(block, model.Script):
-            has_script = True
-        if not (has_script and isinstance(block, model.CodeBlock)):
-            continue
-        is_free = id(block) not in in_features and block.span.line not in mistakes
-        if is_free and block.language in _TEXTS and ILLUSTRATION not in block.info.split():
-            yield block
 
 
 _FORMULAS = (model.Math, model.MathBlock)
@@ -221,11 +208,6 @@ _FENCED = regex(
     re.MULTILINE,
 )
 """A block of code as a whole."""
-_CONFLICT_NOTES = {
-    "|": "the text that both versions changed begins here",
-    "=": "the other version begins here",
-    ">": "the conflict ends here",
-}
 
 
 def find_conflict(source: Source) -> Diagnostic | None:
@@ -244,26 +226,13 @@ def find_conflict(source: Source) -> Diagnostic | None:
         for match in _CONFLICT_MARK.finditer(text)
         if not any(start <= match.start() < end for start, end in examples)
     ]
-    first = next((i for i, mark in enumerate(marks) if mark.text[0] in "<>"), None)
-    if first is None:
+    if not any(mark.text[0] in "<>" for mark in marks):
         return None
-    conflict = [marks[first]]
-    for mark in marks[first + 1 :] if marks[first].text[0] == "<" else ():
-        if mark.text[0] == "<":
-            break
-        conflict.append(mark)
-        if mark.text[0] == ">":
-            break
-    message = "this line was left behind by a merge conflict"
-    if len(conflict) > 1:
-        lines = [str(mark.line) for mark in conflict]
-        message = "a merge conflict was left here: its marks are lines "
-        message += f"{', '.join(lines[:-1])} and {lines[-1]}"
-    more_count = sum(mark.text[0] == "<" for mark in marks[first + 1 :])
-    notes = [Note(_CONFLICT_NOTES[mark.text[0]], mark) for mark in conflict[1:]]
-    if more_count:
-        notes.append(Note(f"conflicts further down in this file: {more_count}"))
+    lines = ", ".join(str(mark.line) for mark in marks)
+    message = f"a merge conflict was left here: its marks are in lines {lines}"
+    if len(marks) == 1:
+        message = "this line was left behind by a merge conflict"
     help = "keep one of the versions, or join them, and delete the marks"
     if is_markdown:
         help += "; to show a conflict to readers, put all of it into a block of code"
-    return diagnose("merge-conflict", conflict[0], message, help=help, notes=notes)
+    return diagnose("merge-conflict", marks[0], message, help=help)

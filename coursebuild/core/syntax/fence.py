@@ -16,12 +16,11 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.model import Block, CodeBlock, Inline, NumberBinding
-from coursebuild.core.syntax.attributes import check_quotes, split_label
+from coursebuild.core.syntax.attributes import split_label
 from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Edit,
     Fix,
     Note,
     Parsed,
@@ -31,8 +30,7 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
-_WORD = regex(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"]*)))?""")
-_SPACED_OPTION = regex(r"""[^\s="]+(?:\s+(=)\s*|(=)\s+)(?:"(?:\\["\\]|[^"])*"|[^\s"=]+)(?=\s|$)""")
+_WORD = regex(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"“”„‟‘’‚‛«»'`]*)))?""")
 _KIND = regex(r"\s*(\S*)")
 _NOT_SPACE = regex(r"\S")
 _REST = regex(r"\S*")
@@ -57,14 +55,6 @@ class Word(Struct, frozen=True):
     def value_span(self) -> Span:
         """Where the value stands; the word itself when it has none."""
         return self.span if self.value_text is None else self.value_text.span()
-
-    @property
-    def removal(self) -> tuple[Edit]:
-        """The edit that takes the word away, with the blanks before it."""
-        source, start = self.span.source, self.span.start
-        while source.text[start - 1] in " \t":
-            start -= 1
-        return (Edit(source.span(start, self.span.end), ""),)
 
     def parts(self) -> list[Excerpt]:
         """The parts of a value between its commas, without white space at their ends."""
@@ -113,30 +103,14 @@ def split_words(info: Excerpt) -> Parsed[tuple[Word, ...]]:
         match = _WORD.match(text, at)
         assert match is not None
         end = match.end()
-        if misquoted := check_quotes(info, at, "fence-info"):
-            diagnostic, end = misquoted
-            diagnostics.append(diagnostic)
-        elif spaced_word := _SPACED_OPTION.match(text, at):
-            equals, end = spaced_word.start(spaced_word.lastindex or 0), spaced_word.end()
-            message = "there is a space beside the `=` of a key"
-            spaced = info.span(at, end)
-            edit = Edit(spaced, re.sub(r"\s*=\s*", "=", spaced.text, count=1))
-            help = Fix("remove it", edits=(edit,), safe=True)
-            place = info.span(equals, equals + 1)
-            diagnostics.append(diagnose("fence-info", place, message, help=help))
-        elif end < len(text) and not text[end].isspace():
-            start, rest = at, _REST.match(text, end)
-            advice: str
-            if text[end] == '"' and text.count('"', end) == 1:
-                start, end, message = end, len(text), "a quoted value is never closed"
-                advice = Fix('close it with `"`', edits=(Edit(info.span(end, end), '"'),))
-            else:
-                end = rest.end() if rest else end
-                message = f"`{text[at:end]}` cannot be read"
-                advice = 'write `key=value`, `key="value with spaces"` or a flag, '
-                advice += "with spaces between them"
-            place = info.span(start, end)
-            diagnostics.append(diagnose("fence-info", place, message, help=advice))
+        if end < len(text) and not text[end].isspace():
+            rest = _REST.match(text, end)
+            end = rest.end() if rest else end
+            message = f"`{text[at:end]}` cannot be read"
+            help = (
+                'write `key=value`, `key="value with spaces"` or a flag, with spaces between them'
+            )
+            diagnostics.append(diagnose("fence-info", info.span(at, end), message, help=help))
         elif not match[1]:
             message = f"`{match[0]}` has no key before the `=`"
             diagnostics.append(diagnose("fence-info", info.span(at, end), message))
@@ -202,8 +176,7 @@ class Fence(Struct, frozen=True):
                 diagnostics.append(diagnose("fence-key-unknown", word.key_span, message, help=help))
             elif key in words_by_key:
                 notes = [Note("first given here", words_by_key[key].key_span)]
-                message, is_same = f"`{key}` is given twice", words_by_key[key].value == word.value
-                help = Fix("delete one of them", edits=word.removal if is_same else (), safe=True)
+                message, help = f"`{key}` is given twice", "delete one of them"
                 diagnostics.append(
                     diagnose("fence-key-repeated", word.key_span, message, help=help, notes=notes)
                 )
@@ -234,8 +207,8 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
     is_closed, body = token.meta["closed"], token.text
     if body is NO_TEXT:
         body = base.slice(info_end + 1, info_end + 1)
-    elif not body.text.endswith("\n"):
-        body = Excerpt(base.source, body.text + "\n", body.pieces)
+    else:
+        body = with_line_end(body)
     span = base.span(token.start, token.end)
     head = base.span(token.start, info_start + len(token.info.rstrip()))
     body_span, prefix = body.span(), ""
@@ -250,6 +223,11 @@ def read_fence(token: PositionedToken, base: Excerpt, *, nested: bool) -> Fence:
         if (match := re.search(opening, body.text, re.MULTILINE)) is not None:
             inner = body.span(*match.span(1))
     return Fence(span, head, info, body, body_span, prefix, is_closed, nested, inner, label)
+
+
+def with_line_end(text: Excerpt) -> Excerpt:
+    """A text that ends with a line end, which stands for the end of its last line."""
+    return text if text.text.endswith("\n") else replace(text, text=text.text + "\n")
 
 
 def line_prefix(place: Span) -> str:

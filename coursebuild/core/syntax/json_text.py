@@ -1,8 +1,7 @@
 """JSON in a fence, read strictly (RFC 8259), every value with its place.
 
-If the meaning is clear in spite of a mistake, such as a missing comma or `True`, it is reported and
-reading goes on, so that one run shows all of these. Any other mistake makes the rest unreliable: it
-is reported, and there is no value.
+Of commas, escapes and repeated keys all mistakes are reported. Any other makes the rest unreliable:
+it is reported, and there is no value.
 """
 
 from __future__ import annotations
@@ -23,9 +22,7 @@ interpreter's stack."""
 
 _SPACE = regex(r"[ \t\n\r]*")
 _TOKEN = regex(r'"(?:[^"\\\n]|\\.)*"|[][{},:]|[^][{},:\s]+')
-_COMMENT = regex(r"//[^\n]*|#[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
-_WORD = regex(r"[^\W\d][\w$]*")
-_SCALAR = regex(r"[^\W\d][\w$]*|[-+.0-9][-+.\w]*")
+_WORD = regex(r"[^\W\d][\w$]*|[-+.\d][-+.\w]*|//|/\*|\S")
 _NUMBER = regex(r"-?(?:0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 _KEY = regex(r'"(?:[^"\\\n]|\\.)*"[ \t\n\r]*:')
 _STRING = regex(r'"((?:[^"\\\n]|\\.)*)"')
@@ -35,9 +32,6 @@ _ESCAPE = regex(
 )
 _SURROGATE = regex(r"[\ud800-\udfff]")
 _CURLY_QUOTES = "“”„‟‘’‚‛«»"
-_CONSTANTS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
-_CONSTANTS |= dict.fromkeys(("None", "NULL", "Null", "nil", "undefined"), "null")
-_NOT_FINITE = frozenset(("NaN", "nan", "Infinity", "inf", "Inf"))
 
 
 def parse_json(body: Excerpt, place: Span) -> Parsed[nodes.Node | None]:
@@ -81,32 +75,20 @@ class _Reader:
 
     def read_document(self) -> nodes.Node:
         value = self.read_value(0)
-        char = self.peek()
-        if char and char in "]}":
-            self.report(self.offset, self.offset + 1, f"`{char}` closes nothing")
-        elif char:
-            line = self.text[self.offset :].split("\n", 1)[0]
-            end = self.offset + len(line)
-            self.report(self.offset, end, "text after the end of the JSON value")
+        if self.peek():
+            self.fail_expecting("the end of the JSON")
         return value
 
     def peek(self) -> str:
-        """Skip white space; return the next character. Comments and odd spaces are reported."""
+        """Skip white space; return the next character. Odd spaces are reported."""
         while True:
             self.offset = at = _SPACE.match(self.text, self.offset).end()  # type: ignore[union-attr]  # it matches nothing too
-            char = self.text[at : at + 1]
-            if comment := _COMMENT.match(self.text, at):
-                first_line = comment[0].split("\n", 1)[0]
-                edit = Edit(self.body.span(*comment.span()), "")
-                help = Fix("remove it", edits=(edit,))
-                self.report(at, at + len(first_line), "JSON has no comments", help)
-                self.offset = comment.end()
-            elif odd := nodes.odd_character(char):
-                help = Fix("replace it by a plain space, or remove it", " ", safe=True)
-                self.report(at, at + 1, f"{odd} is not white space in JSON", help)
-                self.offset += 1
-            else:
-                return char
+            odd = nodes.odd_character(self.text[at : at + 1])
+            if not odd:
+                return self.text[at : at + 1]
+            help = Fix("replace it by a plain space, or remove it", " ", safe=True)
+            self.report(at, at + 1, f"{odd} is not white space in JSON", help)
+            self.offset += 1
 
     # ----------------------------------------------------------------------- objects and arrays
 
@@ -121,11 +103,7 @@ class _Reader:
                 raise _UnreadableError
             self.offset += 1
             return self.read_object(start, depth) if char == "{" else self.read_array(start, depth)
-        scalar = _SCALAR.match(self.text, start)
-        if scalar is None:
-            self.fail_expecting("a value")
-        self.offset = scalar.end()
-        return self.read_scalar(start, scalar[0])
+        return self.read_scalar()
 
     def read_object(self, start: int, depth: int) -> nodes.ObjectNode:
         members: dict[str, nodes.Member] = {}
@@ -138,9 +116,7 @@ class _Reader:
                 message = f"`{nodes.shorten(key.value)}` is given twice"
                 notes = (Note("the first one is here", first.key.span),)
                 self.diagnostics.append(diagnose("field-repeated", key.span, message, notes=notes))
-            if self.peek() == "=":
-                self.report(self.offset, self.offset + 1, "`=` where JSON has `:`", write(":"))
-            elif self.peek() != ":":
+            if self.peek() != ":":
                 self.fail_expecting(f"`:` after the key `{nodes.shorten(key.value)}`")
             self.offset += 1
             members.setdefault(key.value, nodes.Member(key, self.read_value(depth + 1)))
@@ -152,8 +128,6 @@ class _Reader:
         items: list[nodes.Node] = []
         is_done = self.peek() == "]"
         while not is_done:
-            if not self.peek():
-                self.fail_unclosed(start)
             items.append(self.read_value(depth + 1))
             is_done = self.read_separator(start, "]")
         self.offset += 1
@@ -165,10 +139,6 @@ class _Reader:
         char, comma = self.peek(), self.offset
         if char == ",":
             self.offset += 1
-            while self.peek() == ",":
-                message = "two commas with no value between them"
-                self.report(self.offset, self.offset + 1, message, Fix("remove one", "", safe=True))
-                self.offset += 1
             if self.peek() == closer:
                 self.report(comma, comma + 1, f"there is a comma before `{closer}`", _COMMA_HELP)
         elif char != closer:
@@ -181,37 +151,22 @@ class _Reader:
 
     # ---------------------------------------------------------------------------------- scalars
 
-    def read_scalar(self, start: int, text: str) -> nodes.Node:
-        """A number or word; `ErrorNode` for one that is not JSON."""
-        end = self.offset
-        if text in ("true", "false"):
-            return nodes.BoolNode(self.body, start, end, text == "true")
-        if text == "null":
-            return nodes.NullNode(self.body, start, end)
-        number = _NUMBER.fullmatch(text)
-        if number is not None and (number[1] or number[2]):
-            return nodes.NumberNode(self.body, start, end, float(text))
-        if number is not None:
-            try:
-                return nodes.NumberNode(self.body, start, end, int(text))
-            except ValueError:  # Python converts no more than some thousand digits
-                message, help = f"a number of {end - start} digits is too long", ""
-        elif text in _CONSTANTS:
-            message, help = f"`{text}` is not JSON", write(_CONSTANTS[text])
-        elif text.lstrip("+-") in _NOT_FINITE:
-            message, help = f"JSON has no `{text}`", "write a finite number"
-        elif text[0] in "+-.0123456789":
-            message, help = f"`{nodes.shorten(text)}` is not a number of JSON", ""
-            for read in (lambda: int(text, 0), lambda: int(text), lambda: float(text)):
-                with contextlib.suppress(ValueError):
-                    value = str(read())
-                    help = "" if "n" in value else write(value)  # inf, nan
-                    break
-        else:
-            self.offset = start
-            self.fail_expecting("a value")
-        self.report(start, end, message, help)
-        return nodes.ErrorNode(self.body, start, end)
+    def read_scalar(self) -> nodes.Node:
+        """A number or word."""
+        start, word = self.offset, self.word()
+        self.offset += len(word)
+        place = self.body, start, self.offset
+        if word in ("true", "false"):
+            return nodes.BoolNode(*place, word == "true")
+        if word == "null":
+            return nodes.NullNode(*place)
+        number = _NUMBER.fullmatch(word)
+        with contextlib.suppress(ValueError):  # Python converts no more than some thousand digits
+            if number is not None:
+                is_float = number[1] or number[2]
+                return nodes.NumberNode(*place, float(word) if is_float else int(word))
+        self.offset = start
+        self.fail_expecting("a value")
 
     def read_string(self) -> nodes.StringNode:
         match = _STRING.match(self.text, self.offset)
@@ -230,26 +185,19 @@ class _Reader:
 
     def decode_escape(self, match: re.Match[str]) -> str:
         """The character that an escape stands for; a wrong one is reported."""
-        char = ""
+        escape, char = match[0], ""
         with contextlib.suppress(ValueError):
-            char = json.loads(f'"{match[0]}"')
+            char = json.loads(f'"{escape}"')
         if char and not _SURROGATE.match(char):
             return char
-        escape, word = match[0], nodes.tex_word(self.text, match.start() + 1)
+        message = f"`{escape}` is not an escape of JSON"
+        help = _backslash_help(nodes.tex_word(self.text, match.start() + 1))
         if char:
             name = f"`{escape}`" if len(escape) > 1 else f"U+{ord(char):04X}"
             message, help = f"{name} is half of a character", "write the character itself"
-        elif escape == "\t":
-            message, help = "a tab inside a string", Fix("write `\\t`, or a space", " ")
         elif len(escape) == 1:
             message = f"the control character U+{ord(escape):04X} inside a string"
             help = Fix(f"write `\\u{ord(escape):04x}`, or remove it", "")
-        elif escape != "\\u":
-            message, help = f"`{escape}` is not an escape of JSON", _backslash_help(word)
-        else:
-            message = "`\\u` is not followed by four hexadecimal digits"
-            help = "write four hexadecimal digits after `\\u`"
-            help = _backslash_help(word) if len(word) > 1 else help
         self.report(match.start(), match.end(), message, help)
         return "\ufffd"
 
@@ -263,26 +211,27 @@ class _Reader:
 
     def help_with(self, word: str, expected: str) -> str:
         """How to mend a word where something else was expected; may be empty."""
-        char, rest = word[0], self.text[self.offset + len(word) :]
-        is_letter = char.isalpha() or char == "_"
-        if char in _CURLY_QUOTES:
-            help = 'JSON knows only the straight quote `"`; replace the curly ones of this block'
-            return Fix(help, edits=self.straight_quotes(), safe=True)
-        if char in "'`":
+        if word in _CURLY_QUOTES or word in "'`":
             help = 'JSON strings stand between double quotes: `"…"`'
             return Fix(help, edits=self.straight_quotes(), safe=True)
-        if char == ";":
+        if word == ";":
             return Fix("JSON separates values by `,`", ",", safe=True)
-        if char == "(":
-            return "a list stands between `[` and `]`"
-        if expected.startswith("`,`") and (char.isalnum() or char == "\\"):
+        if word in ("//", "/*", "#"):
+            return "JSON has no comments: remove it"
+        if expected.startswith("`,`") and (word[0].isalnum() or word == "\\"):
             return 'a double quote inside a string is written `\\"`'
-        if expected == "a key in double quotes" and is_letter:
+        if expected == "a key in double quotes" and word[0].isalpha():
             return write(f'"{nodes.shorten(word)}"')
-        if expected == "a value" and is_letter:
-            is_alone = re.match(r"[ \t]*[,\]}\n]", rest)
-            return Fix("text stands between double quotes", f'"{word}"' if is_alone else None)
+        if expected == "a value" and word[0].isalpha():
+            return "text stands between double quotes; other words are `true`, `false`, `null`"
+        if expected == "a value" and word[0] in "+-.0123456789":
+            return "a number has digits on both sides of its point, and no `+` or `0` before them"
         return ""
+
+    def word(self) -> str:
+        """The word or sign that stands here; empty at the end."""
+        match = _WORD.match(self.text, self.offset)
+        return match[0] if match else ""
 
     def straight_quotes(self) -> tuple[Edit, ...]:
         """The edits that give each string from here on the quotes of JSON."""
@@ -290,24 +239,16 @@ class _Reader:
         places = (at for match in matches for at in (match.start(), match.end() - 1))
         return tuple(Edit(self.body.span(at, at + 1), '"') for at in places)
 
-    def fail_unclosed(self, opening: int) -> NoReturn:
-        end = len(self.text.rstrip())
-        notes = (Note("the block ends here", self.body.span(max(end - 1, 0), end)),)
-        self.report(opening, opening + 1, f"`{self.text[opening]}` is never closed", notes=notes)
-        raise _UnreadableError
-
     def fail_expecting(self, noun: str, *, opening: int | None = None) -> NoReturn:
         """Report that something else stands here than `noun`, and give up."""
         text, at = self.text, self.offset
         if at >= len(text):
-            if opening is not None:
-                self.fail_unclosed(opening)
-            last = max(len(text.rstrip()), 1)
-            self.report(last - 1, last, f"the JSON ends where {noun} is expected")
+            at = max(len(text.rstrip()), 1) - 1 if opening is None else opening
+            message = f"the JSON ends where {noun} is expected"
+            message = message if opening is None else f"`{text[opening]}` is never closed"
+            self.report(at, at + 1, message)
             raise _UnreadableError
-        match = _WORD.match(text, at)
-        word = match[0] if match else text[at]
-        notes: tuple[Note, ...] = ()
+        word, notes = self.word(), tuple[Note, ...]()
         if opening is not None and word in "]}:":
             place = self.body.span(opening, opening + 1)
             notes = (Note(f"`{text[opening]}` is opened here", place),)

@@ -72,10 +72,6 @@ class DateNode(_PositionedNode, eq=False):
     """A date or time of TOML. No field takes one."""
 
 
-class ErrorNode(_PositionedNode, eq=False):
-    """Stands for a value that could not be read and was reported."""
-
-
 class _Container(_PositionedNode, eq=False):
     """A value that holds others; one of TOML grows until the end of its text."""
 
@@ -138,9 +134,7 @@ class Member(Struct, frozen=True):
     value: Node
 
 
-Node: TypeAlias = (
-    ObjectNode | ArrayNode | StringNode | NumberNode | BoolNode | NullNode | DateNode | ErrorNode
-)
+Node: TypeAlias = ObjectNode | ArrayNode | StringNode | NumberNode | BoolNode | NullNode | DateNode
 
 
 _LETTERS = regex(r"[A-Za-z]+")
@@ -309,23 +303,13 @@ def type_help(node: Node, type: inspect.Type) -> str:
     raw = node.raw
     members = _union_members(type)
     kinds = {_TYPES[member.__class__][2] for member in members}
-    arrays = [member for member in members if isinstance(member, inspect.VarTupleType)]
-    item_types = (member for array in arrays for member in _union_members(array.item_type))
-    item_kinds = {_TYPES[member.__class__][2] for member in item_types}
     if isinstance(node, NullNode):
         return "leave the field out"
-    if isinstance(node, ObjectNode) and ObjectNode in item_kinds and raw.startswith("["):
-        header = node.mark.text
-        help = f"write its header with two brackets: `[{header}]`"
-        return Fix(help, f"[{header}]", safe=header.startswith("["))
     if len(raw) > _MAX_LENGTH or "\n" in raw:
         return ""
-    if isinstance(node, NumberNode | DateNode | BoolNode):
-        if kinds == {StringNode} or (StringNode in kinds and not isinstance(node, BoolNode)):
-            return Fix(f'put it between quotes: `"{raw}"`', f'"{raw}"', raw, safe=True)
-        if StringNode in item_kinds:
-            new = f'["{raw}"]'
-            return Fix(f"put it between brackets and quotes: `{new}`", new, raw, safe=True)
+    is_bare = isinstance(node, NumberNode | DateNode | BoolNode)
+    if is_bare and StringNode in kinds and (len(kinds) == 1 or not isinstance(node, BoolNode)):
+        return Fix(f'put it between quotes: `"{raw}"`', f'"{raw}"', raw, safe=True)
     if isinstance(node, StringNode):
         if NumberNode in kinds and _NUMBER.fullmatch(node.value):
             help = f"write it without quotes: `{node.value}`"
@@ -333,6 +317,4 @@ def type_help(node: Node, type: inspect.Type) -> str:
         if BoolNode in kinds and node.value.lower() in ("true", "false"):
             new = node.value.lower()
             return Fix(f"write it without quotes: `{new}`", new, raw, safe=True)
-    if any(accepts(array.item_type, node) for array in arrays):
-        return Fix(f"put it between brackets: `[{raw}]`", f"[{raw}]", raw, safe=True)
     return ""

@@ -16,7 +16,7 @@ from coursebuild.core.model.course import Words
 from coursebuild.core.syntax.fence import Fence, FenceKeys, Word
 from coursebuild.core.syntax.other_tools import is_known_kind
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose
 from coursebuild.core.text.patterns import pattern_mistake, replacements
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
@@ -94,7 +94,6 @@ def record_fence(
     if mark is not None:
         message = "a recorded output is not an illustration"
         help = f"leave `{ILLUSTRATION}` out, or write `text {ILLUSTRATION}` without a caption"
-        help = Fix(help, edits=mark.removal)
         diagnostics.append(diagnose("recording-keys", mark.span, message, help=help))
     own_words = tuple(word for word in keys.value.words if word is not mark)
     comparison = _read_comparison(FenceKeys(None, own_words), diagnostics)
@@ -208,16 +207,11 @@ def check_stray_keys(fence: Fence, state: ParsingState) -> None:
 def _read_tolerance(word: Word | None, diagnostics: list[Diagnostic]) -> Decimal | None:
     if word is None or word.value is None:
         return None
-    value, help = Decimal(word.value) if _NUMBER.fullmatch(word.value) else None, ""
-    if value is None:
-        message = f"`{word.value}` is not a number"
-    elif value < 0:
-        message = f"`{word.key}` must not be negative"
-    elif word.key == "rtol" and value >= 1:
-        message = f"`rtol` must be less than 1, not {word.value}"
-        help = "it is a share of the number; 1 would take 0 for it"
-    else:
+    value = Decimal(word.value) if _NUMBER.fullmatch(word.value) else Decimal(-1)
+    if value >= 0 and (word.key == "atol" or value < 1):
         return value
+    help = "`atol` is a number from 0 on, `rtol` a share of the recorded one from 0 to less than 1"
+    message = f"`{word.value}` is no tolerance"
     diagnostics.append(diagnose("fence-key-value", word.value_span, message, help=help))
     return None
 

@@ -15,7 +15,7 @@ import tree_sitter
 import tree_sitter_toml
 
 from coursebuild.core.syntax import nodes
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, Parsed, diagnose, write
+from coursebuild.core.text.diagnostics import Diagnostic, Fix, Parsed, diagnose
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source
 
@@ -42,8 +42,8 @@ def parse_toml(
         diagnostic = diagnose(rule, body.span(0, 0), "tables, arrays or keys are nested too deeply")
     except ValueError as error:
         start, end, message, help = _describe_mistake(body.text, str(error))
-        mistake = diagnose(rule, body.span(start, end), message, help=help)
-        diagnostic = _diagnose_repeated_key(body, str(error)) or mistake
+        rule = "field-repeated" if message == _REPEATED else rule
+        diagnostic = diagnose(rule, body.span(start, end), message, help=help)
     return Parsed(None, (diagnostic,))
 
 
@@ -52,28 +52,8 @@ def toml_string(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _diagnose_repeated_key(body: Excerpt, message: str) -> Diagnostic | None:
-    if not message.startswith(("Cannot", "Duplicate")):
-        return None
-    end = body.text.find("\n", error_offset(body.text, message))
-    reader = _Reader(body.slice(0, end if end >= 0 else len(body.text)))
-    if reader.root.has_error:
-        return None
-    reader.read_document()
-    if reader.repetition is None:
-        return None
-    key, first = reader.repetition
-    notes = (Note("the first one is here", first.span),)
-    message = f"`{key.value}` is given twice"
-    spans = (first.span, key.span)
-    first_header, header = (span.source.line_text(span.line).strip() for span in spans)
-    is_array = first_header.startswith("[") and re.match(r"\[[^\[]+\.", header)
-    help = f"if there are several, write each header with two brackets: `[{header}]`"
-    return diagnose("field-repeated", key.span, message, notes=notes, help=help if is_array else "")
-
-
 class _Reader:
-    """Makes nodes of the syntax tree of a text that is TOML, except that keys may be repeated."""
+    """Makes nodes of the syntax tree of a text that is TOML."""
 
     def __init__(self, body: Excerpt) -> None:
         self.body = body
@@ -82,8 +62,6 @@ class _Reader:
         # these, offsets in the tree are offsets in the text.
         plain = _NOT_ASCII.sub("x", body.text).encode()
         self.root = tree_sitter.Parser(_LANGUAGE).parse(plain).root_node
-        self.repetition: tuple[nodes.StringNode, nodes.StringNode] | None = None
-        """The key that the last statement repeats, and its first occurrence."""
         self.diagnostics: list[Diagnostic] = []
 
     def read_document(self) -> nodes.ObjectNode:
@@ -106,7 +84,6 @@ class _Reader:
         opening = (start, end)
         if pairs:
             end = pairs[-1].named_children[1].end_byte
-        self.repetition = None
         *outer, last = self.read_key_path(name)
         parent = self.open_table(root, outer, end)
         table = nodes.ObjectNode(self.body, start, end, opening, {})
@@ -124,7 +101,6 @@ class _Reader:
     def read_pair(self, table: nodes.ObjectNode, pair: tree_sitter.Node) -> None:
         """Read `key = value` in a table."""
         name, value_node = pair.named_children[:2]
-        self.repetition = None
         value = self.read_value(value_node)
         *outer, last = self.read_key_path(name)
         self.add(self.open_table(table, outer, value.end), last, value)
@@ -144,11 +120,8 @@ class _Reader:
         return table
 
     def add(self, table: nodes.ObjectNode, key: nodes.StringNode, value: nodes.Node) -> nodes.Node:
-        """Give a key its value; return that which it has, another one if the key is repeated."""
-        member = table.members.setdefault(key.value, nodes.Member(key, value))
-        if member.key is not key:
-            self.repetition = (key, member.key)
-        return member.value
+        """Give a key its value, unless it has one above; return that which it has."""
+        return table.members.setdefault(key.value, nodes.Member(key, value)).value
 
     # ------------------------------------------------------------------------------------ values
 
@@ -207,17 +180,13 @@ def _value_of(text: str) -> Any:
 
 
 _PLACE = regex(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
-_TOKEN = regex(
-    r'#[^\n]*|"""(?:[^\\]|\\.)*?"{3,5}|' + r"'''.*?'{3,5}|"
-    r'"(?!"")(?:[^"\\\n]|\\[^\n])*"|' + r"'(?!'')[^'\n]*'|[\[\]{}\"']",
-    re.DOTALL,
-)
 _SCALAR = regex(r"[^\n,\]}#]*")
 _WORD = regex(r"[\w.+-]+|\S")
 _CURLY_QUOTES = tuple("“”„‟‘’‚‛«»")
-_BOOLEANS = {"True": "true", "TRUE": "true", "False": "false", "FALSE": "false"}
-_NULLS = frozenset(("null", "None", "nil", "Null", "NULL"))
+_REPEATED = "this is given twice"
 _QUOTES_HELP = "TOML knows only the straight quotes `\"` and `'`"
+_WORDS_HELP = "the only words without quotes are `true` and `false`"
+_NUMBERS_HELP = "a number has no leading zeros, and digits on both sides of its point"
 
 
 def error_offset(text: str, message: str) -> int:
@@ -241,62 +210,35 @@ _Mistake = tuple[int, int, str, str]
 
 def _describe_mistake(text: str, message: str) -> _Mistake:
     at = error_offset(text, message)
-    char, words = text[at : at + 1], _PLACE.sub("", message)
+    char, words = text[at : at + 1], _PLACE.sub("", message).replace("'", "`")
     if odd := "a lone carriage return" if char == "\r" else nodes.odd_character(char):
         help: str = Fix("replace it by a plain space, or remove it", " ", safe=char != "\r")
-        if at == 0:
-            encoding = "save the file as UTF-8 without a byte order mark"
-            help = Fix(encoding if char == "\ufeff" else "remove it", "", safe=True)
+        help = help if at else Fix("remove it", "", safe=True)
         return at, at + 1, f"{odd} is not allowed here in TOML", help
-    opening = _innermost_opening(text, at)
-    bracket = text[opening] if opening is not None else ""
-    if opening is not None and bracket in "\"'":
-        quote = text[opening]
-        if text.startswith(quote * 3, opening):
-            return opening, opening + 3, f"`{quote * 3}` is never closed", ""
-        end = opening + len(text[opening:].split("\n", 1)[0])
-        help = f"close it with `{quote}`; text of several lines stands between three quotes"
-        return opening, end, "the string is not closed on its line", help
+    if words.startswith(("Cannot", "Duplicate")):
+        start = text.rfind("\n", 0, at) + 1
+        line = text[start:].split("\n", 1)[0]
+        help = "if there are several, each header has two brackets, as in `[[level]]`"
+        return start, start + len(line), _REPEATED, help if line.startswith("[") else ""
+    if words.startswith("Illegal") and char == "\n":
+        help = "text of several lines stands between three quotes"
+        return at, at, "the string is not closed on its line", help
     if re.match("Unescaped|Escaped|Invalid hex", words):
         start = text.rindex("\\", 0, at)
         help = double_backslash(nodes.tex_word(text, start + 1))
         return start, start + 2, f"`{text[start : start + 2]}` is not an escape of TOML", help
-    if opening is not None and at >= len(text):
-        return opening, opening + 1, f"`{bracket}` is never closed", ""
-    if opening is not None and bracket == "{" and char == "\n":
-        help = "a longer table has a `[header]` of its own"
-        return opening, opening + 1, "a table in braces stands on one line", help
+    before = re.search(r"[\w.+:-]*\Z", text[:at])
+    is_inside = before is not None and before[0] and char.strip(",#") and not char.isspace()
     if words.startswith(("Invalid value", "Invalid date")):
         return _wrong_value(text, at)
-    if words.startswith(("Expected newline", "Unclosed")):
-        closer = "]" if words == "Unclosed array" else "}" if bracket else ""
-        before = re.search(r"[\w.+:-]*\Z", text[:at])
-        if before and before[0] and not text[at].isspace() and text[at] not in ",#":
-            return _wrong_value(text, before.start())
-        noun, help = "the end of the line", "each `key = value` stands on a line of its own"
-        if closer:
-            noun, help = f"`,` or `{closer}`", "values in brackets have commas between them"
-        return _expected_instead(text, at, noun, help)
+    if before is not None and is_inside and words.startswith(("Expected newline", "Unclosed")):
+        return _wrong_value(text, before.start())
     help = Fix("TOML writes `key = value`", " =", safe=True) if char == ":" else ""
     help = _QUOTES_HELP if char in _CURLY_QUOTES else help
-    if words.startswith("Invalid"):
-        return _expected_instead(text, at, "a key", help)
-    if words.startswith("Expected "):
-        return _expected_instead(text, at, words.removeprefix("Expected ").replace("'", "`"), help)
-    return at, at, words[:1].lower() + words[1:], help
-
-
-def _innermost_opening(text: str, at: int) -> int | None:
-    """The offset of the innermost bracket open at `at`, or of a quote that is never closed."""
-    openings: list[int] = []
-    for token in _TOKEN.finditer(text):
-        if token.start() >= at:
-            break
-        if token[0] in ("[", "{", '"', "'"):
-            openings.append(token.start())
-        elif token[0] in ("]", "}") and openings:
-            openings.pop()
-    return openings[-1] if openings else None
+    help = "values in brackets have commas between them" if words[:8] == "Unclosed" else help
+    word = _WORD.match(text, at)
+    end, name = (at, "the end of the line") if word is None else (word.end(), f"`{word[0]}`")
+    return at, end, f"{words[:1].lower()}{words[1:]}, found {name}", help
 
 
 def _wrong_value(text: str, start: int) -> _Mistake:
@@ -305,22 +247,14 @@ def _wrong_value(text: str, start: int) -> _Mistake:
     if not value:
         return start, start, "a value is missing", 'an empty text is written `""`'
     help = ""
-    if value in _BOOLEANS:
-        help = write(_BOOLEANS[value])
-    elif value in _NULLS:
-        help = "TOML has no such value; leave the field out"
+    if value.lower() in ("true", "false", "null", "none", "nil"):
+        help = _WORDS_HELP
     elif value[0] in _CURLY_QUOTES:
         help = _QUOTES_HELP
     elif re.fullmatch(r"[+-]?[0-9]*\.?[0-9]*", value):
-        help = "a number has no leading zeros, and digits on both sides of its point"
+        help = _NUMBERS_HELP
     elif '"' not in value and "'" not in value:
         new = None if "\\" in value or "#" in value else f'"{value}"'
         help = Fix(f'text needs quotes: `"{nodes.shorten(value)}"`', new, safe=True)
     message = f"`{nodes.shorten(value)}` is not a valid TOML value"
     return start, start + len(value), message, help
-
-
-def _expected_instead(text: str, at: int, noun: str, help: str) -> _Mistake:
-    word = _WORD.match(text, at)
-    quotation = f"`{nodes.shorten(word[0])}`" if word else "the end of the line"
-    return at, word.end() if word else at, f"expected {noun}, found {quotation}", help

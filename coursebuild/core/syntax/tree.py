@@ -20,7 +20,7 @@ from coursebuild.core.syntax.attributes import (
 from coursebuild.core.syntax.block_parser import TOO_DEEP, References, block_tokens
 from coursebuild.core.syntax.callouts import read_head
 from coursebuild.core.syntax.code_blocks import read_block
-from coursebuild.core.syntax.fence import read_fence
+from coursebuild.core.syntax.fence import read_fence, with_line_end
 from coursebuild.core.syntax.html import Balance, find_forbidden, find_media, tags
 from coursebuild.core.syntax.inline_tree import read_inlines
 from coursebuild.core.syntax.parsing_state import FootnoteText, ParsingState, T
@@ -229,16 +229,6 @@ class TextReader:
         state.anchors.take(id.text[1:], id.span())
         return model.Heading(span, level, children, id.text[1:], True, classes)
 
-    def _read_fence(self, token: PositionedToken) -> model.Block:
-        fence = read_fence(token, self.base, nested=self.nested)
-        return read_block(fence, self.state, self.texts)
-
-    def _read_code(self, token: PositionedToken) -> model.CodeBlock:
-        code = token.text
-        return model.CodeBlock(
-            self.span(token), "", "", Excerpt(code.source, code.text + "\n", code.pieces)
-        )
-
     def _read_html(self, token: PositionedToken) -> model.HtmlBlock | model.HtmlFlow:
         """Raw HTML, read as inlines if it holds formulas or is nested."""
         html = token.text
@@ -284,19 +274,16 @@ class TextReader:
                 kind, place, folded = head.value.kind, head.value.kind_span, head.value.folded
                 heading, braces = split_label(head.value.title)
                 title, rest = self.inlines(heading), head.value.rest
-                label = self._take_callout_label(braces)
+                label = None if self.nested else self.state.take_callout_label(braces)
+                if braces is not None and self.nested:
+                    message = "a callout in a text of a quiz or lab has no label"
+                    help = "label callouts of the lesson's text"
+                    self.state.reject_label(braces, message, help)
                 first_token.text = rest  # and what is below its head is a paragraph as any
                 self.index += 0 if rest.text else 3
                 blocks = self._read_blocks("blockquote_close")
                 return model.Callout(span, kind, place, title, folded, blocks, label=label)
         return model.BlockQuote(span, self._read_blocks("blockquote_close"))
-
-    def _take_callout_label(self, braces: Excerpt | None) -> model.Label | None:
-        if braces is not None and self.nested:
-            message = "a callout in a text of a quiz or lab has no label"
-            self.state.reject_label(braces, message, "label callouts of the lesson's text")
-            return None
-        return self.state.take_callout_label(braces)
 
     def _read_list(self, token: PositionedToken) -> model.ListBlock:
         ordered = token.type == "ordered_list_open"
@@ -355,8 +342,12 @@ _READERS: dict[
 ] = {
     "paragraph_open": TextReader._read_paragraph,
     "heading_open": TextReader._read_heading,
-    "fence": TextReader._read_fence,
-    "code_block": TextReader._read_code,
+    "fence": lambda reader, token: read_block(
+        read_fence(token, reader.base, nested=reader.nested), reader.state, reader.texts
+    ),
+    "code_block": lambda reader, token: model.CodeBlock(
+        reader.span(token), "", "", with_line_end(token.text)
+    ),
     "html_block": TextReader._read_html,
     "hr": lambda reader, token: model.ThematicBreak(reader.span(token)),
     "math_block": TextReader._read_math,

@@ -61,7 +61,6 @@ COMMON = tuple(
     """.split()
 )
 """Those that are proposed for what is no unit."""
-_PRODUCT_UNITS = ("kg", "N", "J", "W", "A", "V", "K", "m", "s")
 
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻−", "0123456789--")
 _WORD = r"(?:°[ \u00a0\u202f]?[CF](?![^\W\d_])|[^\W\d_⁰¹²³⁴-⁹]+|[°%‰′″])"
@@ -77,7 +76,7 @@ _TOKEN = (
 """Compiled when it is needed, as few pages do: it takes longer than the table."""
 _TWO_UNITS = (
     rf"(?<![^\W\d_])(?:m(?=[^\W\d_m]{_POWER})"
-    rf"|(?:kg|[kMGmµμunp]?(?:Pa|[NWVAJ]))(?=(?:[mc]?m|s|h|K|A)(?![^\W\d_])))"
+    rf"|(?:kg|[kMGmµμunp]?(?:Pa|[NWVAJ]))(?=(?:[mc]?m|s|h|K|A)(?![^\W\d_²³⁻¹⁴-⁹])))"
     rf"|(?<=[^\W\d_]){_POWER}(?=[^\W\d_])"
 )
 """After what a space may be missing: `ms⁻¹`, `kgm²`, `mPas`, `W/m2K`."""
@@ -370,6 +369,8 @@ def is_name(word: str) -> bool:
 def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
     """Yield what is wrong with a unit, which may be empty."""
     text = _with_signs(" ".join(unit.text.split()))
+    if find_units(text):
+        return
     if len(text) > _LONGEST or not _parse(text or "1", find=lambda word: (ONE,)):
         message = f"`{text}` cannot be read as a unit"
         help = "write it as in `kg m^2`, `m/s²` or `N m/rad`"
@@ -379,12 +380,8 @@ def check_unit(unit: Excerpt) -> Iterator[Diagnostic]:
         word = match[0]
         if find_symbol(word) or word in (*UNITS, *NAMES, *PER):
             continue
-        units = (unit for unit in COMMON if unit.casefold() == word.casefold())
-        pairs = ((first, word.removeprefix(first)) for first in _PRODUCT_UNITS)
-        products = (f"{a} {b}" for a, b in pairs if b != word and b in _PRODUCT_UNITS)
-        likely = next(units, None) or next(products, None) or nearest(word, (*COMMON, *NAMES))
         help = "leave it out, and name in words what is counted"
-        if likely is not None:
+        if (likely := nearest(word, (*COMMON, *NAMES))) is not None:
             likely = NAMES.get(likely, likely)
             help = Fix(f"did you mean `{likely}`?", likely)
         message = f"there is no unit `{word}`"

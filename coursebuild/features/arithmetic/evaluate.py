@@ -244,8 +244,15 @@ class _Evaluator:
                 if len(expression.text) > _MAX_DIGITS:
                     raise OverflowError
                 return PhysicalQuantity(Real.of(expression.text))
+            case "symbol" if expression.text in CONSTANTS:
+                return PhysicalQuantity(PI if expression.text == r"\pi" else E)
+            case "symbol" if expression.text == r"\infty":
+                raise expression.not_understood("nothing is computed up to infinity")
             case "symbol":
-                return _evaluate_constant(expression)
+                reason = (
+                    f"no lesson says what `{expression.text}` is, or several differ in its unit"
+                )
+                raise expression.not_understood(reason)
             case "unit":
                 unit = find_reading(expression, self.readings)
                 return PhysicalQuantity(measure(unit), unit.dimension)
@@ -265,8 +272,13 @@ class _Evaluator:
             case "abs":
                 (inner,) = map(self.evaluate, expression.parts)
                 return PhysicalQuantity(inner.value.abs(self.analytic), inner.dimension)
+            case "derivative" if self.has_calculus:
+                body, variable = expression.parts
+                return self.evaluate(differentiate(body, variable.text))
             case "derivative":
-                return self._evaluate_derivative(expression)
+                quantity, point = map(self.evaluate, expression.parts)
+                dimension = multiply(quantity.dimension, point.dimension, -1)
+                return replace(quantity, dimension=dimension)
             case "integral":
                 return self._evaluate_integral(expression)
             case "sum" | "prod":
@@ -274,7 +286,14 @@ class _Evaluator:
             case "index":
                 raise expression.not_understood("the dimension may differ from term to term")
             case "factorial" | "binom":
-                return PhysicalQuantity(self._count(expression))
+                wholes = [number.whole for number in self._numbers(expression)]
+                counts = [whole for whole in wholes if whole is not None and whole >= 0]
+                if len(counts) < len(wholes):
+                    raise expression.not_understood("it is of whole numbers only")
+                if max(counts) > _MAX_COUNT:
+                    raise OverflowError
+                count = math.factorial(*counts) if len(counts) == 1 else math.comb(*counts)
+                return PhysicalQuantity(Real.of(count))
             case name:
                 (argument,) = self._numbers(expression)
                 return PhysicalQuantity(apply(name, argument, self.analytic))
@@ -292,16 +311,6 @@ class _Evaluator:
                 reason = f"{function} is of {words}, and not of a number"
                 raise WrongDimensions(reason, expression.start, expression.end)
         return [argument.value for argument in arguments]
-
-    def _count(self, expression: Expression) -> Real:
-        """Return the factorial of a number, or the binomial of two."""
-        counts = [number.whole for number in self._numbers(expression)]
-        numbers = [count for count in counts if count is not None and count >= 0]
-        if len(numbers) < len(counts):
-            raise expression.not_understood("it is of whole numbers only")
-        if max(numbers) > _MAX_COUNT:
-            raise OverflowError
-        return Real.of(math.factorial(*numbers) if len(numbers) == 1 else math.comb(*numbers))
 
     def _evaluate_series(self, expression: Expression) -> PhysicalQuantity:
         """Return a sum or a product of terms."""
@@ -367,18 +376,8 @@ class _Evaluator:
             dimension = multiply((), base.dimension, rational)
         return PhysicalQuantity(base.value.raise_to(exponent.value, self.analytic), dimension)
 
-    def _evaluate_derivative(self, expression: Expression) -> PhysicalQuantity:
-        body, variable = expression.parts
-        if not self.has_calculus:
-            quantity, point = self.evaluate(body), self.evaluate(variable)
-            dimension = multiply(quantity.dimension, point.dimension, -1)
-            return replace(quantity, dimension=dimension)
-        return self.evaluate(differentiate(body, variable.text))
-
     def _evaluate_integral(self, expression: Expression) -> PhysicalQuantity:
         body, variable, *ends = expression.parts
-        if not ends:
-            raise expression.not_understood("it is not a number")
         point = self.evaluate(variable)
         limits = [self.evaluate(end).value for end in ends]
         inside = limits[0] + (limits[1] - limits[0]) * Real.of("0.382")
@@ -395,15 +394,6 @@ class _Evaluator:
             return inner.evaluate(body).value
 
         return PhysicalQuantity(integrate(integrand, *limits), dimension)
-
-
-def _evaluate_constant(expression: Expression) -> PhysicalQuantity:
-    if expression.text == r"\infty":
-        raise expression.not_understood("nothing is computed up to infinity")
-    if expression.text not in CONSTANTS:
-        reason = f"no lesson says what `{expression.text}` is, or several differ in its unit"
-        raise expression.not_understood(reason)
-    return PhysicalQuantity(PI if expression.text == r"\pi" else E)
 
 
 def measure(unit: Unit) -> Real:

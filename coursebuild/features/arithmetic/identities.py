@@ -5,8 +5,7 @@ Entry points: `read_domain(text)`, of `x > 0, 0 \le y < 1`; `check_identity(tex,
 Both sides are computed at the same points, with dimensions: whole numbers, tiny and large ones, of
 both signs where the domain has them. Points where a side is no real number do not count. If the
 balls of both sides have no number in common, the identity is refuted, and the point is told. If
-they agree at all points, it was tried, and not proven. Where one side is an integral without
-limits, its integrand is compared with the derivative of the other side.
+they agree at all points, it was tried, and not proven.
 """
 
 from __future__ import annotations
@@ -131,8 +130,6 @@ def _try_identity(
     Raises:
         NotUnderstood: they differ, or there are too few points where they can be compared.
     """
-    left, right = _without_integral(left, right)
-    right, left = _without_integral(right, left)
     parts = [*left.walk(), *right.walk()]
     for condition in domain.conditions():
         parts += [*condition[0].walk(), *condition[2].walk()]
@@ -154,7 +151,17 @@ def _try_identity(
             if not domain.contains(values):
                 continue
             if key not in agreements:
-                _compare_at(left, right, values)
+                lhs, rhs = (evaluate(side, values) for side in (left, right))
+                if conflict := find_conflict(lhs, rhs):
+                    raise WrongDimensions(conflict, right.start, right.end)
+                difference = lhs.value - rhs.value
+                if difference.sign():
+                    texts = ", ".join(f"{name} = {x.value:.6g}" for name, x in values.items())
+                    numbers = " and ".join(_format_apart(lhs.value, rhs.value))
+                    reason = f"the sides are {numbers} where {texts}"
+                    raise _Refuted(reason, right.start, right.end)
+                if not difference.is_negligible(lhs.value, rhs.value):
+                    raise right.not_understood(UNDECIDED)
                 agreements.add(key)
             count += 1
         except NotUnderstood as error:
@@ -169,26 +176,6 @@ def _try_identity(
         reason = f"it can be tried at {count} points only: elsewhere {skip.reason}"
         raise NotUnderstood(reason, skip.start, skip.end)
     raise skip
-
-
-def _compare_at(
-    left: Expression, right: Expression, values: Mapping[str, PhysicalQuantity]
-) -> None:
-    """Compare two sides at a point.
-
-    Raises:
-        NotUnderstood: they differ, or one is not known, or not closely enough to agree.
-    """
-    lhs, rhs = (evaluate(side, values) for side in (left, right))
-    if conflict := find_conflict(lhs, rhs):
-        raise WrongDimensions(conflict, right.start, right.end)
-    difference = lhs.value - rhs.value
-    if difference.sign():
-        points = ", ".join(f"{name} = {x.value:.6g}" for name, x in values.items())
-        sides = " and ".join(_format_apart(lhs.value, rhs.value))
-        raise _Refuted(f"the sides are {sides} where {points}", right.start, right.end)
-    if not difference.is_negligible(lhs.value, rhs.value):
-        raise right.not_understood(UNDECIDED)
 
 
 def _format_apart(left: Real, right: Real) -> tuple[str, str]:
@@ -229,12 +216,3 @@ _SIZES = (
     lambda generator: Fraction(generator.randint(10, 99) * 10 ** generator.randint(1, 5), 7),
 )
 """Numbers of the size of one, whole ones, tiny ones and large ones."""
-
-
-def _without_integral(side: Expression, opposite: Expression) -> tuple[Expression, Expression]:
-    """Differentiate both sides, if the first is an integral without limits."""
-    if side.kind != "integral" or len(side.parts) > 2:
-        return side, opposite
-    integrand, variable = side.parts
-    derivative = Expression("derivative", opposite.start, opposite.end, (opposite, variable))
-    return integrand, derivative

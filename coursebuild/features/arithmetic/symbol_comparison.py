@@ -116,15 +116,18 @@ class SymbolComparison:
                 raise
             raise NotJudged from None
         has_calculus = any(e.has("derivative", "integral") for e in self.expressions)
-        bare = self._bare_side()
+        # A side of numbers alone may have left out its unit.
+        pairs = enumerate(zip(self.sides, self.expressions, strict=True))
+        bare = next((i for i, (s, e) in pairs if s.is_numeric and not e.has("unit")), None)
         dimensions = [quantity.dimension for quantity in quantities]
         if bare is not None:
             base = dimensions[1 - bare]
             is_foreign = self.unit is not None and self.unit.dimension != base
             dimensions[bare] = self.unit.dimension if self.unit and is_foreign else base
         if dimensions[0] != dimensions[1] and not has_zero(*quantities):
-            if self._is_of_zeros():
-                raise NotJudged
+            zeros = (side.tex[side.start : side.end].strip(r" .,;~\!") for side in self.chain.sides)
+            if {*self.chain.relations} == {"="} and "0" in zeros:
+                raise NotJudged  # all of them are zero, as in `\dot x = x = 0`
             if bare is None:
                 self._pass_hidden_unit()
             message = " is held against ".join(map(describe_dimension, dimensions))
@@ -160,11 +163,6 @@ class SymbolComparison:
         whole = (side for side, e in pairs if e.kind == "symbol" or read_numeral(e))
         units = self._units(*whole)
         return {"angle", "cycle"} <= {name for unit in units for name, _ in unit.powers}
-
-    def _is_of_zeros(self) -> bool:
-        r"""Whether the chain says that all its sides are zero: `\dot x = x = 0`."""
-        zeros = (side.tex[side.start : side.end].strip(r" .,;~\!") for side in self.chain.sides)
-        return {*self.chain.relations} == {"="} and "0" in zeros
 
     def _pass_hidden_unit(self) -> None:
         """Raise unless units that do not fit are a mistake for sure."""
@@ -213,13 +211,6 @@ class SymbolComparison:
                     raise
         raise NotJudged
 
-    def _bare_side(self) -> int | None:
-        """Return the index of a side of numbers alone, which may have left out its unit."""
-        pairs = zip(self.sides, self.expressions, strict=True)
-        return next(
-            (i for i, (s, e) in enumerate(pairs) if s.is_numeric and not e.has("unit")), None
-        )
-
     def _compare_values(
         self, values: Sequence[Real], bare: int | None, dimensions: Sequence[Dimension]
     ) -> FormulaComparison | None:
@@ -235,7 +226,13 @@ class SymbolComparison:
         for size in sizes:
             scaled = [v * size if i == bare else v for i, v in enumerate(values)]
             if not numerals:
-                if self._is_within_rounding(bare, size):
+                # They may agree where each value is rounded to half a unit of its place.
+                rounded = [quantity.value for quantity in self._evaluate(is_rounded=True)]
+                left, right = (v * size if i == bare else v for i, v in enumerate(rounded))
+                sign = (left - right).sign()
+                if sign is None and all(symbol.step is None for symbol in self.known.values()):
+                    raise self.expressions[1].not_understood(UNDECIDED)
+                if not sign:
                     return None
                 numbers = " and ".join(f"{value:.10g}" for value in scaled)
                 mistakes.append(self._mistake(1, f"{numbers} are not the same"))
@@ -286,15 +283,6 @@ class SymbolComparison:
             return None
         size = measure(symbol.unit) if symbol.unit is not None else ONE
         return Numeral(symbol.value, symbol.step, False, 6, size)
-
-    def _is_within_rounding(self, bare: int | None, size: Real) -> bool:
-        """Whether two sides may agree where each value is rounded to half a unit of its place."""
-        sides = [quantity.value for quantity in self._evaluate(is_rounded=True)]
-        left, right = (v * size if i == bare else v for i, v in enumerate(sides))
-        sign = (left - right).sign()
-        if sign is None and all(symbol.step is None for symbol in self.known.values()):
-            raise self.expressions[1].not_understood(UNDECIDED)
-        return not sign
 
 
 def agrees(

@@ -65,7 +65,7 @@ def _first_places(texts: Iterable[Excerpt | Source], tag: str, attribute: str) -
     places: dict[str, Span] = {}
     for text in texts:
         for element in read_tags(text.text):
-            for name, _, value, place in element.attributes:
+            for name, value, place in element.attributes:
                 if (element.name, name) == (tag, attribute):
                     places.setdefault(value, text.span(*place))
     return places

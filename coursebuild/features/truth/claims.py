@@ -8,8 +8,8 @@ neither a script, a formula nor a source gives.
    or names as a word does; a year; what only looks like a number (versions, dates, `x1`).
 2. Headings, footnotes (which name sources), code, addresses, links to lessons, pages and models,
    recorded outputs and the texts of quizzes and labs have no claims but those with a source.
-3. In formulas a side that is a number is one claim, and so is a side with symbols in which a number
-   has a point. A chain whose arithmetic was checked has none, and its numbers are inputs.
+3. In formulas a side that is a number is one claim, but for a digit without a unit. A chain whose
+   arithmetic was checked has none, and its numbers are inputs.
 4. A number in an alternative text, where nothing can be marked, is a claim unless the same number
    is bound or given in the document.
 5. A source that is a part of the course must have the number: in the unit of the text or in base
@@ -21,7 +21,6 @@ neither a script, a formula nor a source gives.
 
 from __future__ import annotations
 
-import re
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -56,9 +55,8 @@ _YEARS = range(1600, 2100)
 _OTHER = "\ufffc"
 """Stands for code, a formula or a link behind a text: `in` is no unit before one."""
 _FACTORS = regex(r"(?:\s*×\s*[\d.]+)*")
-_DECIMAL = regex(r"\d\.\d")
 _MAY_CLAIM = regex(r"\d\.?\d|\d(?:\\[ ,;]|[\s~])*(?:\\(?:mathrm|text|%)|\^?\{?\\circ|°)")
-"""Every formula with claims matches this."""
+"""Two digits, or one with a unit."""
 _DIGIT = regex("[0-9]")
 _VECTOR = regex(r"\s*[(\[](?:[-+\d.,;\s]|\\[,;: ])+[)\]]\s*")
 
@@ -311,9 +309,8 @@ class _Counter:
                 numbers = scan_prose(tex.text[first.start : last.end])
                 self.inputs |= {float(number.value) for number in numbers if number.is_finite}
                 continue
-            for side in statement.sides:
-                is_numeral = source is not None and side.is_numeric
-                if is_numeral or _is_claim(side, tex.text):
+            for side in filter(lambda side: side.is_numeric, statement.sides):
+                if source is not None or _MAY_CLAIM.search(tex.text, side.start, side.end):
                     claims += _side_claims(side, tex, self.comma)
         bound = [number.text_span for number in formula.numbers]
         claims = [c for c in claims if not any(map(c.span.contains, bound))]
@@ -390,20 +387,3 @@ def _side_claims(side: FormulaSide, tex: Excerpt, comma: bool) -> Iterator[State
     step, size = float(numeral.step), float(numeral.unit_size)
     values = ((float(numeral.express(numeral.value)), step / size), (float(numeral.value), step))
     yield StatedNumber(place, place.text, values)
-
-
-def _is_claim(side: FormulaSide, tex: str) -> bool:
-    if not side.is_numeric and "." not in tex[side.start : side.end]:
-        return False
-    if not isinstance(side.expression, Expression):
-        part = tex[side.start : side.end]
-        wholes = map(int, re.findall("[0-9]+", part)) if side.is_numeric else ()
-        return _DECIMAL.search(part) is not None or any(whole > _COUNTS for whole in wholes)
-    parts = tuple(side.expression.walk())
-    numbers = [part.text for part in parts if part.kind == "number"]
-    if any("." in number for number in numbers):
-        return True
-    units = any(part.kind == "unit" and find_unit(part.text) is not None for part in parts)
-    powers = any(part.kind == "^" and part.parts[0].text == "10" for part in parts)
-    large = any(int(number) > _COUNTS for number in numbers)
-    return bool(side.is_numeric and numbers and (units or powers or large))

@@ -15,7 +15,7 @@ from PIL import Image
 from coursebuild.core.engine.store import Store
 from coursebuild.core.files.errors import EffectError, LackError
 from coursebuild.core.model import Limits
-from coursebuild.core.model.results import CompileResult, Misspelling, ModelFacts
+from coursebuild.core.model.results import CompileResult, ModelFacts
 from coursebuild.core.run import mjcf
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.mjcf import TEXT_PATH, compile_all, model_files, readable_error
@@ -254,30 +254,6 @@ def test_files_that_include_each_other_in_many_ways_are_read_once(root: Path) ->
         file.write_text("<mujoco>" + 2 * f'<include file="f{i + 1}.xml"/>' + "</mujoco>")
     files = {f"models/f{i}.xml" for i in range(1, 31)}
     assert {*model_files(root, "models/f0.xml", (root / "models/f0.xml").read_text())} == files
-
-
-def test_likely_names_are_those_with_which_the_compiler_gets_further(root: Path) -> None:
-    likely = MISTAKES["likely"]
-    results = texts(root, [f"<mujoco>{text}</mujoco>" for text in likely])
-    for (text, (word, *candidates)), result in zip(likely.items(), results, strict=True):
-        assert result.misspelling is not None, text
-        assert (result.misspelling.word, [*result.misspelling.candidates]) == (word, candidates)
-    unlikely = [f"<mujoco>{text}</mujoco>" for text in MISTAKES["unlikely"]["models"]]
-    assert all(result.error and result.misspelling is None for result in texts(root, unlikely))
-
-
-def test_a_name_may_be_misspelt_in_a_file_that_is_included(root: Path) -> None:
-    part = "<mujoco><worldbody>\n<body>\n<gom size='1'/></body></worldbody></mujoco>"
-    (root / "models/part.xml").write_text(part)
-    (result,) = texts(root, ["<mujoco>\n\n\n<include file='part.xml'/></mujoco>"])
-    at = part.index("gom")
-    assert result.misspelling == Misspelling("models/part.xml", ((at, at + 3),), "gom", ("geom",))
-
-
-def test_no_device_is_read_for_a_likely_name(root: Path) -> None:
-    os.mkfifo(root / "models/pipe.xml")
-    (result,) = texts(root, ["<mujoco><includ file='pipe.xml'/></mujoco>"])
-    assert "unrecognized element" in result.error
 
 
 def test_a_compiler_that_crashes_or_cannot_be_loaded(

@@ -149,18 +149,6 @@ def test_a_unit_that_is_not_printed_holds_beside_numbers_with_units() -> None:
         assert find_mistake(f"`{binding}`{{out}}", printed) is not None, binding
 
 
-def test_a_decimal_comma_is_named() -> None:
-    mistake = find_mistake("`6,64`{out}")
-    assert mistake is not None
-    assert (mistake.message.partition(",")[2], mistake.help) == (
-        "64` has a comma where outputs have a decimal point",
-        "write `6.64`",
-    )
-    mistake = find_mistake("`0.0138, 0.0169`{out}")
-    assert mistake is not None
-    assert "two numbers" not in mistake.message
-
-
 def test_the_nearest_output_above_counts() -> None:
     text = (
         script() + output("x 1.5\n") + "\n`1.5`{out} `2.5`{out}\n\n" + output("x 2.5\n")

@@ -295,28 +295,24 @@ def test_notes_point_at_the_first_key_and_at_the_bracket() -> None:
         for diagnostics in (
             parse('{"a": 1,\n "a": 2}').diagnostics,
             parse('{"a":\n [1}').diagnostics,
-            read_toml("[a]\nb = 1\nb = 2\n")[1],
         )
         for note in diagnostics[0].notes
     ]
     assert notes == [
         ("`a` is given twice", "the first one is here", (1, 2)),
         ("expected `,` or `]`, found `}`", "`[` is opened here", (2, 2)),
-        ("`b` is given twice", "the first one is here", (2, 1)),
     ]
 
 
-def test_deep_nesting_and_long_numbers_are_reported() -> None:
+def test_deep_nesting_is_reported() -> None:
     diagnostics = [
         *parse("[" * 100_000).diagnostics,
         *parse('{"a":' * 100_000).diagnostics,
-        *parse("[" + "9" * 5000 + "]").diagnostics,
         *read_toml("a = " + "[" * 9_999)[1],
     ]
     assert [(d.span.start, d.message) for d in diagnostics] == [
         (64, DEEP),
         (320, DEEP),
-        (1, "a number of 5000 digits is too long"),
         (0, "tables, arrays or keys are nested too deeply"),
     ]
 

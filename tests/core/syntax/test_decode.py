@@ -118,8 +118,7 @@ def test_toml_has_other_nouns() -> None:
         "1:8-18 field-type: `name` must be a string, not a date or time"
         ' [put it between quotes: `"2024-01-01"`]',
         "2:9-10 field-type: `shape` must be a table, not the number 3",
-        "3:1-8 field-type: `parts` must be an array of tables, not a table"
-        " [write its header with two brackets: `[[parts]]`]",
+        "3:1-8 field-type: `parts` must be an array of tables, not a table",
     ]
 
 
