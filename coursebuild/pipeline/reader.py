@@ -121,6 +121,8 @@ class Reader:
 
     def close(self) -> None:
         """End the workers, which frees their memory with the documents that they have read."""
+        if self._engine is not None:
+            self._engine.close()
         if self._workers is not None:
             self._workers.close()
             self._workers = None
@@ -379,6 +381,8 @@ class Reader:
         requests = chain(first, requests)
         is_worth_it = len(first) >= _MIN_PARALLEL and self._jobs > 1
         # Before the stage begins, which may start a thread: a fork does not copy threads.
+        if self._engine is not None:
+            self._engine.close()
         if self._workers is None and is_worth_it and can_fork():
             count = min(self._jobs, -(-2 * len(first) // _MIN_PARALLEL))
             self._workers = Workers(self._answer, count)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import threading
 import tomllib
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from xml.etree import ElementTree
 
@@ -25,12 +27,15 @@ ALLOWED_ATTRIBUTES = {
 """What the HTML checker takes and browsers draw; a `span` in `mtext` is the number of an equation.
 """
 FORMULAS = fixture_text("documents/formulas.tex").strip().splitlines()
+MISTAKES = tomllib.loads(fixture_text("documents/formula_mistakes.toml"))["mistakes"]
 DISPLAY_ONLY = fixture_tables("display_only")["formulas"]
 
 
 @pytest.fixture(scope="module")
-def engine() -> MathEngine:
-    return MathEngine()
+def engine() -> Iterator[MathEngine]:
+    engine = MathEngine()
+    yield engine
+    engine.close()
 
 
 def typeset_one(engine: MathEngine, tex: str, display: bool = False) -> str | MathError:
@@ -123,14 +128,19 @@ class TestMarkup:
         result = typeset_one(engine, r"\tag{1}\label{introduction} x", True)
         assert isinstance(result, str) and " id=" not in result
 
-    def test_same_formula_same_bytes(self, engine: MathEngine) -> None:
-        formulas = [Formula(tex, display) for tex in FORMULAS for display in (False, True)]
+    def test_same_formula_same_bytes(self) -> None:
+        sources = [*FORMULAS, *MISTAKES, "{" * 600 + "x" + "}" * 600, r"\bf{" * 250 + "}" * 250]
+        formulas = [Formula(tex, display) for tex in sources for display in (False, True)]
+        engine = MathEngine()
         first = engine.typeset(formulas)
         assert engine.typeset(formulas) == first
-        assert MathEngine().typeset(formulas[::-1]) == first[::-1]
-
-
-MISTAKES = tomllib.loads(fixture_text("documents/formula_mistakes.toml"))["mistakes"]
+        many, before = MathEngine(), threading.active_count()
+        for start in range(0, len(formulas), 50):
+            reverse = formulas[::-1][start : start + 50]
+            assert many.typeset(reverse) == first[::-1][start : start + 50]
+        assert threading.active_count() > before, "V8 has come in"
+        many.close()
+        assert threading.active_count() == before
 
 
 class TestMistakes:
@@ -199,7 +209,7 @@ class TestHostile:
 def test_copies_of_a_process_that_typesets_do_so_too() -> None:
     process = run_code(program("typeset_in_copies"))
     assert process.stderr == ""
-    assert process.stdout == "True False\n"
+    assert process.stdout == "True False\nTrue True\n"
 
 
 def test_threads_share_an_engine_whatever_is_nested_in_their_formulas() -> None:
