@@ -228,6 +228,8 @@ class PagePart(Struct, frozen=True, kw_only=True):
     """The kinds of pages it is for, if not all with the mark."""
     texts: tuple[str, ...] = ()
     """Keys of interface texts that the script uses, or prefixes of keys, which end in a dot."""
+    evaluates: bool = False
+    """Whether a worker under the policy of these pages makes functions of texts."""
 
 
 class Exporter(Struct, frozen=True, kw_only=True):
@@ -379,7 +381,8 @@ class Feature(Struct, frozen=True, kw_only=True):
     citations: Callable[[Library, Place, Document], Citations] | None = None
     """What a document's page shows of the sources that it cites."""
     code_links: Callable[[Library, Place, Document], Mapping[int, str]] | None = None
-    """Addresses of what inline code names, by the offset of the code, for a document's page."""
+    """Addresses of what inline code names, and of where listings of MJCF are edited, by the offset
+    of the code or the listing, for a document's page."""
     against: Callable[[Course, str], Iterable[Diagnostic]] | None = None
     """What the course would lose with the MuJoCo of another interpreter, of which the path is
     given, for `check --against`."""

@@ -245,7 +245,7 @@ def citations(library: Library, place: urls.Place, document: Document) -> Citati
 
 
 def code_links(library: Library, place: urls.Place, document: Document) -> dict[int, str]:
-    """The addresses of what inline code in a document names, by the offset of the code."""
+    """The addresses to which code in a document leads, by the offset of the code."""
     links: dict[int, str] = {}
     for _, find in _offers("code_links"):
         links |= find(library, place, document)

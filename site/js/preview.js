@@ -20,7 +20,11 @@ const page = script.dataset.page
 const texts = JSON.parse(script.dataset.words)
 const sayHere = (key, values) => say((name) => texts[name] ?? name, `preview.${key}`, values)
 const parse = (text) => new DOMParser().parseFromString(text, 'text/html')
-const scripts = (page) => [...page.querySelectorAll('head script[src]')].map((script) => script.getAttribute('src')).join('\n')
+/** What a page needs that only loading it gives: its scripts, and the policy of exercises. */
+const needs = (page) => {
+  const sources = [...page.querySelectorAll('head script[src]')].map((script) => script.getAttribute('src'))
+  return [...sources, page.querySelector('[data-exercise]') !== null].join('\n')
+}
 const sheet = (page) => page.querySelector('head link[rel="stylesheet"]')
 const stateOf = (next) => next.querySelector('script[data-state]')?.dataset.state ?? ''
 
@@ -44,7 +48,7 @@ async function take() {
       const response = await fetch(location.href, { cache: 'no-store' })
       const next = parse(await response.text())
       const fresh = stateOf(next)
-      if (state === '' || scripts(head) !== scripts(next)) return location.reload()
+      if (state === '' || needs(head) !== needs(next)) return location.reload()
       if (fresh === '') break // the page is gone again; a message will follow
       change(next)
       state = fresh

@@ -166,7 +166,7 @@ async function fetchPage(address) {
 }
 
 function resolveAddresses(part, address) {
-  for (const name of ['href', 'src', 'data-config', 'data-script']) {
+  for (const name of ['href', 'src', 'data-config', 'data-script', 'data-editor']) {
     for (const element of part.querySelectorAll(`[${name}]`)) {
       const value = element.getAttribute(name)
       const inside = value.startsWith('#') && part.querySelector(`#${CSS.escape(value.slice(1))}`)

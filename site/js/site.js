@@ -1,6 +1,6 @@
 /** The script of every page. Pages are complete without it; it adds comfort. */
 
-import { addCopyButtons } from './page/copy.js'
+import { addCopyButtons, addEditButtons } from './page/copy.js'
 import { followContents } from './page/contents.js'
 import { followPredictions, gatePredictions } from './page/gates.js'
 import { leaveLabs, loadLabs } from './page/labs.js'
@@ -27,6 +27,7 @@ const progress = openProgress(document.documentElement.dataset.course ?? '')
 
 function improve(part) {
   addCopyButtons(part, words)
+  addEditButtons(part, words)
   markScrolling(part)
   addLineNumbers(part, words) // after markScrolling: the numbers stay a keyboard stop
   loadLabs(part, words, progress)

@@ -282,6 +282,17 @@ def test_every_lab_opens_its_model_in_the_editor(page: Page) -> None:
     press(swing, "Pause")
 
 
+def test_listing_opens_in_the_editor_of_the_course(page: Page, base: str) -> None:
+    second_page = page.context.new_page()
+    second_page.goto(base + PAGE)
+    listing = second_page.locator(".mjcf")
+    part = listing.locator("code").inner_text().strip()
+    press(listing, "Open in the editor")
+    text = editor_of(second_page)[1]
+    expect(text).to_have_value(f"<mujoco><worldbody>\n{part}\n</worldbody></mujoco>")
+    second_page.close()
+
+
 def test_model_that_never_comes_to_an_end_holds_nothing_up(page: Page) -> None:
     lab_element, text = editor_of(page)
     press(lab_element, "Back to the lesson’s model")

@@ -84,12 +84,9 @@ def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
     texts: list[MjcfText] = []
     for document in course.documents:
         for block in document_blocks(document):
-            if isinstance(block, Mjcf) and block.fragment is not None:
-                # `fragment="worldbody/body"` names nested elements, from the outside.
-                names = block.fragment.split("/")
-                path = ["mujoco", *(name for name in names if name not in ("", "mujoco"))]
-                opening = "".join(f"<{name}>" for name in path)
-                closing = "".join(f"</{name}>" for name in reversed(path))
+            if isinstance(block, Mjcf) and block.around:
+                opening = "".join(f"<{name}>" for name in block.around)
+                closing = "".join(f"</{name}>" for name in reversed(block.around))
                 text = f"{opening}\n{block.code.text}\n{closing}"
                 texts.append(MjcfText(block, block.code, text, 1))
             elif isinstance(block, Mjcf):

@@ -307,8 +307,8 @@ class PageContext(HtmlWriter, Struct, frozen=True, dict=True):
             return Markup()
         return self.template("blocks/references.html", **asdict(citations))
 
-    def code_href(self, code: model.CodeSpan) -> str:
-        """The address of what inline code names."""
+    def code_href(self, code: model.CodeSpan | model.Mjcf) -> str:
+        """The address of what inline code names, or of where a listing is edited."""
         return self.inputs.code_links.get(code.span.start, "")
 
     def find_repetition(self, name: str) -> Span:

@@ -57,17 +57,18 @@ LOGO_HEIGHT = 28
 """Pixels, as in the style sheet."""
 
 
-def policy(json_ld: str, *, form: bool = False) -> str:
+def policy(json_ld: str, *, form: bool = False, evaluates: bool = False) -> str:
     """The Content-Security-Policy of a page: nothing from other hosts, no inline code or style.
 
     Structured data is not code, but its hash is listed, because checkers take it for code.
     """
     digest = base64.b64encode(hashlib.sha256(json_ld.encode()).digest()).decode()
     data = f" 'sha256-{digest}'" if json_ld else ""
+    evaluation = " 'unsafe-eval'" if evaluates else ""
     return "; ".join(
         (
             "default-src 'self'",
-            f"script-src 'self' 'wasm-unsafe-eval'{data}",
+            f"script-src 'self' 'wasm-unsafe-eval'{evaluation}{data}",
             "style-src 'self'",
             "img-src 'self' data: blob:",
             "worker-src 'self' blob:",
@@ -184,7 +185,11 @@ class PageFrame(Struct, frozen=True):
             "base.html",
             frame=inputs,
             body=Markup(body),
-            policy=policy(head.json_ld, form=kind is not None and kind.form),
+            policy=policy(
+                head.json_ld,
+                form=kind is not None and kind.form,
+                evaluates=any(known_parts[mark].evaluates for mark in parts),
+            ),
             head_title=head_title(inputs.title, head.title, head.kind),
             description=head.description,
             social=social(inputs.title, inputs.base_url, head),

@@ -135,6 +135,7 @@ class PageWriter(PageContext, frozen=True):
                     number=self.number(block.label),
                     html=self.highlight("xml", block.code.text.rstrip("\n")),
                     engine=self.inputs.engine,
+                    editor=self.code_href(block),
                 )
             case model.PlainCode():
                 code = self.highlight(block.language, block.code.text.rstrip("\n"))

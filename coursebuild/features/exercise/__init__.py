@@ -59,7 +59,7 @@ FEATURE = Feature(
             index=on_demand("coursebuild.features.exercise.page:index_exercise"),
         ),
     ),
-    parts=(PagePart(mark="data-exercise=", texts=("exercise.live.",)),),
+    parts=(PagePart(mark="data-exercise=", texts=("exercise.live.",), evaluates=True),),
     trials=Trials(
         find=exercise_trials,
         start=on_demand("coursebuild.features.exercise.trial:ExerciseTrials"),

@@ -22,6 +22,7 @@ _LIVE = PagePart(
     ),
 )
 """The script of live labs is loaded by the element itself."""
+_LISTING = PagePart(mark="data-editor=", texts=("lab.live.edit",))
 FEATURE = Feature(
     name="lab",
     fences=(
@@ -45,7 +46,8 @@ FEATURE = Feature(
     ),
     check=check_labs,
     check_models=check_model_names,
-    parts=(_LIVE,),
+    code_links=on_demand("coursebuild.features.lab.page:editor_links"),
+    parts=(_LIVE, _LISTING),
     trials=Trials(
         find=lab_trials,
         start=on_demand("coursebuild.features.lab.trial:LabTrials"),

@@ -29,13 +29,14 @@ from coursebuild.api import (
     find_blocks,
     urls,
 )
-from coursebuild.core.model import ModelTarget
+from coursebuild.core.model import Mjcf, ModelTarget
 from coursebuild.core.pages.library import BY_LAB
 from coursebuild.core.pages.marks import escape_marks, link, picture
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.lab.engines.native import LAB_ENGINE
 from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
+from coursebuild.features.lab.relations import is_editable
 from coursebuild.features.lab.reply import LabRecord, PublishedLab
 from coursebuild.features.lab.schema import (
     Control,
@@ -334,6 +335,26 @@ def draw_model(renderer: Renderer, view: LabView) -> Markup:
 def model_picture(library: Library, model: MjcfModel) -> Picture | None:
     """Return the picture of a model's lab."""
     return lab_picture(*_find_lab(library, model))
+
+
+def editor_links(library: Library, place: Place, document: Document) -> dict[int, str]:
+    """Return the address of the lab in which readers edit a listing of MJCF, by its offset.
+
+    It is the first of the kind `mjcf` on a page of the course, or else in a lesson.
+    """
+    listings = [
+        block.span.start
+        for block in find_blocks(document, Mjcf)
+        if block.error is None and is_editable(block.code.text)
+    ]
+    owners = (*library.course.pages, *library.order) if listings else ()
+    for owner in (owner for owner in owners if owner.document is not None):
+        for lab in find_blocks(owner.document, Lab):
+            published = library.trial_value(lab)
+            if lab.kind == MJCF and isinstance(published, PublishedLab):
+                href = place.href(urls.owner_path(owner), published.name)
+                return dict.fromkeys(listings, href)
+    return {}
 
 
 def qr_svg(text: str, label: str) -> Markup:

@@ -4,7 +4,7 @@
  * The simulation runs in a dedicated worker, as that of a model which readers edit; the trials in one more.
  */
 
-import { Connection } from '../lab/page/connection.js'
+import { Connection, startConfined } from '../lab/page/connection.js'
 import { h, textButton } from '../lab/page/dom.js'
 import { Editor } from '../lab/page/editor.js'
 import { Instrument } from '../lab/page/instrument.js'
@@ -192,7 +192,7 @@ const valueText = (value, { digits, unit }) => withUnit(formatReadout(value, dig
  * @returns {() => void} ends it without a word
  */
 function judgeAttempt({ worker, ...addresses }, config, on) {
-  const line = new Connection(`${worker}#judge`).open(config.id, ({ type, index, message, kind, ...verdict }) => {
+  const line = new Connection(`${worker}#judge`, startConfined).open(config.id, ({ type, index, message, kind, ...verdict }) => {
     if (type === 'judging') return on.begun()
     if (type === 'verdict') return on.verdict(index, verdict)
     line.close()

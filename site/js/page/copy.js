@@ -1,6 +1,7 @@
-/** Copy buttons on code, added by script, since they need one to work. */
+/** Buttons on code that copy it or open it in an editor, added by script, since they need one to work. */
 
 import { h } from '../lab/page/dom.js'
+import { writeLink } from '../lab/page/share.js'
 import { selectAll } from './select.js'
 
 const SHOWN_FOR = 2000 // ms
@@ -21,6 +22,25 @@ export function addCopyButtons(part, words) {
     }
     const button = h('button', { type: 'button', class: 'copy', 'aria-live': 'polite', onclick: copy }, words('code.copy'))
     target.prepend(button)
+  }
+}
+
+/** Add a button to each listing of MJCF that has an editor, the lab to which `data-editor` leads; `data-around` names elements around a part. */
+export function addEditButtons(part, words) {
+  if (location.protocol === 'file:') return // labs do not run there
+  for (const tools of selectAll(part, '[data-editor]')) {
+    const { editor, around } = tools.dataset
+    const open = async () => {
+      const address = new URL(editor, document.baseURI)
+      const names = around.split(' ').filter(Boolean)
+      const line = (tags) => tags.map((tag) => `<${tag}>`).join('')
+      const lines = [line(names), codeOf(tools.closest('.script')).trimEnd(), line(names.map((name) => `/${name}`).reverse())]
+      const text = lines.filter(Boolean).join('\n')
+      const state = { values: [], steps: 0, time: 0, physics: new Float64Array(), text, isOther: true }
+      const { link } = await writeLink(decodeURIComponent(address.hash.slice(1)), state)
+      location.assign(new URL(link, address))
+    }
+    tools.prepend(h('button', { type: 'button', class: 'copy', onclick: open }, words('lab.live.edit')))
   }
 }
 

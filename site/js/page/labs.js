@@ -42,6 +42,7 @@ export function loadLabs(part, words, progress) {
   for (const lab of labs) {
     lab.addEventListener('coursebuild:run', async ({ detail }) => (await start(lab))?.run?.(detail))
   }
+  if (part === document) window.addEventListener('hashchange', followState)
   const linkedId = linkedLab(location.hash)
   const shared = part === document ? labs.find((lab) => lab.dataset.lab === linkedId) : null
   if (!shared) return
@@ -51,6 +52,13 @@ export function loadLabs(part, words, progress) {
 
 /** The id of the lab whose state an address holds, or null. */
 export const linkedLab = (hash) => new URLSearchParams(hash.slice(1)).get('lab')
+
+/** Follow a link to a state on this page, which is read as the page is loaded. */
+function followState() {
+  if (linkedLab(location.hash) === null) return
+  history.scrollRestoration = 'manual' // so that the lab is gone to
+  location.reload()
+}
 
 /** End the labs in a part that was removed from the page. */
 export function leaveLabs(part) {

@@ -13,14 +13,27 @@ const MISSED = 3 // pings that it may leave without an answer
 const connections = new Map()
 
 /** The connection to the worker at this address; one for the page. */
-export function connection(url) {
-  if (!connections.has(url)) connections.set(url, new Connection(url))
+export function connection(url, start = startWorker) {
+  if (!connections.has(url)) connections.set(url, new Connection(url, start))
   return connections.get(url)
+}
+
+const startWorker = (url) => new Worker(url, { type: 'module', name: 'labs' })
+
+/**
+ * Start a worker under the policy of the page, by which nothing in it reaches another host, `import()` included: a worker takes the
+ * policy of who started it if its own script comes from no host.
+ *
+ * @param {string} url of the worker's script
+ */
+export function startConfined(url) {
+  const script = URL.createObjectURL(new Blob([`import ${JSON.stringify(url)}`], { type: 'text/javascript' }))
+  return startWorker(url.startsWith('data:') ? url : script)
 }
 
 export class Connection {
   /** @param {string} url of the worker's script; @param {(url: string) => Worker} [start] */
-  constructor(url, start = (address) => new Worker(address, { type: 'module', name: 'labs' })) {
+  constructor(url, start = startWorker) {
     this.url = url
     this.start = start
     this.worker = null

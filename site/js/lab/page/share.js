@@ -4,7 +4,7 @@
  * TEXT is base64url of a deflated content: JSON on one line (`v` the values of the controls, `n` the steps since the reset, `t` the
  * time in s; `l` the log: the values of the controls at the reset, and the events since), and after the end of the line the whole
  * physics as 64-bit floats. If all this is too long for a link, the log is left out, then the physics. A model that the reader has
- * written is in the JSON, as `x`.
+ * written is in the JSON, as `x`, with `o` if it did not begin as the lab's.
  */
 
 import { copyText } from '../../page/copy.js'
@@ -21,11 +21,11 @@ const LINE_END = 10
 
 /**
  * @param {string} id
- * @param {{values: unknown[], steps: number, time: number, physics: Float64Array, text?: string, log?: Record<string, any> | null}} state
+ * @param {{values: unknown[], steps: number, time: number, physics: Float64Array, text?: string, isOther?: boolean, log?: Record<string, any> | null}} state
  * @returns {Promise<{link: string, only: 'state' | 'controls' | null}>} `only`: what it holds if not all fitted
  */
-export async function writeLink(id, { values, steps, time, physics, text, log = null }) {
-  const state = { v: values, n: steps, t: time, x: text }
+export async function writeLink(id, { values, steps, time, physics, text, isOther, log = null }) {
+  const state = { v: values, n: steps, t: time, x: text, o: isOther || undefined }
   const motion = log && steps > 0 ? { ...state, l: [log.values, log.events] } : state
   const link = (text) => `#lab=${encodeURIComponent(id)}&${text}`
   /** @type {[Record<string, any>, 'state' | null][]} */
@@ -56,7 +56,7 @@ async function field(head, physics) {
  *
  * @param {string} fragment
  * @returns {Promise<{id: string, state: null | {values: unknown[], steps: number, time: number, physics: Float64Array | null,
- *   text?: string, log?: {values: unknown[], events: unknown[][], end: number}}} | null>}
+ *   text?: string, isOther?: boolean, log?: {values: unknown[], events: unknown[][], end: number}}} | null>}
  */
 export async function readLink(fragment) {
   if (!fragment.startsWith('#lab=')) return null
@@ -72,13 +72,13 @@ export async function readLink(fragment) {
 
 function parse(bytes) {
   const end = bytes.includes(LINE_END) ? bytes.indexOf(LINE_END) : bytes.length
-  const { v, n, t, x, l } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(0, end)))
+  const { v, n, t, x, o, l } = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes.subarray(0, end)))
   if (!Array.isArray(v)) return null
   const floats = bytes.slice(end + 1)
   const physics = floats.length > 0 ? new Float64Array(floats.buffer) : null
   const state = { values: v, steps: Number.isInteger(n) && n >= 0 ? n : 0, time: Number(t) || 0, physics }
   if (isLog(l)) state.log = { values: l[0], events: l[1], end: state.time }
-  return typeof x === 'string' && x.length <= LONGEST_MODEL ? { ...state, text: x } : state
+  return typeof x === 'string' && x.length <= LONGEST_MODEL ? { ...state, text: x, isOther: o === true } : state
 }
 
 /** A log as the JSON that an author gives a goal: one line for each event. */

@@ -19,7 +19,7 @@
  * the previous frame: the newest stays here, to be drawn again when the camera moves.
  */
 
-import { connection } from './connection.js'
+import { connection, startConfined } from './connection.js'
 import { prefersStillness } from './dom.js'
 
 export class Simulation {
@@ -59,7 +59,8 @@ export class Simulation {
     this.epoch = null
     this.diverged = false
     this.setState('loading')
-    this.line = connection(worker).open(config.id, (message) => MESSAGES[message.type]?.(this, message))
+    const start = config.exercise ? startConfined : undefined
+    this.line = connection(worker, start).open(config.id, (message) => MESSAGES[message.type]?.(this, message))
     this.send({ type: 'load', config, own: this.own, ...addresses })
     this.send({ type: 'visible', on: this.visible })
   }

@@ -126,13 +126,15 @@ export class Workbench extends Instrument {
 
   shareAction() {
     const state = { values: [], steps: 0, time: 0, physics: new Float64Array() }
-    return ['link_model', () => this.share({ ...state, text: this.editor.text }, this.own?.files.size > 1 ? 'files' : '')]
+    return ['link_model', () => this.share({ ...state, text: this.editor.text, isOther: this.isOther }, this.own?.files.size > 1 ? 'files' : '')]
   }
 
   /** Show the model of a link. */
-  restore({ text }) {
+  restore({ text, isOther }) {
     if (text === undefined) return
     this.own = null
+    this.isOther = isOther
+    if (isOther) this.starts.show([null])
     this.editor.text = text
     this.run(false)
   }
