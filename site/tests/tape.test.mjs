@@ -79,20 +79,32 @@ test('a controller that changes the model is repeated, too', (t) => {
   }
 })
 
-test('a button that changes the model leaves the states before it as they were', (t) => {
+test('what changes the model for good, a button or a controller, leaves the steps before it as they were', (t) => {
   const fields = { controls: [control({ type: 'button' })] }
-  const lab = taped(t, BALLS, fields, { controls: [{ run: ({ model }) => (model.opt.gravity[2] = 5) }] })
-  const seen = [lab.physics.read()]
-  for (let i = 1; i <= 200; i++) {
+  const run = ({ model, mj, data }) => {
+    model.opt.gravity[2] = 5
+    model.opt.timestep = 0.003
+    model.body_mass[1] *= 3
+    mj.mj_setConst(model, data)
+  }
+  const controller = ({ data, model }) => {
+    if (data.time > 0.7) model.geom_size[3] = 0.05
+  }
+  const lab = taped(t, BALLS, fields, { controller, controls: [{ run }] })
+  const seen = [whole(lab)]
+  for (let i = 1; i <= 300; i++) {
     lab.step(1)
     if (i === 150) lab.press(0)
-    seen.push(lab.physics.read())
+    seen.push(whole(lab))
   }
-  assert.ok(lab.tape.states.length > 3)
-  for (const { step } of lab.tape.states) {
+  assert.ok(lab.tape.states.length < 60)
+  for (const step of [20, 149, 150, 151, 300, 199, 3, 250]) {
     lab.tape.go(step)
-    assert.deepEqual(lab.physics.read(), seen[step], `step ${step}`)
+    assert.deepEqual(whole(lab), seen[step], `step ${step}`)
   }
+  lab.tape.go(100)
+  lab.step(1)
+  assert.deepEqual(whole(lab), seen[101], 'what goes on from there has the model of that time')
 })
 
 test('a run that goes on from an earlier step goes as it went before', (t) => {
@@ -227,7 +239,7 @@ test('what a lab keeps itself is counted, so that the tape of a long run stays s
   const lab = taped(t, PENDULUM, {}, { setup: ({ ctx }) => (ctx.delays = new Float64Array(4000)), controller: ({ ctx, data }) => (ctx.delays[99] = data.time) })
   lab.step(20_000)
   const { states } = lab.tape
-  const numbers = states.reduce((sum, { numbers, before, ctx }) => sum + numbers.length + (before?.length ?? 0) + ctx.delays.length, 0)
+  const numbers = states.reduce((sum, { numbers, before, model, ctx }) => sum + [numbers, before, model, ctx.delays].reduce((count, list) => count + (list?.length ?? 0), 0), 0)
   assert.ok(numbers < 1_100_000, `${numbers} numbers`)
   assert.ok(states.length > 100, `${states.length} states`)
   lab.tape.seek(17)

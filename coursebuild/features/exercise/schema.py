@@ -70,7 +70,8 @@ class ExerciseFile(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     names: Annotated[
         tuple[
             Annotated[
-                str, Meta(pattern=JAVASCRIPT_NAME, extra={"expects": "a name of JavaScript"})
+                str,
+                Meta(pattern=JAVASCRIPT_NAME, extra={"expects": "a name of JavaScript, in ASCII"}),
             ],
             ...,
         ],

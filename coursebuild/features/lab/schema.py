@@ -75,7 +75,7 @@ class SettingFields(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     param: Annotated[
         Annotated[
             str,
-            Meta(pattern=JAVASCRIPT_NAME, extra={"expects": "a name of JavaScript"}),
+            Meta(pattern=JAVASCRIPT_NAME, extra={"expects": "a name of JavaScript, in ASCII"}),
         ]
         | None,
         Meta(description="the value is stored as `ctx.NAME`"),

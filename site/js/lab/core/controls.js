@@ -60,15 +60,6 @@ export class Controls {
     this.values[i] = value
   }
 
-  /** Take the values of another moment, and apply those that differ. */
-  change(values) {
-    values.forEach((value, i) => {
-      if (value === this.values[i]) return
-      this.values[i] = value
-      this.apply(i)
-    })
-  }
-
   /** Run the code of a button. */
   press(i) {
     this.check(i)

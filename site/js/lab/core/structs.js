@@ -105,6 +105,56 @@ export class StepNumbers {
   }
 }
 
+/** All numbers of a model, as the engine has them: its options, visuals and statistics, which lie side by side, and its arrays. */
+export class ModelWords {
+  /** @param {Record<string, any>} model MjModel @param {Record<string, any>} data any MjData of the same engine */
+  constructor(model, data) {
+    this.data = data
+    const words = new Int32Array(memory(data))
+    const { center } = model.stat // the last of them, behind which stands where the arrays begin
+    const [start, end] = [words[model.opt.$$.ptr >> 2], center.byteOffset + center.byteLength]
+    const [first, length] = [words[end >> 2], model.nbuffer]
+    const { byteOffset: inside } = model.body_mass
+    if (start >= end || inside < first || inside >= first + length) throw new EngineError(WRONG, true)
+    this.parts = [[start >> 2, (end - start) >> 2], [first >> 2, length >> 2]]
+    this.begin()
+  }
+
+  views() {
+    const buffer = memory(this.data)
+    return this.parts.map(([at, length]) => new Int32Array(buffer, 4 * at, length))
+  }
+
+  /** Compare with the model as it is now from here on. */
+  begin() {
+    this.bases = this.views().map((view) => view.slice())
+  }
+
+  /** The words that have changed since `begin`: the place of each, then the word. */
+  read() {
+    const changed = []
+    let offset = 0
+    this.views().forEach((view, part) => {
+      const base = this.bases[part]
+      for (let i = 0; i < base.length; i++) if (view[i] !== base[i]) changed.push(offset + i, view[i])
+      offset += base.length
+    })
+    return Int32Array.from(changed)
+  }
+
+  /** Go to the model of which `read` said what has changed. @param {Int32Array} changed */
+  write(changed) {
+    const [options, arrays] = this.views()
+    options.set(this.bases[0])
+    arrays.set(this.bases[1])
+    for (let i = 0; i < changed.length; i += 2) {
+      const place = changed[i]
+      if (place < options.length) options[place] = changed[i + 1]
+      else arrays[place - options.length] = changed[i + 1]
+    }
+  }
+}
+
 const GEOM_WORDS = 63 // sizeof(mjvGeom) is 252 bytes
 const GEOMS_AT = 2 // mjvScene starts with maxgeom, ngeom and a pointer to the geoms
 

@@ -2,19 +2,21 @@
  * What a run was: its states, one every few steps, from which each step is found again to the last bit.
  *
  * A state holds all that the next step depends on: MuJoCo's numbers, the lab's `ctx`, its controls and its random numbers. What is derived
- * (`xpos`, sensors, contacts) is that of the step before; so the numbers before a step are kept, and the step is made again. Those after it
- * are kept, too, where it need not end as it did: where a controller or a button may change the model, or a hand pulled. After
- * something was done to the lab, the numbers are those before `mj_forward`. (Accelerations are derived with the model as it is now, which
- * is another if a controller changes it.) Between two states steps are repeated, unless a body was
- * pulled there: then the run can be looked at in the states only. When there are too many, every second one goes.
+ * (`xpos`, sensors, contacts) is that of the step before; so the numbers before a step are kept, and the step is made again. Where a
+ * hand pulled it need not end as it did: there those after it are kept, too. After something was done to the lab, the numbers are those
+ * before `mj_forward`. Where code may change the model, a state holds what of the model has changed. Between two states steps are
+ * repeated, unless a body was pulled there: then the run can be looked at in the states only. When there are too many, every second
+ * one goes.
  *
  * The lab may stand at an earlier step of its tape. What then happens to it, or the next step that it makes, drops what came after.
  */
 
+import { ModelWords } from './structs.js'
+
 const MOST = 1500 // states
 const LEAST = 4
 const MOST_NUMBERS = 1_000_000 // in all of them, 8 MB
-const LARGEST = 5000 // values that `ctx` may hold
+const LARGEST = 5000 // values that `ctx` may hold, and those of the model that may change
 const SAMPLES = 16 // of the plots, between two states
 const MOST_MARKS = 200
 const APART = 0.3 // s between two marks of one control, or of contacts
@@ -25,12 +27,15 @@ export class Tape {
   constructor(lab) {
     this.lab = lab
     this.most = MOST
+    const { code, config, model, data } = lab
+    this.model = code.controller || config.controls.length > 0 ? new ModelWords(model, data) : null
     this.clear()
   }
 
   /** Begin a new run. */
   clear() {
     this.states = []
+    this.model?.begin()
     this.stride = 0 // steps between two states; 0: not known yet
     this.isKept = true // no longer if `ctx` holds what cannot be copied
     this.end = { step: -1, time: 0, log: null } // the last step; -1: none yet
@@ -56,20 +61,19 @@ export class Tape {
 
   // --- recording
 
-  /** The numbers before the step that begins, if its state is to be kept. */
+  /** The numbers before the step that begins, and what of the model has changed, if its state is to be kept. */
   before() {
     const { lab } = this
     if (!this.isKept) return null
     if (this.stride === 0) this.stride = Math.max(1, SAMPLES * Math.round(lab.sampler.interval / lab.option.timestep))
     const stride = lab.drag.active ? Math.ceil(this.stride / SAMPLES) : this.stride
-    return (lab.steps + 1) % stride === 0 ? lab.physics.read() : null
+    return (lab.steps + 1) % stride === 0 ? { before: lab.physics.read(), model: this.model?.read() } : null
   }
 
-  /** A step was made. @param {Float64Array | null} numbers of `before` @param {number} time s */
-  after(numbers, time) {
-    const { code, config, drag, physics } = this.lab
-    const endsOtherwise = code.controller || drag.active || config.controls.some(({ type }) => type === 'button')
-    if (numbers !== null) this.keep(numbers, endsOtherwise ? physics.read() : null)
+  /** A step was made. @param {ReturnType<Tape['before']>} begun @param {number} time s */
+  after(begun, time) {
+    const { drag, physics } = this.lab
+    if (begun !== null) this.keep({ ...begun, numbers: drag.active ? physics.read() : null })
     this.touch(time)
     this.markEnd(time)
   }
@@ -87,7 +91,7 @@ export class Tape {
     this.cut()
     const { steps } = this.lab
     this.states = this.states.filter(({ step }) => step < steps)
-    this.keep(null, numbers)
+    this.keep({ before: null, numbers, model: this.model?.read() })
     this.markEnd(this.lab.time)
   }
 
@@ -106,9 +110,11 @@ export class Tape {
     end.log = lab.log
   }
 
-  keep(before, numbers) {
+  /** @param {{before: Float64Array | null, numbers: Float64Array | null, model?: Int32Array}} moment */
+  keep(moment) {
     const { lab } = this
-    const { copy: ctx, size } = copyOf(lab.ctx, lab.physics.memory)
+    const { copy: ctx, size: held } = copyOf(lab.ctx, lab.physics.memory)
+    const size = held + (moment.model?.length ?? 0) / 2
     if (size > LARGEST) {
       this.states = []
       this.isKept = false
@@ -117,8 +123,7 @@ export class Tape {
     this.states.push({
       step: lab.steps,
       time: lab.time,
-      before,
-      numbers,
+      ...moment,
       ctx,
       values: [...lab.values],
       random: lab.draw.read(),
@@ -175,12 +180,13 @@ export class Tape {
     this.repeat(state, step)
   }
 
-  restore({ before, numbers, ctx, values, random, seen, step }) {
+  restore({ before, numbers, model, ctx, values, random, seen, step }) {
     const { lab, end } = this
     const { mj } = lab.engine
     lab.queue = []
     lab.drag.release()
-    lab.controls.change(values)
+    lab.controls.values = [...values]
+    this.model?.write(model)
     for (const name of Object.keys(lab.ctx)) delete lab.ctx[name]
     Object.assign(lab.ctx, copyOf(ctx, lab.physics.memory).copy)
     lab.physics.write(before ?? numbers)
