@@ -1,6 +1,7 @@
 """Read texts that strangers wrote, and count what is said of them without reason.
 
 Run: python benchmarks/corpus.py [--bodies NAME …] [--cache DIR] [--record]
+     python benchmarks/corpus.py --pages NUMBER [--bodies NAME …] [--cache DIR]
 
 The texts are those of packages (`corpus.toml`); they are fetched into `--cache`, and nothing of
 them is run. Each body is read twice: as `coursebuild import` makes it, and its Markdown files as
@@ -19,6 +20,9 @@ run this again. Letters are kept in `corpus_judged.txt`, with a hash of rule and
 
 The share of a letter among the lines judged of a rule and body is taken for all of them. Rates are
 of `w`, and of all hints but `o`.
+
+`--pages` imports each body that has a `format`, and names so many of its texts, always the same
+ones: whether their pages look right in a browser, somebody has to see.
 """
 
 from __future__ import annotations
@@ -26,7 +30,9 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import random
 import re
+import shutil
 import sys
 import tempfile
 import tomllib
@@ -76,6 +82,10 @@ class Body(Struct, frozen=True):
     name: str
     packages: list[str]
     files: list[str]
+    format: str = ""
+    """That of the tool for which they were written; empty where no pages are looked at."""
+    folder: str = ""
+    """The one that is imported."""
 
 
 class Row(Struct, frozen=True):
@@ -181,13 +191,26 @@ def examine_body(body: Body, cache: Path) -> Iterator[tuple[str, Examination, Lo
         top = Path(folder)
         texts_of(body.packages, body.files, cache / "packages", top / "texts")
         try:
-            paths = import_course(top / "texts", top / "imported")
-            losses = find_losses(top / "texts", paths, top / "imported")
+            texts = top / "texts" / body.folder
+            paths = import_course(texts, top / "imported")
+            losses = find_losses(texts, paths, top / "imported")
             yield "imported", examine(top / "imported"), losses
         except UsageError as error:
             print(f"{body.name} cannot be imported: {error}")
         if write_plain_course(top / "texts", top / "plain"):
             yield "as it is", examine(top / "plain"), None
+
+
+def list_pages(body: Body, number: int, cache: Path) -> Iterator[str]:
+    """Import a body into a folder of the cache, and yield lines: texts, and what they became."""
+    folder = cache / "pages" / re.sub(r"\W+", "-", body.name)
+    shutil.rmtree(folder, ignore_errors=True)
+    texts_of(body.packages, body.files, cache / "packages", folder / "texts")
+    texts = folder / "texts" / body.folder
+    paths = import_course(texts, folder / "imported")
+    sources = random.Random(body.name).sample(sorted(paths), min(number, len(paths)))
+    yield f"\n{body.name} ({body.format}): {texts}; coursebuild serve -C {folder / 'imported'}"
+    yield from (f"  {source} -> {paths[source]}" for source in sources)
 
 
 def table_of_rules(examination: Examination, judgements: Judgements) -> Iterator[str]:
@@ -237,10 +260,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])  # type: ignore[union-attr]
     parser.add_argument("--bodies", nargs="*", default=[], help="words of the names of bodies")
     parser.add_argument("--cache", type=Path, default=Path.home() / ".cache/coursebuild-corpus")
+    parser.add_argument("--pages", type=int, metavar="NUMBER", help="name texts to look at")
     parser.add_argument("--record", action="store_true", help=f"write {RESULT.name}")
     arguments = parser.parse_args()
     cache: Path = arguments.cache
     cache.mkdir(parents=True, exist_ok=True)
+    if arguments.pages:
+        for body in read_bodies(arguments.bodies):
+            if body.format:
+                print(*list_pages(body, arguments.pages, cache), sep="\n", flush=True)
+        return 0
     judgements = read_judgements(JUDGED) | read_judgements(cache / "sample.txt")
     keep_judgements(judgements)
     rows, questions = [], []

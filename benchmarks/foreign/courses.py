@@ -12,8 +12,10 @@ from pathlib import Path
 from msgspec import Struct
 
 from coursebuild.core.text.diagnostics import Diagnostic
+from coursebuild.features.importer.contents import read_contents
 from coursebuild.features.importer.convert import convert, write_course
-from coursebuild.features.importer.source_files import TEXTS, SourceFiles
+from coursebuild.features.importer.course_map import read_texts
+from coursebuild.features.importer.source_files import SourceFiles
 from coursebuild.pipeline.check import judge
 from coursebuild.pipeline.load import load
 from coursebuild.pipeline.options import Options, open_store
@@ -38,11 +40,18 @@ class Examination(Struct, frozen=True):
     """Errors, warnings and hints."""
 
 
-def import_course(texts: Path, root: Path) -> list[str]:
-    """Write texts as `coursebuild import` does; return the paths of those that it takes."""
+def import_course(texts: Path, root: Path) -> dict[str, str]:
+    """Write texts as `coursebuild import` does; return the paths of the new ones by the old.
+
+    A text that only others include has none, nor one of which nothing is left.
+    """
     files = SourceFiles(texts)
     write_course(convert(files), root, files, open_store(root, None, None))
-    return sorted(path for path in files.read_paths if path.endswith(TEXTS))
+    files = SourceFiles(texts)
+    course = read_texts(read_contents(files), files)
+    lessons = [lesson for level in course.levels for lesson in level.lessons]
+    texts_with_files = (text for text in (*lessons, *course.pages) if text.path)
+    return {text.file: text.path for text in texts_with_files if (root / text.path).is_file()}
 
 
 def write_plain_course(texts: Path, root: Path) -> bool:

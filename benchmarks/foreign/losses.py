@@ -17,6 +17,7 @@ from typing import TypeAlias
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
+from mdit_py_plugins.footnote import footnote_plugin
 from msgspec import Struct
 
 from benchmarks.foreign.courses import FRONT, WORDS
@@ -28,7 +29,7 @@ Run: TypeAlias = list[str]
 """Words that follow each other without a formula or the end of a block between them."""
 _NEIGHBOURS = 3
 """Words in a row by which one of them is found; fewer where a run has fewer."""
-_READER = MarkdownIt("commonmark").enable(["table", "strikethrough"])
+_READER = MarkdownIt("commonmark").enable(["table", "strikethrough"]).use(footnote_plugin)
 _CODE = re.compile(
     r"\{(?:code|python|ipython|r\b|julia|bash|math|mermaid|eval-rst|toctree|include|literal|raw|"
     r"auto|bibliography|currentmodule|button|octave|contents|index|image|tableofcontents)"
@@ -36,21 +37,27 @@ _CODE = re.compile(
 """How a block begins that holds no prose; any other with a name between braces does."""
 _MARKS = re.compile(
     r"^:::[ \t]+[\w.]+\n(?:[ ]{4}[^\n]*(?:\n|\Z))+"
-    r"|^[ \t>]*(?::[\w-]+:[^\n]*|:{3,}[^\n]*|\([\w:.-]+\)=|%[^\n]*|\+\+\+[^\n]*|/{3,}[^\n]*"
-    r"|===[!+]?(?=[ \t]+[\"'])|(?:!!!|\?{3}\+?)[ \t]+[\w-]+"
-    r"|import[ ][\w{}*, ]+[ ]from[ ][\"'][^\"'\n]+[\"'];?)[ \t]*$",
+    r"|^[ \t>]*(?::[\w-]+:[^\n]*|:{3,}[^\n]*|\([\w:.-]+\)=|%(?!\})[^\n]*|\+\+\+[^\n]*|/{3,}[^\n]*"
+    r"|-+8<-+[^\n]*|import[ ][\w{}*, ]+[ ]from[ ][\"'][^\"'\n]+[\"'];?)[ \t]*$",
     re.MULTILINE,
 )
-"""Lines of options, labels, comments, frames and imports of other tools."""
+"""Lines of options, labels, comments, frames, inclusions and imports of other tools."""
+_TITLED = re.compile(
+    r"^([ \t>]*)(?:===[!+]?|(?:!!!|\?{3}\+?)(?:[ \t]+[\w-]+)*)[ \t]*(?:([\"'])(.*)\2)?[ \t]*$",
+    re.MULTILINE,
+)
+"""The title of a tab or an admonition of MkDocs, whose text stands further right."""
 _FORMULA = re.compile(
     r"\$\$(?:(?!\n[ \t>]*\n).)+?\$\$|(?<![\\$])\$[^$\n]+\$(?!\d)"
+    r"|(?<![\\$])\$(?=\S)(?:(?!\n[ \t>]*\n)[^$])+?(?<=\S)\$(?!\d)"
     r"|\\begin\{(\w+\*?)\}.*?\\end\{\1\}",
     re.DOTALL,
 )
 _NAMES = re.compile(
     r"\{cite[\w:]*\}`[^`]+`|\{[a-z][\w:+.-]*\}`[^`\s]+`|\{[a-z][\w:+.-]*\}(?=`)"
     r"|(?<=\S)\s<[^<>`\n]+>(?=`)|\[[^\[\]\n]*-?@[\w:.-]+[^\[\]\n]*\](?!\()"
-    r"|(?<![\w.\[])@\w+-[\w-]+|:[a-z]+-[\w-]+:|\{\{[^{}\n]*\}\}|\{%[^%\n]*%\}"
+    r"|(?<![\w.\[])@\w+-[\w-]+|(?<![\w:]):[a-z][\w+-]*:(?![\w:])|\{\{[^{}\n]*\}\}|\{%[^%]*%\}"
+    r"|\[\]\([^()\n]*\)|(?<=\])\[[A-Za-z_]\w*(?:\.\w+)+\]"
     r"|<!--.*?-->|\{/\*.*?\*/\}",
     re.DOTALL,
 )
@@ -95,8 +102,6 @@ def find_losses(texts: Path, paths: Iterable[str], root: Path) -> Losses:
     with_account.add(_runs(account.replace("`", " ").replace("*", " ")))
     words, silent, runs = 0, 0, []
     for path in paths:
-        if (root / "content/files" / path).is_file():  # a text that is linked, and no lesson
-            continue
         for run in _runs(_prose(texts / path)):
             words += len(run)
             for is_there, group in groupby(zip(on_pages.find(run), run, strict=True), _first):
@@ -164,7 +169,7 @@ def _prose(path: Path) -> str:
     """Return the prose of a text, or of the cells of a notebook that are no code."""
     text = path.read_text("utf-8", errors="replace").replace("\r\n", "\n")
     if path.suffix != ".ipynb":
-        return _EDGE.join(_read(FRONT.sub("", text)))
+        return _EDGE.join(_read(text))
     try:
         cells = json.loads(text)["cells"]
     except (ValueError, KeyError, TypeError):
@@ -175,7 +180,8 @@ def _prose(path: Path) -> str:
 
 def _read(text: str) -> Iterator[str]:
     """Yield the blocks of Markdown as plain text."""
-    text = _ATTRIBUTES.sub("", _MARKS.sub("", text))
+    text = _TITLED.sub(r"\1\3\n", _MARKS.sub("", FRONT.sub("", text)))
+    text = _ATTRIBUTES.sub("", text)
     text = _FORMULA.sub(_EDGE, _NAMES.sub(_EDGE, text))
     for token in _READER.parse(text):
         if token.type == "inline":

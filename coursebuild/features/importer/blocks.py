@@ -37,7 +37,10 @@ _TITLE = regex(r"\b(?:title|tab|filename|lst-cap|name)(?:=|:[ ])(?:\"([^\"]*)\"|
 _TAB = "tab", "a title in bold, and what it holds: pages show one tab below the other"
 _CAMERA = regex(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = regex(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
-_QUOTED_KIND = regex(r"^((?:[ \t]*>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\])", re.MULTILINE)
+_QUOTED_KIND = regex(
+    r"^((?:[ \t]*>)+[ \t]*\[!)([\w-]+)(?:[ \t]*\|[^\]\n]*)?(\][-+]?)(?:[ ]+#+(?=[ ]))?",
+    re.MULTILINE,
+)
 
 
 def convert_segment(segment: Segment, context: LessonContext) -> str:

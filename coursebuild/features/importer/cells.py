@@ -418,7 +418,11 @@ def _print_last_value(cell: Segment, text: str, tree: ast.Module, context: Lesso
     lines = text.split("\n")
     before = "\n".join(lines[: last.lineno - 1])
     lead = lines[last.lineno - 1].encode()[: last.col_offset].decode()
-    value = ast.get_source_segment(text, last.value)
+    value = ast.get_source_segment(text, last.value) or ""
+    *_, end = lines[: last.end_lineno]
+    below = [end.encode()[last.end_col_offset :].decode(), *lines[last.end_lineno :]]
+    if isinstance(last.value, ast.Tuple) and value[0] != "(":
+        value = f"({value})"
     if re.match(r"['\"]|[A-Za-z_][\w.]*\(", cell.value.lstrip()):  # `array([…])`, a text
         value = f"repr({value})"
-    return f"{before}\n{lead}print({value})"
+    return f"{before}\n{lead}print({value})" + "\n".join(below)

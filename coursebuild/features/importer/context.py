@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import binascii
+import contextlib
 import posixpath
 import re
+from base64 import b64decode
 from collections.abc import Mapping, Sequence
 from urllib.parse import unquote, urlsplit
 
 from msgspec import Struct, field
 from msgspec.structs import replace
 
+from coursebuild.api import regex
 from coursebuild.core.drawing.safe_svg import without_refused
+from coursebuild.core.values import fingerprint
 from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.source_files import TEXTS, SourceFiles, stem_of
 
@@ -50,8 +55,6 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     camera_is_position: bool
     path: str = ""
     """The lesson's file, relative to the folder that is imported."""
-    pictures: Mapping[str, bytes] = {}
-    """Pictures that this file contains, by name."""
     folder: str = ""
     """The folder of the new file, such as `content/lessons`."""
     place: str = ""
@@ -220,9 +223,10 @@ class LessonContext(Struct, frozen=True, kw_only=True):
 
     def resolve_picture(self, source: str) -> str:
         """Return the new address of a picture or file; empty where none here has it."""
-        name = source.removeprefix("attachment:")
-        if name in self.pictures:
-            return self.add_picture(name)
+        if data := _DATA.fullmatch(source):
+            with contextlib.suppress(binascii.Error):
+                name = f"{stem_of(self.path)}/{fingerprint(source)[:8]}.{data['kind']}"
+                return self._add_copy(name, b64decode(data["text"]))
         path = self.resolve_path(urlsplit(source).path)
         return self.add_file(path) if path in self.files and not path.endswith(TEXTS) else ""
 
@@ -264,11 +268,6 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         self.add_file(path)
         return f"content/files/{path}"
 
-    def add_picture(self, name: str) -> str:
-        """Copy a picture that the lesson's file contains, and return its new address."""
-        file = re.sub(r"[^\w.+-]", "-", name)  # it is a name, whatever path it looks like
-        return self._add_copy(f"{stem_of(self.path)}/{file}", self.pictures[name])
-
     def add_file(self, path: str) -> str:
         """Copy a file of the folder, and return its new address."""
         return self._add_copy(path, self.files.read(path))
@@ -284,6 +283,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         return posixpath.relpath(path, self.folder).replace(" ", "%20")
 
 
+_DATA = regex(r"data:\w+/(?P<kind>\w+)[\w.+-]*;base64,(?P<text>.+)")
+"""A file that a text holds itself."""
 PRINTS = {
     "python": 'print("{}:", {})  # for the text',
     "r": 'cat("{}:", format({}), "\\n")  # for the text',

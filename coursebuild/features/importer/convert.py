@@ -379,7 +379,6 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
         course_context,
         path=text.file,
         folder=folder,
-        pictures=text.pictures,
         is_mdx=is_mdx(text.file, text.segments),
         references=frozenset(
             label.casefold()

@@ -25,7 +25,7 @@ from coursebuild.features.importer.bookdown import read_bookdown
 from coursebuild.features.importer.context import LessonContext
 from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
 from coursebuild.features.importer.pandoc_tables import number_examples
-from coursebuild.features.importer.segments import read_segments
+from coursebuild.features.importer.segments import RST, read_segments
 from coursebuild.features.importer.source_files import (
     TEXTS,
     ImportedCourse,
@@ -270,7 +270,8 @@ def _read_file(
         if visible_text != source:
             files.change("hidden lines of code", "dropped: readers did not see them")
             source = visible_text
-        read = read_segments(source, text.file, title)
+        raw_formats = RST | {""} if "conf.py" in files else RST  # as Sphinx reads them
+        read = read_segments(source, text.file, title, raw_formats)
     except RecursionError:
         raise UsageError(f"{text.file} is nested too deeply") from None
     lost = {**read.lost, **({} if id or not read.summary else {"description": read.summary})}
@@ -299,7 +300,6 @@ def _read_file(
         path=path,
         summary=text.summary or _plain_text(read.summary),
         segments=read.segments,
-        pictures=read.pictures,
         substitutions={"page.title": title, **read.substitutions},
         macros=read.macros,
     )

@@ -168,7 +168,7 @@ def _write(directive: Directive, context: LessonContext) -> str:
             words = " ".join(f"{argument} {text}".split())
             context.leave(kind, f"{kind} (`{words.replace('`', '')}`), which no page here shows")
             return ""
-        case "embed" | "eval":
+        case "embed" | "eval" | "glue" | "glue:" | "glue:any":
             return convert_role(name, argument.strip().removeprefix("#"), context)
         case "rubric" | "centered":
             return f"**{rewrite_prose(argument, context)}**\n\n{directive.nested(text)}"

@@ -27,7 +27,7 @@ _STATEMENT = (
     r"|export[ ](?:const|let|function|default)\b)"
     r"[^\n]*(?:\n(?!</)[^\n]+)*\n?"  # not the end of a script element
 )
-_MDX = regex(rf"{_STATEMENT}|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
+_MDX = regex(rf"{_STATEMENT}|^\{{/\*|<[A-Za-z][^<>]*[ ](?:className=|\w+=\{{)", re.MULTILINE)
 """What only MDX can hold."""
 _PART = regex(
     r"(?P<code>(?P<ticks>`+)(?!`).*?(?<!`)(?P=ticks)(?!`))"
@@ -160,8 +160,8 @@ def _write_value(value: str) -> str:
                 target = _TARGET.match(value, part.end())
                 items[-1] += f"**[{text}]({target[1]})**: " if target else f"**{text}**: "
             else:
-                is_code = part["key"] and not re.search(r"`|\A\W*[A-Z][^<]*\w \w\w[^<]*\Z", text)
-                items[-1] += f"`{text}` " if is_code else f"{text} "
+                is_sentence = re.search(r"`|\A[^\w<]*[A-Z][^<]*\w \w\w[^<]*\Z", text)
+                items[-1] += f"`{text}` " if part["key"] and not is_sentence else f"{text} "
     return "\n".join(item.rstrip(": ") for item in items if item)
 
 

@@ -16,9 +16,11 @@ from coursebuild.features.importer.source_files import TEXTS, SourceFiles
 
 _WORD = regex(r"[^\W\d_](?:[^\W_]|\d)+")
 _MARKUP = regex(
-    r"<(script|style)\b.*?</\1\s*>|<[^<>]*>|\x1b\[[0-9;]*m|data:[\w/+-]+;base64,[\w/+=]+", re.DOTALL
+    r"<(script|style)\b.*?</\1\s*>|<[^<>]*>|\x1b\[[0-9;]*m|attachment:[^()\s]+"
+    r"|data:[\w/+-]+;base64,[\w/+=]+",
+    re.DOTALL,
 )
-"""What of recorded HTML, or of what a terminal shows, is no word."""
+"""What of recorded HTML, of what a terminal shows, or of a picture's address is no word."""
 _MAPS = (".yml", ".yaml", ".toml", "_category_.json", "book.json", "course.json")
 _NEW_TEXTS = (".md", ".toml", ".bib", ".js")
 _MOST_WORDS = 40

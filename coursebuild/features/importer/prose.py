@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from coursebuild.api import regex
-from coursebuild.features.importer.account import Rules
+from coursebuild.features.importer.account import Rules, shorten_value
 from coursebuild.features.importer.anchors import (
     FIGURE,
     MARKDOWN_FIGURE,
@@ -311,7 +311,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             label = dressing if dressing.startswith("{#fig-") else ""
             if address := context.resolve_picture(source):
                 return f"![{alt}]({address}{hover}){label}"
-            context.leave("picture", f"the picture `{source}`, which is not in the folder")
+            name = shorten_value(source)
+            context.leave("picture", f"the picture `{name}`, which is not in the folder")
             return alt
         case "link":
             address = context.resolve_link(match["address"].strip("<>"))

@@ -120,7 +120,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             message = f"`{body}`, a source that no BibTeX file of the folder has; it is code now"
             context.leave(f"role `{{{name}}}`", message)
             return f"`{body}`"
-        case "glue:text" | "eval":
+        case "glue" | "glue:" | "glue:any" | "glue:text" | "eval":
             whole = f"`{body}`"
             value = context.print_value("python", body) if name == "eval" else body
             return _ask_value(f"role `{{{name}}}`", value, body, whole, context)
@@ -182,6 +182,8 @@ def convert_code(whole: str, context: LessonContext) -> str:
         context.leave("code in a line", f"{whole}, which is for other forms than a site")
         return ""
     run = _INLINE_RUN.fullmatch(whole)
+    if context.is_pandoc:  # the name of an object, as filters mark it
+        whole = re.sub(r"\A(`+)~~(?=[A-Za-z][\w.]*(?:\(\))?\1\Z)", r"\1", whole)
     if run is None:
         return _LANGUAGE.sub(r"\1", fill_shortcodes(whole, context))
     if run[1] is None and re.match(r"[\w.]+[ ]*(?:<-|=(?!=))", run[2]):
@@ -331,9 +333,9 @@ def convert_tag(tag: str, context: LessonContext) -> str:
         context.leave("link", f"a link to `{shorten_value(attribute[3])}`, data in the text")
         return tag[: attribute.start()].rstrip() + tag[attribute.end() + 1 :]
     for attribute in reversed(attributes):
-        if re.match(r"(?!attachment:)[a-z][a-z+.-]*:|//|#", attribute[3]):
+        address = attribute[3]
+        if re.match(r"(?!attachment:|data:)[a-z][a-z+.-]*:|//|#", address):
             continue
-        address = attribute[3].removeprefix("attachment:")
         if attribute[1].lower() == "srcset":  # the first of several: pages take one size
             address = address.split()[0].rstrip(",")
         before, after = tag[: attribute.start(3)], tag[attribute.end(3) :]
@@ -343,7 +345,7 @@ def convert_tag(tag: str, context: LessonContext) -> str:
         problem = "which is not in the folder"
         if stem_of(context.resolve_path(urlsplit(address).path)) in context.targets:
             problem = "which HTML cannot link: write the link in Markdown"
-        context.leave("tag of HTML", f"the file `{address}`, {problem}")
+        context.leave("tag of HTML", f"the file `{shorten_value(address)}`, {problem}")
         if attribute[1].lower() == "src" and re.match("<img", tag, re.IGNORECASE):
             return find_group(r"\s(?i:alt)=[\"']([^\"']*)", tag)
         tag = tag[: attribute.start()].rstrip() + after[1:]

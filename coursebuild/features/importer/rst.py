@@ -24,7 +24,7 @@ _INLINE = regex(
 def read_rst(text: str) -> str:
     """Return reStructuredText in Markdown of MyST: its directives, roles, links and labels."""
     parts, at = [], 0
-    for block in _DIRECTIVE.finditer(text := f"{text.expandtabs()}\n"):
+    for block in _DIRECTIVE.finditer(text := textwrap.dedent(f"{text.expandtabs()}\n")):
         parts += [_INLINE.sub(_write_inline, text[at : block.start()]), _write_block(block)]
         at = block.end()
     return "".join((*parts, _INLINE.sub(_write_inline, text[at:])))

@@ -8,7 +8,7 @@ import contextlib
 import json
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -69,6 +69,9 @@ _NEEDLESS = (
 """Further keys of which nothing is lost."""
 
 
+RST = frozenset(("text/restructuredtext", "text/x-rst"))
+
+
 class ReadText(Struct, frozen=True):
     """What the file of a lesson holds."""
 
@@ -76,7 +79,6 @@ class ReadText(Struct, frozen=True):
     """Empty if it states none."""
     summary: str
     segments: tuple[Segment, ...]
-    pictures: Mapping[str, bytes]
     lost: Mapping[str, Any]
     """What its front matter, or a notebook's metadata, hold that has no counterpart, by key."""
     substitutions: Mapping[str, str]
@@ -85,13 +87,14 @@ class ReadText(Struct, frozen=True):
     """The definitions of its macros."""
 
 
-def read_segments(text: str, name: str, title: str = "") -> ReadText:
+def read_segments(text: str, name: str, title: str = "", raw_formats: Set[str] = RST) -> ReadText:
     """Read the file of a lesson, which the map may give a title.
+
+    Cells of a notebook that are raw hold reStructuredText where they have one of these formats.
 
     Raises:
         UsageError: it is no notebook, but is called so.
     """
-    pictures: dict[str, bytes] = {}
     metadata: Mapping[str, Any] = {}
     if name.endswith(".ipynb"):
         try:
@@ -105,7 +108,7 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
             if size:
                 metadata = {**metadata, **front}
                 cells[0] = {**cells[0], "source": first[size:]}
-            segments, pictures = _read_cells(cells, language)
+            segments = _read_cells(cells, language, raw_formats)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             raise UsageError(f"{name} is not a notebook of format 4") from None
     else:
@@ -137,7 +140,6 @@ def read_segments(text: str, name: str, title: str = "") -> ReadText:
         str(metadata.get("title") or (titles or [""])[0]).strip(),
         " ".join("".join(str(metadata[key]) for key in summaries).split()),
         shifted,
-        pictures,
         {
             str(key): value
             for key, value in metadata.items()
@@ -376,28 +378,19 @@ for _parse in (_parse_titled, _parse_marked, _parse_component):
 # --- notebooks
 
 
-def _read_cells(
-    cells: list[dict[str, Any]], language: str
-) -> tuple[list[Segment], dict[str, bytes]]:
-    """Return cells as segments, and the pictures that are attached to them, by name."""
+def _read_cells(cells: list[dict[str, Any]], language: str, raw_formats: Set[str]) -> list[Segment]:
+    """Return cells as segments; the pictures that are attached to one are in its text."""
     segments: list[Segment] = []
-    attachments: dict[str, bytes] = {}
     is_run = any(cell.get("outputs") for cell in cells)
     for number, cell in enumerate(cells, 1):
         place, source = f"cell {number}", join_lines(cell.get("source", ""))
         metadata = cell.get("metadata") or {}
         raw_format = str(metadata.get("raw_mimetype") or metadata.get("format") or "")
         if cell.get("cell_type") == "markdown":
-            pictures = {}
             for name, kinds in (cell.get("attachments") or {}).items():
-                for data in kinds.values():
-                    try:
-                        pictures[name] = base64.b64decode(join_lines(data))
-                    except (binascii.Error, ValueError):
-                        continue
-            for picture, data in pictures.items():
-                source = source.replace(f"attachment:{picture}", f"attachment:{number}-{picture}")
-                attachments[f"{number}-{picture}"] = data
+                for kind, data in kinds.items():
+                    url = f"data:{kind};base64,{''.join(join_lines(data).split())}"
+                    source = source.replace(f"attachment:{name}", url)
             segments += read_markdown(source, place=place)
         elif cell.get("cell_type") == "code" and source.strip():
             outputs = cell.get("outputs") or ()
@@ -415,7 +408,7 @@ def _read_cells(
                 shows_value=bool(values) if is_run else None,
                 printed="".join(join_lines(stream.get("text") or "") for stream in streams),
                 value="\n".join(map(join_lines, value_texts)),
-                picture=_recorded_picture(outputs) if outputs else None,
+                picture=_recorded_picture(outputs),
                 lost=tuple(
                     kind
                     for output in outputs
@@ -424,11 +417,12 @@ def _read_cells(
                 ),
             )
             segments.append(cell_segment)
-        elif raw_format == "text/restructuredtext":
+        elif raw_format in raw_formats:
             segments += read_markdown(read_rst(source), place=place)
         elif source.strip():
-            segments.append(Segment(kind="block", place=place, text=source, head="text"))
-    return segments, attachments
+            head = f"={raw_format.rpartition('/')[2] or 'text'}"
+            segments.append(Segment(kind="block", place=place, text=source, head=head))
+    return segments
 
 
 _LOST_KINDS = frozenset(
@@ -437,9 +431,14 @@ _LOST_KINDS = frozenset(
 )
 
 
-def _recorded_picture(outputs: Iterable[Mapping[str, Any]]) -> tuple[str, bytes]:
-    """Return the picture among the outputs of a cell, with its extension; empty for none."""
+def _recorded_picture(outputs: Iterable[Mapping[str, Any]]) -> tuple[str, bytes] | None:
+    """Return the picture among the outputs of a cell, with its extension; empty for none.
+
+    `None`: there are none, or a program was to draw it in the browser.
+    """
     data = {kind: text for output in outputs for kind, text in (output.get("data") or {}).items()}
+    if not outputs or "application/javascript" in data:
+        return None
     with contextlib.suppress(binascii.Error, KeyError):
         return ".png", base64.b64decode(join_lines(data["image/png"]))
     return ".svg", join_lines(data.get("image/svg+xml") or "").encode()

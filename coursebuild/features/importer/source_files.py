@@ -76,8 +76,6 @@ class ImportedText(Struct, frozen=True, kw_only=True):
     path: str = ""
     """The path of its new file; empty where it is only planned."""
     segments: tuple[Segment, ...] = ()
-    pictures: Mapping[str, bytes] = {}
-    """Pictures that its file contains, by name."""
     substitutions: Mapping[str, str] = {}
     """What names between braces stand for in it, as its metadata say."""
     macros: str = ""

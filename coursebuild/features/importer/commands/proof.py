@@ -314,7 +314,7 @@ def _write_values(
     printed = "".join(script_run.output_of(part) for part in parts if part not in failing_parts)
     for place in _VALUE_PLACE.finditer(source.text):
         line = re.search(rf"^{re.escape(place['name'])}:[ ]*([^`\n]*\S)", printed, re.MULTILINE)
-        if line is not None:
+        if line is not None and line[1][0] != "<":  # an object that no words stand for
             value, words = line[1], ""
             if _NUMBER.fullmatch(value):
                 value, words = format(float(value), place["format"] or ""), f' "{place["name"]}"'
