@@ -187,9 +187,12 @@ def _of_document(document: Document) -> Iterator[ProvedText]:
             yield _proved("section", f"the optional section `{title}`", title, heading.span)
     for sides in (p for f in features() if f.proofs is not None for p in f.proofs(document)):
         label, text = (side.text.strip() for side in sides)
-        whole = document.source.span(sides[0].start, sides[1].end).text
-        name = f"the formula `{shorten(whole, 80, placeholder='…')}`"
-        yield _proved("formula", name, text, sides[1], label=label)
+        whole = document.source.span(sides[0].start, sides[1].end)
+        first = document.source.span(sides[0].start, sides[1].start).text.strip()
+        if not first.isalnum():  # else it may stand in any sentence: only with its sign
+            label = first
+        name = f"the formula `{shorten(whole.text, 80, placeholder='…')}`"
+        yield _proved("formula", name, text, whole, label=label)
     for link in find_inlines(document, Link):
         text = link.target_span.text
         is_opaque = isinstance(link.target, UrlTarget) and _OPAQUE.match(text)

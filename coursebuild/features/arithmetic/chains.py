@@ -149,9 +149,10 @@ def _check_chain(
 
 
 def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
-    """Return how a wrong relation may be meant; empty where numbers are what they say.
+    r"""Return how a wrong relation may be meant; empty where numbers are what they say.
 
-    `0 = 1` ends a proof by contradiction, and of whole numbers `/` may be a division without rest.
+    `0 = 1` and `4.5\ \mathrm m = 0` end a proof by contradiction, and of whole numbers `/` may be a
+    division without rest.
     """
     sides = left.get_expression(), right.get_expression()
     if _says_how_many(*sides):
@@ -169,7 +170,7 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
     first, second = (side.tex[side.start : side.end].strip(" .") for side in (left, right))
     if not re.fullmatch("[0-9]+", second):
         return ""
-    if re.fullmatch("[0-9]+", first):
+    if re.fullmatch("[0-9]+", first) or (second == "0" and read_numeral(sides[0])):
         return "there is nothing to compute"
     quotient = re.fullmatch(r"([0-9]+)\s*/\s*([1-9][0-9]*)", first)
     if quotient is not None and int(quotient[1]) // int(quotient[2]) == int(second):

@@ -16,8 +16,10 @@ from coursebuild.features.importer.source_files import find_group, value_at
 WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
 """Words in a formula that hold a formula themselves."""
 _CODE = r"(?P<ticks>`+)(?!`)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
+_PRICE = r"(?<!\$)\$(?=(?:[^$\\\n]|\\.|\$(?!\$))+\$\$)"
+"""A dollar sign in a displayed formula, which ends in its line; MathJax shows it as it stands."""
 _DISPLAY = regex(
-    rf"{_CODE}|\$\$(?P<tex>(?:{WORDS}|[^$\\]|\\.)+?)\$\$"
+    rf"{_CODE}|\$\$(?P<tex>(?:{WORDS}|[^$\\]|\\.|{_PRICE})+?)\$\$"
     r"(?:[ \t]*(?:\((?P<myst>[\w:.-]+)\)|\{#(?P<quarto>[\w:.-]+)\}))?"
     r"(?:[ \t]*<br[ ]*/?>)*(?P<behind>[ \t]*(?=[^\s.,;:]|[.,;:][ \t]*\S))?",
     re.DOTALL,
@@ -42,6 +44,8 @@ _ESCAPED = regex(
     re.DOTALL,
 )
 """A formula whose brackets have two backslashes, one of which is Markdown's; or code."""
+_TEXT = regex(rf"{_CODE}|\\(?:text\w*|[hm]box)\{{[^{{}}]*\}}", re.DOTALL)
+"""Words in a formula, in which MathJax reads `%` as it stands; or code."""
 LABEL = regex(r"\\label\{([^{}]*)\}")
 _EMPTY = regex(r"[ \t]*\n?[ \t]*")
 _MARGIN = regex(r"[ \t]*>[ \t>]*|[ \t]+\Z")
@@ -88,6 +92,7 @@ def read_escapes(text: str) -> str:
 def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
     text = re.sub(r"(?<!\\)\\[ \t]*(?=\n[ \t>]*\$\$)", "", text)  # a blank, at its end
+    text = _TEXT.sub(lambda m: m[0] if m["ticks"] else re.sub(r"(?<!\\)%", r"\%", m[0]), text)
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
     text = _DOXYGEN.sub(_write_doxygen, _DISPLAY.sub(_drop_empty, text))
     return _DISPLAY.sub(_label_formula, _ENVIRONMENT.sub(_write_environment, text))
@@ -131,6 +136,7 @@ def _label_formula(match: re.Match[str]) -> str:
         return match[0]
     label = match["myst"] or match["quarto"] or find_group(LABEL, match["tex"])
     tex = LABEL.sub("", match["tex"])
+    tex = re.sub(rf"({WORDS}|\\.)|\$", lambda sign: sign[1] or r"\$", tex)
     tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
     tex = _align(tex)
     opening, closing = "", match["behind"] or ""
