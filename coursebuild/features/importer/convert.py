@@ -169,9 +169,9 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
     }
     for path, names in parts.items():
         whole = _COMMENT.sub("", "".join(texts.get(name, "") for name in (path, *names)))
-        known = {*map(posixpath.basename, names)}
-        lacking = (n for n in _PART.findall(whole) if posixpath.basename(n) not in known)
-        if name := next(lacking, ""):
+        part_names = {*map(posixpath.basename, names)}
+        needs = (n for n in _PART.findall(whole) if posixpath.basename(n) not in part_names)
+        if name := next(needs, ""):
             lacks[path] = name
     pieces = {part for path in lacks for part in parts.pop(path)}
     _place_models(parts, models)
