@@ -33,7 +33,9 @@ from coursebuild.features.lab.model import BUILT_IN_KINDS
 _MAX_DEPTH = 20
 """Blocks that may be around another."""
 _DIRECTIVE = regex(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
-_TITLE = regex(r"\b(?:title|tab|filename|lst-cap|name)(?:=|:[ ])(?:\"([^\"]*)\"|'([^']*)')")
+_TITLE = regex(
+    r"\b(?:title|tab|filename|lst-cap|name)(?:=|:[ ])(?:\"((?:\\.|[^\"\\])*)\"|'([^']*)')"
+)
 _TAB = "tab", "a title in bold, and what it holds: pages show one tab below the other"
 _CAMERA = regex(r'"camera"\s*:\s*\{(?:[^{}])*\}')
 _ANGLE = regex(r'("(azimuth|elevation)"\s*:\s*)(-?\d+(?:\.\d+)?)')
@@ -207,8 +209,8 @@ def _convert_fence(head: str, text: str, context: LessonContext) -> str:
         text = code_for_readers(text)
         caption = options.get("fig-cap") or options.get("lst-cap") or ""
         head += f' title="{caption}"' if caption else ""
-    signs = r"(\$[^$]+\$)|(?<!\\)([][_*`{}<])"
-    words = re.sub(signs, lambda sign: sign[1] or f"\\{sign[2]}", find_group(_TITLE, head))
+    signs, title = r"(\$[^$]+\$)|([][_*`{}<])", find_group(_TITLE, head)
+    words = re.sub(signs, lambda sign: sign[1] or f"\\{sign[2]}", re.sub(r"\\(.)", r"\1", title))
     if kind in ("output", "text") or package:  # of a block that is not run here
         language = "text illustration" if "illustration" in head else "text"
     kind = f"block of `{language}`" if language else "block without a kind"

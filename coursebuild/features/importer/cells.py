@@ -6,7 +6,7 @@ import ast
 import posixpath
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from msgspec.structs import replace
 
@@ -171,10 +171,7 @@ def _take_saved_figures(cell: Segment, code: str, context: LessonContext) -> tup
         _copy_figure(name, data, context)
         context.change("figure of a cell", "saved by the script, and recorded")
     code = _SAVED.sub(lambda match: f'{match["call"]}"{names[match["path"]]}"', code)
-    caption = _caption_of(cell, code, context)
-    label = len(names) == 1
-    figures = (_write_figure(cell, name, caption, has_label=label) for name in names.values())
-    return _without_window(code), "\n\n".join(figures)
+    return _without_window(code), _write_figures(cell, names.values(), code, context)
 
 
 def _without_window(code: str) -> str:
@@ -182,22 +179,19 @@ def _without_window(code: str) -> str:
     return re.sub(r"^pass\s*\Z", "", code, flags=re.MULTILINE).rstrip("\n")
 
 
-def _caption_of(cell: Segment, code: str, context: LessonContext) -> str:
+def _write_figures(cell: Segment, names: Collection[str], code: str, context: LessonContext) -> str:
+    """Return the paragraphs that show what a cell draws; a label is that of a single figure."""
     options, title = read_options(cell.text)[0], _DRAWN_TITLE.search(code)
     words = "" if title is None else title[3]
     if title and title[1] != "r":
         words = re.sub(r"\\(n|[\\'\"])", lambda sign: " " if sign[1] == "n" else sign[1], words)
     caption = options.get("fig-cap") or options.get("caption") or words
     caption = " ".join(caption.strip("\"' ").split())
-    return rewrite_prose(caption or context.title, context).rstrip()
-
-
-def _write_figure(cell: Segment, name: str, caption: str, *, has_label: bool = True) -> str:
-    options = read_options(cell.text)[0]
+    caption = rewrite_prose(caption or context.title, context).rstrip()
     alt = " ".join(options.get("fig-alt", options.get("alt", "")).strip("\"' ").split()) or caption
     alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$\\]", "", alt)
-    label = options.get("label", "") if has_label else ""
-    return figure_of(name, caption, label if label.startswith("fig-") else "", alt)
+    label = find_group(r"\A(fig-.*)", options.get("label", "")) if len(names) == 1 else ""
+    return "\n\n".join(figure_of(name, caption, label, alt) for name in names)
 
 
 _DRAWN_TITLE = regex(
@@ -212,7 +206,7 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
     context.figures.append(name)
     context.change("figure of a cell", "saved by the script, and recorded")
     code = f'{_without_window(code)}\n{pyplot}.savefig("{name}")\n{pyplot}.close("all")'.lstrip()
-    return code, _write_figure(cell, name, _caption_of(cell, code, context))
+    return code, _write_figures(cell, [name], code, context)
 
 
 def write_outputs(cell: Segment, context: LessonContext) -> Iterator[str]:

@@ -70,6 +70,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     references: frozenset[str] = frozenset()
     """The labels of links by reference that the lesson defines, in lower case."""
     title: str = ""
+    """The heading above the place, by which a figure is called that has no caption."""
     script_path: str = ""
     """Of the script that the lesson's cells become."""
     parts: list[str] = field(default_factory=list)
@@ -165,8 +166,8 @@ class LessonContext(Struct, frozen=True, kw_only=True):
         if parts.scheme in ("javascript", "data"):
             self.leave("link", f"a link to `{shorten_value(address)}`, a program or data")
             return ""
-        if parts.scheme or parts.netloc or not parts.path:
-            return parts.geturl()
+        if parts.scheme or parts.netloc or not parts.path:  # a label may hold a colon
+            return (parts.path and self.resolve_anchor(to_anchor(address))) or parts.geturl()
         path = self.resolve_path(parts.path)
         anchor = f"#{parts.fragment}" if parts.fragment else ""
         stem = stem_of(path)  # the first text of a folder is often called by the folder

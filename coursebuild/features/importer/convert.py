@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import os
 import posixpath
 import re
@@ -119,6 +118,7 @@ def convert(files: SourceFiles) -> ConvertedCourse:
 _READABLE = regex(r"^(?![ ]{0,3}#{1,6}[ \t])[^\n]*\S", re.MULTILINE)
 """A line that is no heading."""
 _COMMENT = regex(r"<!--.*?-->", re.DOTALL)
+_HEADING = regex(r"^[ ]{0,3}#{1,6}[ \t]+(\S.*?)[ \t]*(?:#+|\{[^{}\n]*\})?[ \t]*$", re.MULTILINE)
 
 
 def _plan_empty_lessons(
@@ -153,8 +153,7 @@ _PART = regex(r"<(?:include|mesh|hfield|texture|skin)\s[^<>]*?\bfile\s*=\s*[\"']
 
 def _find_models(files: SourceFiles) -> Mapping[str, str]:
     """Return the new paths of models, and of the files that they are made of, by their paths."""
-    models: dict[str, str] = {}
-    texts: dict[str, str] = {}
+    models, texts, lacks = dict[str, str](), dict[str, str](), dict[str, str]()
     for path in files:
         if path.endswith(".xml") and b"<mujoco" in (data := files.read(path)):
             texts[path] = data.decode("utf-8", "replace")
@@ -168,7 +167,12 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
         path: [part for part in existing_files(files.folder, path, text) if part in files]
         for path, text in texts.items()
     }
-    lacks = {path: name for path in texts if (name := _find_lack(path, parts[path], texts))}
+    for path, names in parts.items():
+        whole = _COMMENT.sub("", "".join(texts.get(name, "") for name in (path, *names)))
+        part_names = {*map(posixpath.basename, names)}
+        needs = (n for n in _PART.findall(whole) if posixpath.basename(n) not in part_names)
+        if name := next(needs, ""):
+            lacks[path] = name
     pieces = {part for path in lacks for part in parts.pop(path)}
     _place_models(parts, models)
     included = {part for names in parts.values() for part in names if part in texts}
@@ -183,14 +187,6 @@ def _find_models(files: SourceFiles) -> Mapping[str, str]:
             files.leave(path, message, "fragment of a model")
             models.pop(path, None)
     return models
-
-
-def _find_lack(path: str, parts: Sequence[str], texts: Mapping[str, str]) -> str:
-    """Return the name of a file that a model is made of and the folder lacks; empty for none."""
-    part_names = {*map(posixpath.basename, parts)}
-    whole = _COMMENT.sub("", "".join(texts.get(name, "") for name in (path, *parts)))
-    names = _PART.findall(whole)
-    return next((name for name in names if posixpath.basename(name) not in part_names), "")
 
 
 def _place_models(parts: Mapping[str, Sequence[str]], models: dict[str, str]) -> None:
@@ -213,8 +209,11 @@ def _place_models(parts: Mapping[str, Sequence[str]], models: dict[str, str]) ->
     models |= {n: f"models/{posixpath.relpath(f'/{n}', root)}" for n in rest - models.keys()}
 
 
+_BEGIN = r"(?:^|(?<=\}))[ \t]*@"
 _WORK = regex(
-    r"(?:^|(?<=\}))[ \t]*@(?!comment|preamble)(\w+)[ \t]*\{[ \t]*([^,\s{}=]+)", re.M | re.I
+    rf"{_BEGIN}(?!comment|preamble)(\w+)[ \t]*\{{[ \t]*([^,\s{{}}=]+).*?"
+    rf"(?={_BEGIN}\w+[ \t]*\{{|\Z)",
+    re.MULTILINE | re.DOTALL | re.IGNORECASE,
 )
 
 
@@ -223,11 +222,8 @@ def _works(files: SourceFiles) -> Iterator[tuple[str, str]]:
     for path in files:
         if path.endswith(".bib"):
             text = files.read(path).decode("utf-8", "replace").replace("\r\n", "\n")
-            starts = [*_WORK.finditer(text)]
-            for work, following in itertools.zip_longest(starts, starts[1:]):
-                end = following.start() if following else len(text)
-                key = "" if work[1].lower() == "string" else work[2]
-                yield key, text[work.start() : end].strip()
+            for work in _WORK.finditer(text):
+                yield "" if work[1].lower() == "string" else work[2], work[0].strip()
 
 
 _AUTHOR = regex(r"\bauthor\s*=\s*(?:\{((?:[^{}]|\{[^{}]*\})*)\}|\"([^\"]*)\")", re.IGNORECASE)
@@ -398,7 +394,11 @@ def _convert_text(text: ImportedText, course_context: LessonContext) -> str:
         figures=[],
         notes=[],
     )
-    parts = [convert_segment(segment, context) for segment in text.segments]
+    parts = []
+    for segment in text.segments:
+        parts.append(convert_segment(segment, context))
+        if segment.kind == "prose" and (headings := _HEADING.findall(segment.text)):
+            context = replace(context, title=headings[-1])
     parts += write_joined_cells(context)
     new = "\n\n".join(part.strip("\n") for part in parts if part.strip()) + "\n"
     new = print_values(new, context)

@@ -271,10 +271,11 @@ def _read_file(
             files.change("hidden lines of code", "dropped: readers did not see them")
             source = visible_text
         raw_formats = RST | {""} if "conf.py" in files else RST  # as Sphinx reads them
-        read = read_segments(source, text.file, title, raw_formats)
+        read, lost = read_segments(source, text, raw_formats)
     except RecursionError:
         raise UsageError(f"{text.file} is nested too deeply") from None
-    lost = {**read.lost, **({} if id or not read.summary else {"description": read.summary})}
+    if read.summary and not id:
+        lost = {**lost, "description": read.summary}
     for name, value in lost.items():
         kind = "lesson" if id else "page"
         message = f"`{name}` of its metadata ({shorten_value(value)}), which a {kind} does not have"
@@ -293,15 +294,13 @@ def _read_file(
         page = _free_id(page, (f"{page}-{n}" for n in itertools.count(2)), used_ids)
     path = f"content/lessons/{id}-{slug}.md" if id else f"content/pages/{page}.md"
     return replace(
-        text,
+        read,
         id=id or page,
         slug=slug,
         title=title,
         path=path,
         summary=text.summary or _plain_text(read.summary),
-        segments=read.segments,
         substitutions={"page.title": title, **read.substitutions},
-        macros=read.macros,
     )
 
 

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from coursebuild.api import marks, model
 from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.context import NUMBERED, LessonContext, label_anchor, to_anchor
-from coursebuild.features.importer.displays import display_formula
+from coursebuild.features.importer.displays import normalize_formulas
 from coursebuild.features.importer.includes import lines_of
 from coursebuild.features.importer.outlines import read_tree
 from coursebuild.features.importer.prose import rewrite_prose
@@ -110,8 +110,9 @@ def _write(directive: Directive, context: LessonContext) -> str:
     kind = f"directive `{{{name}}}`"
     match name:
         case "math":
-            tex = "\n".join(part for part in (argument, text) if part.strip())
-            return display_formula(tex, directive.label)
+            label = f" {{#{label_anchor(directive.label)}}}" if directive.label else ""
+            tex = "\n".join((argument, text)).strip()
+            return normalize_formulas(f"$$\n{tex}\n$${label}")
         case "figure" | "image" if "only-dark" in options.get("class", ""):
             return ""  # a page makes its pictures dark itself
         case "figure" | "image":

@@ -46,7 +46,7 @@ _ESCAPED = regex(
 """A formula whose brackets have two backslashes, one of which is Markdown's; or code."""
 _TEXT = regex(rf"{_CODE}|\\(?:text\w*|[hm]box)\{{[^{{}}]*\}}", re.DOTALL)
 """Words in a formula, in which MathJax reads `%` as it stands; or code."""
-LABEL = regex(r"\\label\{([^{}]*)\}")
+LABEL = regex(r"\label\{([^{}]*)\}[ \t]*")
 _EMPTY = regex(r"[ \t]*\n?[ \t]*")
 _MARGIN = regex(r"[ \t]*>[ \t>]*|[ \t]+\Z")
 """The mark of a quotation, or what a line of a list begins with."""
@@ -112,19 +112,6 @@ def _write_doxygen(match: re.Match[str]) -> str:
     return "$" + re.sub(r"(\\(?:begin|end)\{align)\*?\}", r"\1ed}", inline) + "$"
 
 
-def display_formula(tex: str, label: str) -> str:
-    """Return a displayed formula in Markdown, whose own label may stand in its TeX."""
-    label, tex = label or find_group(LABEL, tex), LABEL.sub("", tex)
-    return f"$$\n{_align(tex).strip()}\n$$" + (f" {{#eq:{label_anchor(label)}}}" if label else "")
-
-
-def _align(tex: str) -> str:
-    """Write the environment that MyST and Sphinx do not need to align at `&`."""
-    if not re.search(r"(?<!\\)&", _WHOLE_ENVIRONMENT.sub("", tex)):
-        return tex
-    return f"\n\\begin{{aligned}}\n{tex.strip()}\n\\end{{aligned}}\n"
-
-
 def _drop_empty(match: re.Match[str]) -> str:
     """Return nothing for a formula of blanks, by which a text makes room below a line."""
     is_empty = match["tex"] is not None and _EMPTY.fullmatch(match["tex"])
@@ -138,7 +125,8 @@ def _label_formula(match: re.Match[str]) -> str:
     tex = LABEL.sub("", match["tex"])
     tex = re.sub(rf"({WORDS}|\\.)|\$", lambda sign: sign[1] or r"\$", tex)
     tex = re.sub(r"\n(?:[ \t]*\n)+", "\n", tex)
-    tex = _align(tex)
+    if re.search(r"(?<!\\)&", _WHOLE_ENVIRONMENT.sub("", tex)):  # MyST and Sphinx align it so
+        tex = f"\n\\begin{{aligned}}\n{tex.strip()}\n\\end{{aligned}}\n"
     opening, closing = "", match["behind"] or ""
     line = match.string[match.string.rfind("\n", 0, match.start()) + 1 : match.start()]
     if lead := _LEAD.search(match["tex"]):  # a mark beside a text could be that of another formula

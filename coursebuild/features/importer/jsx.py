@@ -69,7 +69,7 @@ _DATA = regex(
     re.DOTALL,
 )
 """What matters in a literal of JavaScript: where an object begins or ends, and its values."""
-_ESCAPE = regex(r"\\([\"'`\\n])")
+_ESCAPE = regex(r"\\([\"'`\\])")
 _NAMES = ("title", "label", "name", "heading")
 _ADDRESSES = ("href", "to", "link", "url")
 _TARGET = regex(rf"[^{{}}]*?\b(?:{'|'.join(_ADDRESSES)})\s*:\s*[\"']([^\"'\n]*)[\"']")
@@ -155,7 +155,8 @@ def _write_value(value: str) -> str:
             depth += 1 if brace == "{" else -1
             items += [f"{'  ' * (depth - 1)}- "] * (brace == "{")
         elif part["key"] not in _ADDRESSES:
-            text = part["number"] or _ESCAPE.sub(_read_escape, part["string"][1:-1])
+            string = re.sub(r"\\n", " ", (part["string"] or "")[1:-1])
+            text = part["number"] or _ESCAPE.sub(r"\1", string)
             if part["key"] in _NAMES and items[-1].endswith("- "):
                 target = _TARGET.match(value, part.end())
                 items[-1] += f"**[{text}]({target[1]})**: " if target else f"**{text}**: "
@@ -163,10 +164,6 @@ def _write_value(value: str) -> str:
                 is_sentence = re.search(r"`|\A[^\w<]*[A-Z][^<]*\w \w\w[^<]*\Z", text)
                 items[-1] += f"`{text}` " if part["key"] and not is_sentence else f"{text} "
     return "\n".join(item.rstrip(": ") for item in items if item)
-
-
-def _read_escape(escape: re.Match[str]) -> str:
-    return " " if escape[1] == "n" else escape[1]
 
 
 def _convert_part(part: re.Match[str], context: LessonContext) -> str:

@@ -119,8 +119,11 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     message = f"a {kind} is a script, which runs when `[runners]` of the map says how"
     context.leave(kind, message)
     context.scripts.append(path := _new_path(language, context))
-    script = marks.fence(f"{language} file={path}{word}", code)
-    return "\n\n".join((*head, script, *_outputs(cell, language, context)))
+    head.append(marks.fence(f"{language} file={path}{word}", code))
+    if language in _PRINTING:
+        cell = replace(cell, printed=cell.printed + cell.value, value="")
+    head += write_recorded(cell.printed, path, context)
+    return "\n\n".join((*head, *write_outputs(replace(cell, printed=""), context)))
 
 
 def write_joined_cells(context: LessonContext) -> Iterator[str]:
@@ -136,10 +139,3 @@ def _new_path(language: str, context: LessonContext) -> str:
     stem = context.script_path.removesuffix(".py")
     number = f"_{len(context.scripts) + 1}" if context.scripts else ""
     return f"{stem}{number}.{_EXTENSIONS[language]}"
-
-
-def _outputs(cell: Segment, language: str, context: LessonContext) -> Iterator[str]:
-    printed = cell.printed + (cell.value if language in _PRINTING else "")
-    yield from write_recorded(printed, context.scripts[-1], context)
-    value = "" if language in _PRINTING else cell.value
-    yield from write_outputs(replace(cell, printed="", value=value), context)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import re
 import unicodedata
-from collections.abc import Sequence
 from urllib.parse import urlsplit
 
 from coursebuild.api import regex
@@ -184,7 +183,7 @@ def convert_code(whole: str, context: LessonContext) -> str:
     run = _INLINE_RUN.fullmatch(whole)
     if context.is_pandoc:  # the name of an object, as filters mark it
         whole = re.sub(r"\A(`+)~~(?=[A-Za-z][\w.]*(?:\(\))?\1\Z)", r"\1", whole)
-    if run is None:
+    if run is None or not (run[1] or context.is_pandoc):
         return _LANGUAGE.sub(r"\1", fill_shortcodes(whole, context))
     if run[1] is None and re.match(r"[\w.]+[ ]*(?:<-|=(?!=))", run[2]):
         context.leave("code in a line", f"{whole}, which shows nothing: set the name in a cell")
@@ -266,18 +265,12 @@ def draw_emoji(name: str, context: LessonContext) -> str:
     return name
 
 
-def _find_sign(name: str, ends: Sequence[str]) -> str:
-    """Return the sign that Unicode calls so, with one of these ends; empty for none."""
-    for end in ends:
-        with contextlib.suppress(KeyError):
-            return unicodedata.lookup(name + end)
-    return ""
-
-
 def write_icon(icon: re.Match[str]) -> str:
     """Return the sign that an icon is, or its name where it is alone in a cell or link."""
-    if sign := _find_sign(icon["sign"], (" sign", " mark")):
-        return rf"\{sign} " if sign.isascii() else f"{sign} "
+    for end in (" sign", " mark"):  # as Unicode calls it
+        with contextlib.suppress(KeyError):
+            sign = unicodedata.lookup(icon["sign"] + end)
+            return rf"\{sign} " if sign.isascii() else f"{sign} "
     before, after = icon.string[: icon.start()], icon.string[icon.end() :]
     is_alone = re.search(r"[|\[][ \t]*$", before) and re.match(r"[ \t]*[|\]]", after)
     return f"{title_of_file(icon['sign']).lower()} " if is_alone else ""

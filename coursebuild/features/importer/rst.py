@@ -19,15 +19,21 @@ _INLINE = regex(
     r"(?P<code>``.+?``)|:(?P<role>[A-Za-z][\w:+.-]*):`(?P<body>[^`]+)`"
     r"|`(?P<words>[^`<>]*\S)\s*<(?P<address>[^`<>]+)>`__?"
 )
+_TERM = regex(r"^(?![-*+|#]|\d+[.)])(\S.*\n)[ ]+(?=\S)(.*(?:\n[ ]+\S.*)*)", re.MULTILINE)
+"""A term, and what it means, further right on the next lines."""
 
 
 def read_rst(text: str) -> str:
     """Return reStructuredText in Markdown of MyST: its directives, roles, links and labels."""
     parts, at = [], 0
     for block in _DIRECTIVE.finditer(text := textwrap.dedent(f"{text.expandtabs()}\n")):
-        parts += [_INLINE.sub(_write_inline, text[at : block.start()]), _write_block(block)]
+        parts += [_read_prose(text[at : block.start()]), _write_block(block)]
         at = block.end()
-    return "".join((*parts, _INLINE.sub(_write_inline, text[at:])))
+    return "".join((*parts, _read_prose(text[at:])))
+
+
+def _read_prose(text: str) -> str:
+    return _TERM.sub(r"\1: \2\n", _INLINE.sub(_write_inline, text))
 
 
 def _write_block(block: re.Match[str]) -> str:
@@ -35,7 +41,7 @@ def _write_block(block: re.Match[str]) -> str:
         return f"({block['label']})=" if block["label"] else ""
     body = textwrap.dedent(block["body"]).strip("\n")
     if not re.search("code|math|raw", block["name"]):
-        options = find_group(r"\A((?::[\w-]+:.*\n?)*)", body)
+        options = find_group(r"\A((?::[\w-]+:(?!`).*\n?)*)", body)
         body = options + read_rst(body[len(options) :])
     return marks.fence(f"{{{block['name']}}} {block['argument']}".rstrip(), body) + "\n\n"
 

@@ -14,7 +14,6 @@ from typing import Any
 from markdown_it import MarkdownIt
 from markdown_it.rules_block import StateBlock
 from mdit_py_plugins.footnote import footnote_plugin
-from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import UsageError, regex
@@ -22,7 +21,7 @@ from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.displays import read_macros
 from coursebuild.features.importer.jsx import COMPONENT, dedent_components, is_mdx
 from coursebuild.features.importer.rst import read_rst
-from coursebuild.features.importer.source_files import Segment, read_toml, read_yaml
+from coursebuild.features.importer.source_files import ImportedText, Segment, read_toml, read_yaml
 
 _MARK = regex(r"(:{3,}|/{3,})[ \t]*(.*?)[ \t]*")
 _TITLED = regex(
@@ -72,33 +71,21 @@ _NEEDLESS = (
 RST = frozenset(("text/restructuredtext", "text/x-rst"))
 
 
-class ReadText(Struct, frozen=True):
-    """What the file of a lesson holds."""
+def read_segments(
+    source: str, text: ImportedText, raw_formats: Set[str]
+) -> tuple[ImportedText, Mapping[str, Any]]:
+    """Return a lesson with what its file holds, and what of its metadata has no counterpart.
 
-    title: str
-    """Empty if it states none."""
-    summary: str
-    segments: tuple[Segment, ...]
-    lost: Mapping[str, Any]
-    """What its front matter, or a notebook's metadata, hold that has no counterpart, by key."""
-    substitutions: Mapping[str, str]
-    """What names between braces stand for in it."""
-    macros: str
-    """The definitions of its macros."""
-
-
-def read_segments(text: str, name: str, title: str = "", raw_formats: Set[str] = RST) -> ReadText:
-    """Read the file of a lesson, which the map may give a title.
-
-    Cells of a notebook that are raw hold reStructuredText where they have one of these formats.
+    The map may have given it a title; it has its own now, if it states one. Cells of a notebook
+    that are raw hold reStructuredText where they have one of these formats.
 
     Raises:
         UsageError: it is no notebook, but is called so.
     """
     metadata: Mapping[str, Any] = {}
-    if name.endswith(".ipynb"):
+    if text.file.endswith(".ipynb"):
         try:
-            notebook = json.loads(text)
+            notebook = json.loads(source)
             metadata = notebook.get("metadata") or {}
             kernel, info = (metadata.get(key) or {} for key in ("kernelspec", "language_info"))
             language = str(kernel.get("language") or info.get("name") or "python").lower()
@@ -110,14 +97,14 @@ def read_segments(text: str, name: str, title: str = "", raw_formats: Set[str] =
                 cells[0] = {**cells[0], "source": first[size:]}
             segments = _read_cells(cells, language, raw_formats)
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-            raise UsageError(f"{name} is not a notebook of format 4") from None
+            raise UsageError(f"{text.file} is not a notebook of format 4") from None
     else:
-        metadata, size = read_front_matter(text)
-        content, line = text[size:], 1 + text.count("\n", 0, size)
+        metadata, size = read_front_matter(source)
+        content, line = source[size:], 1 + source.count("\n", 0, size)
         segments = list(read_markdown(content, line))
-        if is_mdx(name, segments):
+        if is_mdx(text.file, segments):
             segments = list(read_markdown(dedent_components(content), line))
-    segments = _raise_title(segments, title)
+    segments = _raise_title(segments, text.title)
     # The first heading of level 1, and the segments without it; from the next on, all go down by 1
     titles: list[str] = []
     own_title = " ".join(str(metadata.get("title") or "").split())
@@ -135,19 +122,18 @@ def read_segments(text: str, name: str, title: str = "", raw_formats: Set[str] =
     myst = metadata.get("myst")
     inner = (myst if isinstance(myst, dict) else metadata).get("substitutions")
     words = {**metadata, **(inner if isinstance(inner, dict) else {})}
+    values = {str(key): str(v) for key, v in words.items() if isinstance(v, str | int | float)}
     summaries = [key for key in _SUMMARIES if isinstance(metadata.get(key), str)][:1]
-    return ReadText(
-        str(metadata.get("title") or (titles or [""])[0]).strip(),
-        " ".join("".join(str(metadata[key]) for key in summaries).split()),
-        shifted,
-        {
-            str(key): value
-            for key, value in metadata.items()
-            if value and key not in (*_NEEDLESS, *summaries)
-        },
-        {str(key): str(v) for key, v in words.items() if isinstance(v, str | int | float)},
-        read_macros(metadata),
+    own_text = replace(
+        text,
+        title=str(metadata.get("title") or (titles or [""])[0]).strip(),
+        summary=" ".join("".join(str(metadata[key]) for key in summaries).split()),
+        segments=shifted,
+        substitutions=values,
+        macros=read_macros(metadata),
     )
+    known_keys = (*_NEEDLESS, *summaries)
+    return own_text, {str(k): v for k, v in metadata.items() if v and k not in known_keys}
 
 
 def _raise_title(segments: list[Segment], title: str) -> list[Segment]:
