@@ -20,12 +20,14 @@ With `--lessons` only so many lessons and pages, drawn by the first seed, are ve
 compared, besides the map and models; what a change of these breaks elsewhere is then not noticed.
 
 Nothing excuses a silence: which slips could not be known either, a reader of the list decides.
-Claims are what says something that could be tried. None are a formula without a relation, as `$m$`,
-which names something and says nothing of it; commands, and what they printed, in blocks that are
-only shown; docstrings, comments and sources in words (`{given="ISO 80000-3"}`); and addresses of
-others, where nothing is looked up. A formula is one if numbers stand on both sides of a relation,
-or a letter in it has a value in its text: only then there is something to compute. All others, as
-`$F = ma$` and `$p = 1$`, have a row of their own, since another one may be meant as well.
+A claim is a part of the course that is run, computed, compiled, looked up or read by a schema: the
+kinds in `CLAIMS`. Of formulas it is one with numbers on both sides of a relation, or with a letter
+that has a value in its text. Relations between letters alone, as `$F = ma$`, and those of a letter
+and a number, as `$p = 1$`, state something too, but another one may be meant as well: they have a
+row of their own, and are counted once without and once with the claims. Neither are what says
+nothing that could be tried: a formula without a relation, as `$m$`; commands, and what they
+printed, in blocks that are only shown; docstrings, comments and sources in words
+(`{given="ISO 80000-3"}`); and addresses of others, where nothing is looked up.
 Beside the silence stand the false alarms that it was bought with: those of `corpus.py --record`.
 """
 
@@ -348,7 +350,9 @@ def table(outcomes: Sequence[Outcome]) -> list[str]:
     claims = [outcome for outcome in outcomes if outcome.change.kind in CLAIMS]
     prose = [o for o in outcomes if o.change.kind not in {*CLAIMS, RELATIONS}]
     groups = [(k, [o for o in outcomes if o.change.kind == k]) for k in KINDS]
-    groups += [("**claims**", claims), ("**prose**", prose), ("**all**", list(outcomes))]
+    statements = [o for o in outcomes if o.change.kind in {*CLAIMS, RELATIONS}]
+    groups += [("**claims**", claims), ("**claims and relations**", statements)]
+    groups += [("**prose**", prose), ("**all**", list(outcomes))]
     for name, group in groups:
         if group:
             ends = Counter(outcome.end for outcome in group)

@@ -44,9 +44,13 @@ _ESCAPED = regex(
     re.DOTALL,
 )
 """A formula whose brackets have two backslashes, one of which is Markdown's; or code."""
-_TEXT = regex(rf"{_CODE}|\\(?:text\w*|[hm]box)\{{[^{{}}]*\}}", re.DOTALL)
-"""Words in a formula, in which MathJax reads `%` as it stands; or code."""
-LABEL = regex(r"\label\{([^{}]*)\}[ \t]*")
+_OF_MATHJAX = regex(
+    rf"{_CODE}|\\(?:text\w*|[hm]box)\{{(?P<words>[^{{}}]*)\}}"
+    r"|\\(?P<kind>p?matrix|cases)[ ]*\{(?P<rows>(?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)\}",
+    re.DOTALL,
+)
+"""Words in a formula, in which MathJax reads `%` as it stands, and rows in plain TeX; or code."""
+LABEL = regex(r"\\label\{([^{}]*)\}[ \t]*")
 _EMPTY = regex(r"[ \t]*\n?[ \t]*")
 _MARGIN = regex(r"[ \t]*>[ \t>]*|[ \t]+\Z")
 """The mark of a quotation, or what a line of a list begins with."""
@@ -92,10 +96,17 @@ def read_escapes(text: str) -> str:
 def normalize_formulas(text: str) -> str:
     """Put LaTeX formulas between dollar signs, and write labels as `{#eq:name}`."""
     text = re.sub(r"(?<!\\)\\[ \t]*(?=\n[ \t>]*\$\$)", "", text)  # a blank, at its end
-    text = _TEXT.sub(lambda m: m[0] if m["ticks"] else re.sub(r"(?<!\\)%", r"\%", m[0]), text)
+    text = _OF_MATHJAX.sub(_rewrite_for_temml, text)
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
     text = _DOXYGEN.sub(_write_doxygen, _DISPLAY.sub(_drop_empty, text))
     return _DISPLAY.sub(_label_formula, _ENVIRONMENT.sub(_write_environment, text))
+
+
+def _rewrite_for_temml(match: re.Match[str]) -> str:
+    if match["words"]:
+        return re.sub(r"(?<!\\)%", r"\%", match[0])
+    kind, rows = match["kind"], match["rows"]
+    return f"\\begin{{{kind}}}{rows}\\end{{{kind}}}" if rows else match[0]
 
 
 def _write_environment(match: re.Match[str]) -> str:

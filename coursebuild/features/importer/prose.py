@@ -119,7 +119,6 @@ _PICTURE_LINE = regex(r"^<(?i:img)\b[^<>]*>[ \t]*\n(?=[^\s<])", re.MULTILINE)
 """A picture of HTML above words, which would be HTML as well."""
 _HOLDER = regex(r"[ \t]*<\w+\b[^<>]*\smarkdown(?:=.?(?:1|block).?)?(?:\s[^<>]*)?>[ \t]*")
 """A tag of HTML around Markdown, which would be HTML without a blank line."""
-_EMPTY_HEADING = regex(r"[ ]{0,3}#{1,6}[ \t]*$")
 _ENDS = {"<!--": "-->", "<pre": "</pre>", "$$": "$$"}
 _COMMENT = regex(
     r"%%(?P<inner>[^%\n]+)%%|^%%[ \t]*\n(?P<lines>(?:(?!%%)[^\n]*\n)+)%%[ \t]*$"
@@ -227,7 +226,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         is_open = _HOLDER.fullmatch(line) and re.match(r"[ ]{,3}\S", below)
         edge = _EDGE.match(line)
         if edge is None and not mark:
-            line = _rewrite_line(_EMPTY_HEADING.sub("", line), context.line_below(number))
+            line = _rewrite_line(line, context.line_below(number))
         elif mark in _ENDS:
             mark = "" if _ENDS[mark] in line or (not line.strip() and mark == "$$") else mark
         elif edge is not None and edge[1].startswith(mark):

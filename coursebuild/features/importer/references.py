@@ -97,7 +97,7 @@ def _read(
         document, edits = parse.value, dict[int, Edit]()
         spans = [
             *(part.span for html in _raw_html(document) for part in html.forbidden),
-            *(d.span for d in parse.diagnostics if d.rule == "html-unbalanced"),
+            *(d.span for d in parse.diagnostics if d.rule in ("html-unbalanced", "heading-empty")),
             *(
                 Span(source, *anchor.span())
                 for d in parse.diagnostics
@@ -111,7 +111,8 @@ def _read(
             if span.start not in edits:
                 edits[span.start] = Edit(_with_line(Span(source, span.start, end)), "")
                 tag = shorten(text[span.start : end], 120, placeholder="…")
-                leave(link, "tag of HTML", f"`{tag}`, which a page cannot hold")
+                if not tag.startswith("#"):
+                    leave(link, "tag of HTML", f"`{tag}`, which a page cannot hold")
         for html in _raw_html(document):
             for media in html.media:
                 if _ELSEWHERE.match(media.url):

@@ -361,7 +361,8 @@ def rewrite_html_links(text: str, context: LessonContext) -> str:
 
     def rewrite(link: re.Match[str]) -> str:
         page = link["page"]
-        is_text = page and stem_of(context.resolve_path(urlsplit(page).path)) in context.targets
+        path = page and urlsplit(page).path
+        is_text = page and (not path or stem_of(context.resolve_path(path)) in context.targets)
         if not is_text or _HTML_BLOCK.match(re.split(r"\n[ \t]*\n", text[: link.start()])[-1]):
             return link[0]
         return f"[{link['words']}]({page})"
