@@ -89,7 +89,15 @@ class FigureData(Struct, frozen=True):
 
 def read_figure_data(data: bytes) -> FigureData | None:
     """The data in a figure's file; `None` where there are none."""
-    text = _read_png(data) if data.startswith(b"\x89PNG") else _read_svg(data)
+    text: str | bytes = b""
+    if not data.startswith(b"\x89PNG"):
+        match = _SVG_DATA.search(data)
+        if match is not None and len(match[1]) <= 2 * MOST_DATA:
+            text = unescape(match[1].decode("utf-8", "replace"))
+    elif (at := data.rfind(_PNG_MARK)) >= 0:
+        start, end = at + len(_PNG_MARK), at + 4 + int.from_bytes(data[at - 4 : at], "big")
+        with contextlib.suppress(zlib.error):
+            text = zlib.decompressobj().decompress(data[start:end], MOST_DATA)
     with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
         return msgspec.json.decode(text, type=FigureData)
     return None
@@ -114,23 +122,6 @@ def without_data(figure: bytes) -> bytes:
     at = figure.rfind(_PNG_MARK)
     end = at + 8 + int.from_bytes(figure[at - 4 : at], "big")
     return figure if at < 0 else figure[: at - 4] + figure[end:]
-
-
-def _read_svg(data: bytes) -> str:
-    match = _SVG_DATA.search(data)
-    if match is None or len(match[1]) > 2 * MOST_DATA:
-        return ""
-    return unescape(match[1].decode("utf-8", "replace"))
-
-
-def _read_png(data: bytes) -> bytes:
-    at = data.rfind(_PNG_MARK)
-    if at < 0:
-        return b""
-    start, end = at + len(_PNG_MARK), at + 4 + int.from_bytes(data[at - 4 : at], "big")
-    with contextlib.suppress(zlib.error):
-        return zlib.decompressobj().decompress(data[start:end], MOST_DATA)
-    return b""
 
 
 # --- differences

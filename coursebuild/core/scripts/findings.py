@@ -110,7 +110,11 @@ def output_findings(
                 dependents = bindings.dependent_bindings(
                     verdict, course.documents, outputs, addresses or {}
                 )
-                change = _environment_change(verdict, run, record)
+                made_with = record.find(recording.script or "", recording_digest(recording))
+                change = ""
+                if made_with is not None and run is not None and run.provenance is not None:
+                    comparison = describe_comparison(verdict.comparison)
+                    change = made_with.change(run.provenance, comparison)
                 yield drift_diagnostic(verdict, id, dependents, change)
         yield from bindings.check_bindings(document, outputs, addresses)
         yield from _find_unmarked(course, document, outputs.runs)
@@ -264,15 +268,6 @@ def _unproven_unit(span: Span, unit: str) -> Diagnostic:
 
 
 # --- drift
-
-
-def _environment_change(verdict: Verdict, run: ScriptRun | None, record: LessonRecord) -> str:
-    """What an output was recorded with that is another now, as a message begins with it."""
-    recording = verdict.recording
-    made_with = record.find(recording.script or "", recording_digest(recording))
-    if made_with is None or run is None or run.provenance is None:
-        return ""
-    return made_with.change(run.provenance, describe_comparison(verdict.comparison))
 
 
 def drift_diagnostic(

@@ -17,7 +17,6 @@ from msgspec import Struct
 from coursebuild.core.text.python_code import python_nodes
 
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-_SCOPES = (ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 
 class NotOneFileError(Exception):

@@ -242,29 +242,21 @@ def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
     return new.text
 
 
-def _find_places(
-    cell: CanonicalText, line: CanonicalText, start: int, numbers_match: SameNumber
-) -> Iterator[int]:
-    """Offsets from `start` on at which a cell stands in a line, whole words and numbers only."""
-    text = cell.skeleton
-    before = r"(?<!\w)" if _WORD_CHARACTER.match(text[0]) else ""
-    after = r"(?!\w)" if _WORD_CHARACTER.match(text[-1]) else ""
-    pattern = re.compile(f"(?={before}{re.escape(text)}{after})")
-    places = (match.start() for match in pattern.finditer(line.skeleton, start))
-    return (place for place in places if numbers_fit(cell, line, place, numbers_match))
-
-
 def find_rows(
     row: Sequence[RowCell], line: CanonicalText, start: int, numbers_match: SameNumber
 ) -> Iterator[tuple[int, ...]]:
-    """The ways in which the cells stand in a line in order, each after the one before."""
+    """The ways in which the cells stand in a line in order, as whole words and numbers."""
     if not row:
         yield ()
         return
-    cell = row[0].canonical
-    for place in _find_places(cell, line, start, numbers_match):
-        for rest in find_rows(row[1:], line, place + len(cell.skeleton), numbers_match):
-            yield (place, *rest)
+    cell, text = row[0].canonical, row[0].canonical.skeleton
+    before = r"(?<!\w)" if _WORD_CHARACTER.match(text[0]) else ""
+    after = r"(?!\w)" if _WORD_CHARACTER.match(text[-1]) else ""
+    pattern = re.compile(f"(?={before}{re.escape(text)}{after})")
+    for place in (match.start() for match in pattern.finditer(line.skeleton, start)):
+        if numbers_fit(cell, line, place, numbers_match):
+            for rest in find_rows(row[1:], line, place + len(text), numbers_match):
+                yield (place, *rest)
 
 
 _WORD_CHARACTER = regex(r"\w")
