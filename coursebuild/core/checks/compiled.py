@@ -274,13 +274,10 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
         place, sizes = scenario.place("horizon_error"), facts.sizes
         for unit, error in scenario.horizon_error.items():
             if unit not in sizes:
-                kind = {"rad": "hinge, ball or free joint", "m": "slide or free joint"}[unit]
-                message = f"no coordinate of the model is in {unit}: it has no {kind}"
-                help = f"state an error in {next(iter(sizes))}" if sizes else "leave it out"
-                yield diagnose(_RULE, place, message, help=help)
+                message = f"no coordinate of the model is in {unit}"
+                yield diagnose(_RULE, place, message, help="leave it out")
             elif not _LEAST_ERROR * (size := sizes[unit]) <= error <= size:
-                side = "small" if error < size else "large"
-                message = f"an error of {error:g} {unit} is too {side}"
+                message = f"an error of {error:g} {unit} is no horizon of this model"
                 help = f"state one from {_LEAST_ERROR * size:.3g} to {size:.3g} {unit}"
                 yield diagnose(_RULE, place, message, help=help)
         yield from _check_timestep(scenario, facts.timestep)

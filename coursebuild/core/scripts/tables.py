@@ -117,7 +117,10 @@ class TableMatcher:
         if not layouts:
             return TableMatch(tuple(self._match_rows(None)))
         is_right = any(self._right_rows(layout) == len(self.rows) for layout in layouts)
-        rivals = tuple(dict.fromkeys(map(self._describe, layouts))) if layouts[1:] else ()
+        rivals: tuple[str, ...] = ()
+        if layouts[1:]:
+            lines = ((at.heading, self.lines[self._fits_in(0, at)[0].line]) for at in layouts)
+            rivals = tuple(dict.fromkeys(plain_text(" / ".join(filter(None, p))) for p in lines))
         if rivals and not is_right:
             fits_of_rows = (
                 [fit for layout in layouts for fit in self._fits_in(row, layout)]
@@ -165,10 +168,6 @@ class TableMatcher:
             if layout not in right and scores[layout][1:3] > scores[best[0]][1:3]
         )
         return [*best, *doubts]
-
-    def _describe(self, layout: LineLayout) -> str:
-        line = self.lines[self._fits_in(0, layout)[0].line]
-        return plain_text(f"{layout.heading} / {line}" if layout.heading else line)
 
     def _fits_in(self, row: int, layout: LineLayout) -> list[RowMatch]:
         return [fit for fit in self._fits_of_row(row) if fit.layout == layout]

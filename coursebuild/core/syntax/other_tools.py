@@ -94,6 +94,4 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     elif "=" in kind.text:
         message = f"the kind of this block is missing before `{kind.text}`"
         help = "the first word says what a block is, as in ```` ```python file=examples/a.py ````"
-        is_script = kind.text.startswith("file=") and kind.text.endswith(".py")
-        fix = Fix(help, f"python {kind.text}" if is_script else None, safe=True)
-        yield diagnose("fence-info", kind.span(), message, help=fix)
+        yield diagnose("fence-info", kind.span(), message, help=help)
