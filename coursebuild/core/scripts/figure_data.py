@@ -223,7 +223,10 @@ def _value_difference(old: DrawnPart, new: DrawnPart) -> str:
     if different:
         first = different[0]
         now, before = map(_number, (new.values[first], old.values[first]))
-        place = _index(first, old.shape)
+        place = f"point {first + 1}"
+        if len(old.shape) > 1:
+            row, rest = divmod(first, math.prod(old.shape[1:]))
+            place = f"row {row + 1}, column {rest // math.prod(old.shape[2:]) + 1}"
         suffix = f", and {len(different) - 1} more differ" if len(different) > 1 else ""
         return f"has the value {now:.4g} at {place} where {before:.4g} is recorded{suffix}"
     return ""
@@ -251,29 +254,18 @@ def _place(point: Point, axes: Axes) -> str:
     """A point in the numbers that its axes show."""
     if axes.kind != "rectilinear":
         return f"({_number(point[0]):.4g}, {_number(point[1]):.4g}) of the axes’ size"
-    numbers = (_unscaled(value, scale) for value, scale in zip(point, axes.scales, strict=False))
+    numbers = []
+    for value, scale in zip(point, axes.scales, strict=False):
+        numbers.append(_number(value))
+        name, _, base = scale.partition(" ")
+        if name == "log" and base:
+            with contextlib.suppress(OverflowError):
+                numbers[-1] = math.pow(float(base), numbers[-1])
     return f"({', '.join(f'{number:.4g}' for number in numbers)})"
-
-
-def _unscaled(value: float | None, scale: str) -> float:
-    name, _, base = scale.partition(" ")
-    number = _number(value)
-    if name == "log" and base:
-        with contextlib.suppress(OverflowError):
-            return math.pow(float(base), number)
-    return number
 
 
 def _number(value: float | None) -> float:
     return math.nan if value is None else value
-
-
-def _index(position: int, shape: Sequence[int]) -> str:
-    """The place of a value: its row and column from 1, or its number."""
-    if len(shape) < 2:
-        return f"point {position + 1}"
-    row, rest = divmod(position, math.prod(shape[1:]))
-    return f"row {row + 1}, column {rest // math.prod(shape[2:]) + 1}"
 
 
 def _size(shape: Sequence[int]) -> str:
