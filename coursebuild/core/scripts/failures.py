@@ -18,7 +18,6 @@ from typing import TypeAlias, assert_never
 
 import msgspec
 
-from coursebuild.core.model import Recording
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
 from coursebuild.core.scripts.diff import limit_notes, shorten
 from coursebuild.core.scripts.extract import Extraction
@@ -157,14 +156,6 @@ def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, 
             return "script-encoding", f"{path} printed bytes that are not UTF-8", help
         case _:
             assert_never(run.outcome)
-
-
-def silence_diagnostic(recording: Recording, run: ScriptRun) -> Diagnostic:
-    """An output is recorded, and the script, or its part above, printed no line."""
-    subject = f"this part of `{run.path}`" if run.part_starts else f"`{run.path}`"
-    message = f"an output is recorded here, but {subject} printed nothing"
-    help = "print what is recorded, or remove the recorded output"
-    return diagnose("script-silent", recording.caption_span, message, help=help)
 
 
 def _last_message(stderr: str) -> str:

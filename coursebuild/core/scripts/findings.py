@@ -101,7 +101,10 @@ def output_findings(
             run = outputs.runs.get(recording.script or "")
             ran_well = run is not None and run.outcome is Outcome.OK
             if run is not None and ran_well and not run.output_of(recording.part).strip():
-                yield failures.silence_diagnostic(recording, run)
+                subject = f"this part of `{run.path}`" if run.part_starts else f"`{run.path}`"
+                message = f"an output is recorded here, but {subject} printed nothing"
+                help = "print what is recorded, or remove the recorded output"
+                yield diagnose("script-silent", recording.caption_span, message, help=help)
             elif run is not None and run.outcome is Outcome.UNRECORDED:
                 yield drift_diagnostic(verdict, id)
             elif unstable_output := find_instability(verdict, run, other_runs or {}):
