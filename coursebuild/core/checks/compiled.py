@@ -31,7 +31,6 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     did_you_mean,
 )
-from coursebuild.core.text.near import nearest
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source, Span
 
@@ -178,8 +177,7 @@ def _diagnose_failure(
 def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagnostic:
     """The diagnostic of a file of scenarios without its model; `models` are the paths of all."""
     model = source.path.removesuffix(".toml") + ".xml"
-    likely = nearest(model, models)
-    help = f"is it `{likely}`?" if likely is not None else "put it beside its model"
+    help = did_you_mean(model, models, most=0) or "put it beside its model"
     message = f"there is no model {model} to which these scenarios belong"
     return diagnose("scenario-model", source.span(0, 0), message, help=help)
 

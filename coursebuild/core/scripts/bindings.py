@@ -325,7 +325,9 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
             noted_places = rivals = next(filter(None, choices), [])
             noted_places.sort(key=lambda place: _distance(text.numbers, place.numbers))
     else:
-        line_text = bound.lost_address().description
+        count, lines = len(text.numbers), bound.groups[-1]
+        lost = [a for a in bound.addresses if all(o.find(a, count) is None for o in lines)]
+        line_text = (*lost, *bound.addresses)[0].description
         message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
         noted_places = rivals = replace(bound, addresses=()).places()
     if not (places_now or (binding.words and noted_places)):

@@ -336,12 +336,6 @@ class BoundNumber(Struct, frozen=True, dict=True):
         called_places = [p for p in chosen_places if p.output.is_called(p.at, p.first, words)]
         return called_places or chosen_places
 
-    def lost_address(self) -> Address:
-        """The first of its addresses that is gone."""
-        count, outputs = len(self.text.numbers), self.groups[-1]
-        lost = (address for address in self.addresses if _find(address, outputs, count) is None)
-        return next(lost, self.addresses[0])
-
     def contradicts_words(
         self, places: Sequence[PrintedPlace], outputs: Sequence[PrintedText]
     ) -> bool:

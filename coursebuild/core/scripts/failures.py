@@ -51,10 +51,6 @@ _HELPS = (
         "a script runs in the project's folder: name files from there, as `models/box.xml`",
     ),
     (
-        regex(r"EOFError: EOF when reading a line"),
-        "nobody types while a course is checked: write into the script what it asks for",
-    ),
-    (
         regex(r".*(?:GLFW|gladLoadGL|OpenGL platform library|X11|\bDISPLAY\b)"),
         "no window opens while a course is checked: leave it out, or say `norun` on its fence",
     ),

@@ -14,7 +14,7 @@ import re
 import struct
 import xml.etree.ElementTree as ET
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TypeAlias
 from xml.sax.saxutils import unescape
 
@@ -209,7 +209,8 @@ def _part_difference(old: DrawnPart, new: DrawnPart, axes: Axes) -> str:
     if old.words != new.words:
         return f"says {_quote(new.words)} where {_quote(old.words)} is recorded"
     if old.shape != new.shape:
-        return f"has {_size(new.shape)} values where {_size(old.shape)} are recorded"
+        sizes = ["×".join(map(str, part.shape)) for part in (new, old)]
+        return "has {} values where {} are recorded".format(*sizes)
     is_alike = (old.style, old.sizes) == (new.style, new.sizes)
     return _value_difference(old, new) or ("" if is_alike else "has another style")
 
@@ -266,10 +267,6 @@ def _place(point: Point, axes: Axes) -> str:
 
 def _number(value: float | None) -> float:
     return math.nan if value is None else value
-
-
-def _size(shape: Sequence[int]) -> str:
-    return "×".join(map(str, shape))
 
 
 def _words(name: str, old: tuple[str, ...], new: tuple[str, ...]) -> Iterator[str]:
