@@ -21,8 +21,8 @@ import msgspec
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
 from coursebuild.core.scripts.diff import limit_notes, shorten
 from coursebuild.core.scripts.extract import Extraction
-from coursebuild.core.syntax.python_syntax import check_syntax
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
+from coursebuild.core.text.python_code import compile_error
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
@@ -106,7 +106,7 @@ def failure_diagnostic(
             span = (extraction.line_span(int(place[1])) if place else None) or fence
         label = "" if span is fence else "it was here"
     if run.outcome is Outcome.FAILED and extraction.script.is_python:
-        if any(any(check_syntax(script.script.code)) for script in (source, extraction)):
+        if any(compile_error(script.text) for script in (source, extraction)):
             return None
         error = _last_message(stderr)
         label = shorten(error, _LABEL)
