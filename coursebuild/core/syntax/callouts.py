@@ -7,7 +7,7 @@ from collections.abc import Collection
 from msgspec import Struct
 
 from coursebuild.core.syntax.spans import trim
-from coursebuild.core.text.diagnostics import Parsed, diagnose, did_you_mean
+from coursebuild.core.text.diagnostics import Fix, Parsed, diagnose, did_you_mean
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
@@ -36,6 +36,7 @@ def read_head(paragraph: Excerpt, kinds: Collection[str]) -> Parsed[Head] | None
         start = match.start(3)
         message = f"`{match[3][0]}` cannot follow the kind of a callout"
         help = "write `[!kind] Title`, or `[!kind]- Title` for a callout that starts folded"
+        help = Fix(help, "" if match[3][0] == "+" else None, safe=True)  # it starts unfolded
         place = paragraph.span(start, start + 1)
         diagnostic = diagnose("callout-unknown", place, message, help=help)
     elif name.text.lower() in kinds:
