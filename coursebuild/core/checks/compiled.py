@@ -5,7 +5,6 @@ A file that only other models include need not compile by itself.
 
 from __future__ import annotations
 
-import math
 import re
 import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -32,7 +31,6 @@ from coursebuild.core.text.diagnostics import (
     diagnose,
     did_you_mean,
 )
-from coursebuild.core.text.near import nearest
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Source, Span
 
@@ -176,8 +174,7 @@ def _diagnose_failure(
 def diagnose_orphan_scenarios(source: Source, models: Collection[str]) -> Diagnostic:
     """The diagnostic of a file of scenarios without its model; `models` are the paths of all."""
     model = source.path.removesuffix(".toml") + ".xml"
-    likely = nearest(model, models)
-    help = f"is it `{likely}`?" if likely is not None else "put it beside its model"
+    help = did_you_mean(model, models, most=0) or "put it beside its model"
     message = f"there is no model {model} to which these scenarios belong"
     return diagnose("scenario-model", source.span(0, 0), message, help=help)
 
@@ -271,41 +268,25 @@ def check_scenarios(declarations: Declarations, facts: ModelFacts) -> Iterator[D
         place, sizes = scenario.place("horizon_error"), facts.sizes
         for unit, error in scenario.horizon_error.items():
             if unit not in sizes:
-                kind = {"rad": "hinge, ball or free joint", "m": "slide or free joint"}[unit]
-                message = f"no coordinate of the model is in {unit}: it has no {kind}"
-                help = f"state an error in {next(iter(sizes))}" if sizes else "leave it out"
-                yield diagnose(_RULE, place, message, help=help)
+                message = f"no coordinate of the model is in {unit}"
+                yield diagnose(_RULE, place, message, help="leave it out")
             elif not _LEAST_ERROR * (size := sizes[unit]) <= error <= size:
-                side = "small" if error < size else "large"
-                message = f"an error of {error:g} {unit} is too {side}"
+                message = f"an error of {error:g} {unit} is no horizon of this model"
                 help = f"state one from {_LEAST_ERROR * size:.3g} to {size:.3g} {unit}"
                 yield diagnose(_RULE, place, message, help=help)
-        yield from _check_timestep(scenario, facts.timestep)
+        step = facts.timestep  # which may be 0 or not a number
+        lengths = ((name, getattr(scenario, name)) for name in ("sample", "hold", "duration"))
+        for name, length in [pair for pair in lengths if pair[1] is not None][:1]:
+            if not (step > 0 and is_multiple(length, step)):
+                message = f"the model's timestep, {step:g} s, does not divide"
+                message += f" `{name}` ({length:g} s)"
+                yield diagnose(_RULE, scenario.place(name), message)
     for sweep in declarations.sweeps:
         yield from _check_sweep(sweep, declarations.scenarios, facts)
 
 
 _LEAST_ERROR = 1e-8
 """Of a difference of coordinates: whether a motion is chaotic is seen by differences of 1e-10."""
-
-
-def _check_timestep(scenario: DeclaredScenario, step: float) -> Iterator[Diagnostic]:
-    """Report that the first length that is given has no whole number of steps.
-
-    MuJoCo compiles models with any timestep, also with 0 and NaN.
-    """
-    lengths = {"sample": scenario.sample, "hold": scenario.hold, "duration": scenario.duration}
-    for name, length in lengths.items():
-        if length is None:
-            continue
-        if step > 0 and is_multiple(length, step):
-            return
-        message = f"the model's timestep, {step:g} s, does not divide `{name}` ({length:g} s)"
-        help = ""
-        if 1e-15 < step / length < math.inf:
-            help = f"a multiple near it is {max(round(length / step), 1) * step:.12g}"
-        yield diagnose(_RULE, scenario.place(name), message, help=help)
-        return
 
 
 MAX_SWEEP_STEPS = 2_000_000

@@ -19,7 +19,6 @@ from coursebuild.core.model import (
 from coursebuild.core.model.blocks import title_line
 from coursebuild.core.registry import features
 from coursebuild.core.text.diagnostics import Diagnostic, Note, diagnose, did_you_mean
-from coursebuild.core.text.source import Span
 
 
 def check_course(course: Course) -> tuple[Diagnostic, ...]:
@@ -30,22 +29,12 @@ def check_course(course: Course) -> tuple[Diagnostic, ...]:
         for document in documents
         for diagnostic in _check_core_rules(course, document, targets)
     ]
-    scripts = {s.path: s for document in documents for s in document_scripts(document)}
-    first: dict[str, Span] = {}
+    scripts = {script.path for document in documents for script in document_scripts(document)}
     for entry in course.unproven:
-        script, notes = scripts.get(entry.path), []
-        if first.setdefault(entry.path, entry.span) is not entry.span:
-            message, help = f"the script `{entry.path}` is named twice", "remove it here"
-            notes = [Note("the first one is here", first[entry.path])]
-        elif script is None:
+        if entry.path not in scripts:
             message = f"no lesson or page has a script `{entry.path}`"
             help = did_you_mean(entry.path, scripts) or "remove it"
-        elif script.is_python and not (script.norun or script.requires):
-            message = f"`{entry.path}` always runs: it says neither `norun` nor `requires`"
-            help = "remove it"
-        else:
-            continue
-        diagnostics.append(diagnose("unproven-name", entry.span, message, help=help, notes=notes))
+            diagnostics.append(diagnose("unproven-name", entry.span, message, help=help))
     return (*diagnostics, *_check_features(course, documents))
 
 

@@ -14,7 +14,6 @@ from coursebuild.core import model
 from coursebuild.core.model.addresses import recorded_figures
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Note,
     diagnose,
     did_you_mean,
 )
@@ -272,11 +271,8 @@ def _check_anchor(
         if last <= count:
             return
         help = f"the last line of `{path}` is {count}"
-    near = nearest(anchor, ids)
-    place = ids.get(near) if near is not None and isinstance(ids, Mapping) else None
-    notes = [] if place is None else [Note(f"`#{near}` is here", place.first_line())]
     message = f"{page_name} has no anchor `#{anchor}`"
-    yield diagnose("link-anchor", span, message, help=help, notes=notes)
+    yield diagnose("link-anchor", span, message, help=help)
 
 
 def urlsplit_or_none(url: str) -> SplitResult | None:

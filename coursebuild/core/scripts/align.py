@@ -114,7 +114,7 @@ def _line_pairs(
     def weight(i: int, j: int) -> int:
         if matcher.matches(lines[i], texts[j]):
             return MATCH
-        if matcher.alike(lines[i], texts[j]):
+        if matcher.pairs(lines[i], texts[j]) is not None:
             return _ALIKE_WEIGHT
         a = words[lines[i]]
         b = words[texts[j]]

@@ -106,8 +106,12 @@ def _check(bound: BoundNumber) -> tuple[Diagnostic | None, Sequence[PrintedPlace
         mismatch = _wrong_unit(bound, bound.text, places[:1])
         if mismatch is not None:
             return mismatch, ()
-        quantities = {place.quantity(binding.words) for place in places} - {None}
-        return _ambiguous(bound, places) if len(quantities) > 1 else None, places
+        if len({place.quantity(binding.words) for place in places} - {None}) <= 1:
+            return None, places
+        message = f"`{bound.path}` printed `{binding.text}` at {len(places)} places"
+        notes = limit_notes([place_note(binding, p, places) for p in places], _MAX_NOTES)
+        place, help = binding.text_span, _choose(binding)
+        return diagnose("output-ambiguous", place, message, help=help, notes=notes), places
     varying = [v.recording for v in verdicts if v not in bound.steady or v.comparison.volatile]
     is_unsteady = bool(bound.text.numbers) and not bound.text.is_in(bound.recorded)
     unfiltered = map(PrintedText.of_recording, varying)
@@ -118,16 +122,6 @@ def _check(bound: BoundNumber) -> tuple[Diagnostic | None, Sequence[PrintedPlace
     if not bound.ran_well and any(isinstance(v.recording.body, model.Table) for v in verdicts):
         return None, ()  # it may stand in what a table leaves out
     return _mismatch(bound), ()
-
-
-def _ambiguous(bound: BoundNumber, places: Sequence[PrintedPlace]) -> Diagnostic:
-    """The diagnostic of a binding that may be any of several printed numbers."""
-    binding = bound.binding
-    message = f"`{bound.path}` printed `{binding.text}` at {len(places)} places"
-    notes = limit_notes([place_note(binding, p, places) for p in places], _MAX_NOTES)
-    return diagnose(
-        "output-ambiguous", binding.text_span, message, help=_choose(binding), notes=notes
-    )
 
 
 def _choose(binding: model.NumberBinding) -> str:
@@ -331,7 +325,9 @@ def _address_mismatch(bound: BoundNumber, message: str) -> Diagnostic:
             noted_places = rivals = next(filter(None, choices), [])
             noted_places.sort(key=lambda place: _distance(text.numbers, place.numbers))
     else:
-        line_text = bound.lost_address().description
+        count, lines = len(text.numbers), bound.groups[-1]
+        lost = [a for a in bound.addresses if all(o.find(a, count) is None for o in lines)]
+        line_text = (*lost, *bound.addresses)[0].description
         message = f"the line that showed `{binding.text}` is no longer printed: {line_text}"
         noted_places = rivals = replace(bound, addresses=()).places()
     if not (places_now or (binding.words and noted_places)):

@@ -128,7 +128,7 @@ class BoundText(Struct, frozen=True):
         """The printed numbers that it may show, each place once; `following` stands behind it."""
         places = self.shown_places(outputs)
         if self.stray:
-            places = list(filter(self.has_context, places))
+            places = [p for p in places if all(test(p) for test in self._context_tests())]
         unit = unit_behind(self.after or following)
 
         def has_unit(place: PrintedPlace) -> bool:
@@ -193,10 +193,6 @@ class BoundText(Struct, frozen=True):
         for test in self._context_tests():
             places = list(filter(test, places)) or places
         return places
-
-    def has_context(self, place: PrintedPlace) -> bool:
-        """Whether the printed numbers have the same text around them."""
-        return all(test(place) for test in self._context_tests())
 
     def _context_tests(self) -> Iterator[Callable[[PrintedPlace], bool]]:
         """Tests of whether printed numbers have the same text after, and before, them."""

@@ -79,10 +79,13 @@ def bound_values(
 ) -> tuple[tuple[model.NumberBinding, ShownValue], ...]:
     """The bound numbers of a document with what tells them apart, wherever their lines move."""
     bindings = document_bindings(document)
-    texts = (
-        (document.source.path, outputs.script_of(b) or "", _words_before(b), b.text)
-        for b in bindings
-    )
+    texts = []
+    for binding in bindings:
+        text, start = binding.span.source.text, binding.span.start
+        paragraph = re.split(r"\n\s*\n", text[max(0, start - 200) : start])[-1]
+        words = " ".join(masked(_MARKUP.sub("", paragraph)).split()[-_CONTEXT:])
+        script = outputs.script_of(binding) or ""
+        texts.append((document.source.path, script, words, binding.text))
     return tuple(zip(bindings, shown_values(texts), strict=True))
 
 
@@ -147,7 +150,11 @@ def reworded_addresses(
             continue
         before = outputs.text(verdict)
         now = outputs.text_of_run(script, verdict.comparison.own_filters, part)
-        if before.numbers == now.numbers and _has_new_words(before, now):
+        old, new = before.words, now.words
+        pairs = zip(old, new, strict=False)
+        # No line has the words that another line had before.
+        are_new = all(a == b or (a not in new and b not in old) for a, b in pairs)
+        if before.numbers == now.numbers and are_new:
             texts.setdefault(script, []).append((before, now))
     reworded = {
         value: tuple(_reword(address, texts[value.script]) for address in places)
@@ -155,13 +162,6 @@ def reworded_addresses(
         if value.script in texts
     }
     return {value: now for value, now in reworded.items() if now != addresses[value]}
-
-
-def _has_new_words(before: PrintedText, now: PrintedText) -> bool:
-    """Whether no line has the words that another line had before."""
-    old, new = before.words, now.words
-    pairs = zip(old, new, strict=True)
-    return all(a == b or (a not in new and b not in old) for a, b in pairs)
 
 
 def _reword(address: Address, texts: Iterable[tuple[PrintedText, PrintedText]]) -> Address:
@@ -175,12 +175,6 @@ def _reword(address: Address, texts: Iterable[tuple[PrintedText, PrintedText]]) 
 _MARKUP = regex(r"\{[^{}]*\}|[`*_$]")
 _CONTEXT = 5
 """The words before a binding by which it is known again."""
-
-
-def _words_before(binding: model.NumberBinding) -> str:
-    text, start = binding.span.source.text, binding.span.start
-    paragraph = re.split(r"\n\s*\n", text[max(0, start - 200) : start])[-1]
-    return " ".join(masked(_MARKUP.sub("", paragraph)).split()[-_CONTEXT:])
 
 
 def place_note(
@@ -341,12 +335,6 @@ class BoundNumber(Struct, frozen=True, dict=True):
         chosen_places = known_places or [*filter(self.text.shows, behind_words)] or behind_words
         called_places = [p for p in chosen_places if p.output.is_called(p.at, p.first, words)]
         return called_places or chosen_places
-
-    def lost_address(self) -> Address:
-        """The first of its addresses that is gone."""
-        count, outputs = len(self.text.numbers), self.groups[-1]
-        lost = (address for address in self.addresses if _find(address, outputs, count) is None)
-        return next(lost, self.addresses[0])
 
     def contradicts_words(
         self, places: Sequence[PrintedPlace], outputs: Sequence[PrintedText]

@@ -110,8 +110,8 @@ def update_body(
     body, filters = recording.body, comparison.filters
     if comparison.mode is model.Mode.VOLATILE:
         before, now = Side.of(body.text).lines, Side.of(stdout).lines
-        alike = LineMatcher(comparison).alike
-        if len(before) == len(now) and all(map(alike, before, now)):
+        pairs = map(LineMatcher(comparison).pairs, before, now)
+        if len(before) == len(now) and None not in pairs:
             return None
         return _fence_edit(recording, now)
     recorded, printed = (Side.of(text, filters) for text in (body.text, stdout))

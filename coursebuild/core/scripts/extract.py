@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from coursebuild.core.model import Course, Limits, Script, document_scripts
 from coursebuild.core.model.results import ScriptJob
-from coursebuild.core.text.diagnostics import Diagnostic, Edit, Fix, Note, Parsed, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, Note, Parsed, diagnose
 from coursebuild.core.text.source import Span
 
 
@@ -91,14 +91,12 @@ def extract(course: Course) -> Parsed[tuple[Extraction, ...]]:
                 extractions.append(extraction)
                 continue
             path, first_path = script.path, first.path
-            help: str = "give one of them another path"
+            help = "give one of them another path"
             note = f"`{first_path}` is written here"
             if first_path == path:
                 message, note = f"two blocks have the file `{path}`", "the first one is here"
                 if first.document == document.source.path:
-                    end = script.span.first_line().end
-                    edits = (Edit(script.span.source.span(end, end), " part"),)
-                    help = Fix(f"{help}, or say `part` if it goes on with the file", edits=edits)
+                    help += ", or say `part` if it goes on with the file"
             else:
                 message = f"`{path}` and `{first_path}` cannot both be written everywhere"
             notes = [Note(note, first.script.path_span)]

@@ -18,12 +18,11 @@ from typing import TypeAlias, assert_never
 
 import msgspec
 
-from coursebuild.core.model import Recording
 from coursebuild.core.model.results import Divergence, Effect, EffectKind, Outcome, ScriptRun, Sign
 from coursebuild.core.scripts.diff import limit_notes, shorten
 from coursebuild.core.scripts.extract import Extraction
-from coursebuild.core.syntax.python_syntax import check_syntax
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
+from coursebuild.core.text.python_code import compile_error
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Span
 
@@ -50,10 +49,6 @@ _HELPS = (
     (
         regex(r"FileNotFoundError: |.*Error opening file"),
         "a script runs in the project's folder: name files from there, as `models/box.xml`",
-    ),
-    (
-        regex(r"EOFError: EOF when reading a line"),
-        "nobody types while a course is checked: write into the script what it asks for",
     ),
     (
         regex(r".*(?:GLFW|gladLoadGL|OpenGL platform library|X11|\bDISPLAY\b)"),
@@ -111,7 +106,7 @@ def failure_diagnostic(
             span = (extraction.line_span(int(place[1])) if place else None) or fence
         label = "" if span is fence else "it was here"
     if run.outcome is Outcome.FAILED and extraction.script.is_python:
-        if any(any(check_syntax(script.script.code)) for script in (source, extraction)):
+        if any(compile_error(script.text) for script in (source, extraction)):
             return None
         error = _last_message(stderr)
         label = shorten(error, _LABEL)
@@ -157,14 +152,6 @@ def _failure_wording(extraction: Extraction, run: ScriptRun) -> tuple[str, str, 
             return "script-encoding", f"{path} printed bytes that are not UTF-8", help
         case _:
             assert_never(run.outcome)
-
-
-def silence_diagnostic(recording: Recording, run: ScriptRun) -> Diagnostic:
-    """An output is recorded, and the script, or its part above, printed no line."""
-    subject = f"this part of `{run.path}`" if run.part_starts else f"`{run.path}`"
-    message = f"an output is recorded here, but {subject} printed nothing"
-    help = "print what is recorded, or remove the recorded output"
-    return diagnose("script-silent", recording.caption_span, message, help=help)
 
 
 def _last_message(stderr: str) -> str:

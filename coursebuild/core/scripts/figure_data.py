@@ -14,7 +14,7 @@ import re
 import struct
 import xml.etree.ElementTree as ET
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import TypeAlias
 from xml.sax.saxutils import unescape
 
@@ -89,7 +89,15 @@ class FigureData(Struct, frozen=True):
 
 def read_figure_data(data: bytes) -> FigureData | None:
     """The data in a figure's file; `None` where there are none."""
-    text = _read_png(data) if data.startswith(b"\x89PNG") else _read_svg(data)
+    text: str | bytes = b""
+    if not data.startswith(b"\x89PNG"):
+        match = _SVG_DATA.search(data)
+        if match is not None and len(match[1]) <= 2 * MOST_DATA:
+            text = unescape(match[1].decode("utf-8", "replace"))
+    elif (at := data.rfind(_PNG_MARK)) >= 0:
+        start, end = at + len(_PNG_MARK), at + 4 + int.from_bytes(data[at - 4 : at], "big")
+        with contextlib.suppress(zlib.error):
+            text = zlib.decompressobj().decompress(data[start:end], MOST_DATA)
     with contextlib.suppress(msgspec.MsgspecError, UnicodeDecodeError):
         return msgspec.json.decode(text, type=FigureData)
     return None
@@ -114,23 +122,6 @@ def without_data(figure: bytes) -> bytes:
     at = figure.rfind(_PNG_MARK)
     end = at + 8 + int.from_bytes(figure[at - 4 : at], "big")
     return figure if at < 0 else figure[: at - 4] + figure[end:]
-
-
-def _read_svg(data: bytes) -> str:
-    match = _SVG_DATA.search(data)
-    if match is None or len(match[1]) > 2 * MOST_DATA:
-        return ""
-    return unescape(match[1].decode("utf-8", "replace"))
-
-
-def _read_png(data: bytes) -> bytes:
-    at = data.rfind(_PNG_MARK)
-    if at < 0:
-        return b""
-    start, end = at + len(_PNG_MARK), at + 4 + int.from_bytes(data[at - 4 : at], "big")
-    with contextlib.suppress(zlib.error):
-        return zlib.decompressobj().decompress(data[start:end], MOST_DATA)
-    return b""
 
 
 # --- differences
@@ -218,7 +209,8 @@ def _part_difference(old: DrawnPart, new: DrawnPart, axes: Axes) -> str:
     if old.words != new.words:
         return f"says {_quote(new.words)} where {_quote(old.words)} is recorded"
     if old.shape != new.shape:
-        return f"has {_size(new.shape)} values where {_size(old.shape)} are recorded"
+        sizes = ["×".join(map(str, part.shape)) for part in (new, old)]
+        return "has {} values where {} are recorded".format(*sizes)
     is_alike = (old.style, old.sizes) == (new.style, new.sizes)
     return _value_difference(old, new) or ("" if is_alike else "has another style")
 
@@ -232,7 +224,10 @@ def _value_difference(old: DrawnPart, new: DrawnPart) -> str:
     if different:
         first = different[0]
         now, before = map(_number, (new.values[first], old.values[first]))
-        place = _index(first, old.shape)
+        place = f"point {first + 1}"
+        if len(old.shape) > 1:
+            row, rest = divmod(first, math.prod(old.shape[1:]))
+            place = f"row {row + 1}, column {rest // math.prod(old.shape[2:]) + 1}"
         suffix = f", and {len(different) - 1} more differ" if len(different) > 1 else ""
         return f"has the value {now:.4g} at {place} where {before:.4g} is recorded{suffix}"
     return ""
@@ -260,33 +255,18 @@ def _place(point: Point, axes: Axes) -> str:
     """A point in the numbers that its axes show."""
     if axes.kind != "rectilinear":
         return f"({_number(point[0]):.4g}, {_number(point[1]):.4g}) of the axes’ size"
-    numbers = (_unscaled(value, scale) for value, scale in zip(point, axes.scales, strict=False))
+    numbers = []
+    for value, scale in zip(point, axes.scales, strict=False):
+        numbers.append(_number(value))
+        name, _, base = scale.partition(" ")
+        if name == "log" and base:
+            with contextlib.suppress(OverflowError):
+                numbers[-1] = math.pow(float(base), numbers[-1])
     return f"({', '.join(f'{number:.4g}' for number in numbers)})"
-
-
-def _unscaled(value: float | None, scale: str) -> float:
-    name, _, base = scale.partition(" ")
-    number = _number(value)
-    if name == "log" and base:
-        with contextlib.suppress(OverflowError):
-            return math.pow(float(base), number)
-    return number
 
 
 def _number(value: float | None) -> float:
     return math.nan if value is None else value
-
-
-def _index(position: int, shape: Sequence[int]) -> str:
-    """The place of a value: its row and column from 1, or its number."""
-    if len(shape) < 2:
-        return f"point {position + 1}"
-    row, rest = divmod(position, math.prod(shape[1:]))
-    return f"row {row + 1}, column {rest // math.prod(shape[2:]) + 1}"
-
-
-def _size(shape: Sequence[int]) -> str:
-    return "×".join(map(str, shape))
 
 
 def _words(name: str, old: tuple[str, ...], new: tuple[str, ...]) -> Iterator[str]:

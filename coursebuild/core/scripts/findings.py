@@ -101,7 +101,10 @@ def output_findings(
             run = outputs.runs.get(recording.script or "")
             ran_well = run is not None and run.outcome is Outcome.OK
             if run is not None and ran_well and not run.output_of(recording.part).strip():
-                yield failures.silence_diagnostic(recording, run)
+                subject = f"this part of `{run.path}`" if run.part_starts else f"`{run.path}`"
+                message = f"an output is recorded here, but {subject} printed nothing"
+                help = "print what is recorded, or remove the recorded output"
+                yield diagnose("script-silent", recording.caption_span, message, help=help)
             elif run is not None and run.outcome is Outcome.UNRECORDED:
                 yield drift_diagnostic(verdict, id)
             elif unstable_output := find_instability(verdict, run, other_runs or {}):
@@ -110,7 +113,11 @@ def output_findings(
                 dependents = bindings.dependent_bindings(
                     verdict, course.documents, outputs, addresses or {}
                 )
-                change = _environment_change(verdict, run, record)
+                made_with = record.find(recording.script or "", recording_digest(recording))
+                change = ""
+                if made_with is not None and run is not None and run.provenance is not None:
+                    comparison = describe_comparison(verdict.comparison)
+                    change = made_with.change(run.provenance, comparison)
                 yield drift_diagnostic(verdict, id, dependents, change)
         yield from bindings.check_bindings(document, outputs, addresses)
         yield from _find_unmarked(course, document, outputs.runs)
@@ -264,15 +271,6 @@ def _unproven_unit(span: Span, unit: str) -> Diagnostic:
 
 
 # --- drift
-
-
-def _environment_change(verdict: Verdict, run: ScriptRun | None, record: LessonRecord) -> str:
-    """What an output was recorded with that is another now, as a message begins with it."""
-    recording = verdict.recording
-    made_with = record.find(recording.script or "", recording_digest(recording))
-    if made_with is None or run is None or run.provenance is None:
-        return ""
-    return made_with.change(run.provenance, describe_comparison(verdict.comparison))
 
 
 def drift_diagnostic(

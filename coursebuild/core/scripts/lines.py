@@ -272,10 +272,6 @@ class LineMatcher:
             return False
         return self._pair_numbers(recorded, printed, self.numbers_match) is not None
 
-    def alike(self, recorded: str, printed: str) -> bool:
-        """Whether two lines differ in their numbers (and the white space around them) only."""
-        return self.pairs(recorded, printed) is not None
-
     def pairs(self, recorded: str, printed: str) -> tuple[tuple[Number, Number], ...] | None:
         """The numbers of two lines that are alike, pair by pair; `None` if they are not alike."""
         return self._pair_numbers(recorded, printed, always_match)

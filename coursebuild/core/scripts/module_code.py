@@ -17,7 +17,6 @@ from msgspec import Struct
 from coursebuild.core.text.python_code import python_nodes
 
 DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
-_SCOPES = (ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 
 class NotOneFileError(Exception):
@@ -69,13 +68,14 @@ class ModuleCode:
     def check(self) -> None:
         """Refuse a module that does something when it is imported."""
         for statement in self.statements:
+            # What stands below `if __name__ == …` is for the module as a script only.
             defines = isinstance(statement, (*DEFINITIONS, ast.Import, ast.ImportFrom))
             assigns = isinstance(statement, ast.Assign | ast.AnnAssign)
             if not (
                 defines
                 or (assigns and bound_names(statement))
                 or is_text(statement)
-                or is_guard(statement)
+                or (isinstance(statement, ast.If) and "__name__" in ast.unparse(statement.test))
             ):
                 message = (
                     f"{self.source.path} does more than define names (line {statement.lineno})"
@@ -210,11 +210,6 @@ def first_line(statement: ast.stmt) -> int:
 def is_text(statement: ast.stmt) -> bool:
     """Whether it is a constant that nothing takes, such as a docstring."""
     return isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant)
-
-
-def is_guard(statement: ast.stmt) -> bool:
-    """Whether it is for the module as a script only."""
-    return isinstance(statement, ast.If) and "__name__" in ast.unparse(statement.test)
 
 
 def is_future(statement: ast.stmt) -> bool:

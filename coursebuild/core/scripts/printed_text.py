@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from itertools import accumulate, chain
 from typing import TypeAlias
 
@@ -37,7 +37,7 @@ from coursebuild.core.text.quantities import (
     unit_of_printed,
 )
 from coursebuild.core.text.regex import regex
-from coursebuild.core.text.source import Excerpt, Source, Span
+from coursebuild.core.text.source import Span
 
 Locate: TypeAlias = Callable[[int, int], Span]
 _Words: TypeAlias = tuple[str, ...]
@@ -183,10 +183,12 @@ class PrintedText:
             return cls.of_rows(body, table_rows(body))
         side = Side.of(body.text, filters)
         is_grouped = has_groups("\n".join(side.lines))
-        return cls(
-            PrintedLine(line, _locator_in_fence(body, side, at), is_grouped)
-            for at, line in enumerate(side.lines)
-        )
+
+        def locate(at: int, start: int, end: int) -> Span:
+            return body.span(*side.origin(at, start, end))
+
+        lines = enumerate(side.lines)
+        return cls(PrintedLine(line, partial(locate, at), is_grouped) for at, line in lines)
 
     @classmethod
     def of_rows(cls, table: Table, rows: Sequence[Sequence[RowCell]]) -> PrintedText:
@@ -194,11 +196,16 @@ class PrintedText:
         titles = list(map(ColumnTitle.of, table.header))
         texts = [" ".join(as_printed(c.mapped.text, table.comma) for c in row) for row in rows]
         is_grouped, lines = has_groups("\n".join(texts)), []
+        gap = MappedText.substitute_for(0, 0, " ")
+
+        def locate(mapped: MappedText, start: int, end: int) -> Span:
+            return Span(table.span.source, *mapped.origin(start, end))
+
         for row, text in zip(rows, texts, strict=True):
             ends = accumulate(len(cell.mapped.text) + 1 for cell in row)
             columns = tuple((end - 1, titles[c.column]) for end, c in zip(ends, row, strict=True))
-            locate = _locator_in_row(row, table.span.source)
-            lines.append(PrintedLine(text, locate, is_grouped, columns))
+            mapped = MappedText.join([part for cell in row for part in (gap, cell.mapped)][1:])
+            lines.append(PrintedLine(text, partial(locate, mapped), is_grouped, columns))
         return cls(lines)
 
     # --- what is printed with a number
@@ -438,13 +445,3 @@ def _ends_with(context: _Words, sought: _Words) -> bool:
         word == sought_word or (sought_word == "#" and word.startswith("\0"))
         for word, sought_word in zip(reversed(context), reversed(sought), strict=False)
     )
-
-
-def _locator_in_fence(body: Excerpt, side: Side, at: int) -> Locate:
-    return lambda start, end: body.span(*side.origin(at, start, end))
-
-
-def _locator_in_row(row: Iterable[RowCell], source: Source) -> Locate:
-    gap = MappedText.substitute_for(0, 0, " ")
-    text = MappedText.join([part for cell in row for part in (gap, cell.mapped)][1:])
-    return lambda start, end: Span(source, *text.origin(start, end))

@@ -25,7 +25,7 @@ import enum
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
-from itertools import pairwise
+from itertools import chain, pairwise
 
 from msgspec import Struct
 from msgspec.structs import replace
@@ -149,14 +149,15 @@ def sensitivity(
     if standing is not Standing.MEASURED:
         return Sensitivity(path, owner, standing)
     reason_unhalved = _reason_unhalved(finer_runs)
-    usable_runs = _RunsByKind(moved_runs)
-    if not reason_unhalved:
-        are_usable = all(r.outcome is Outcome.OK and r.trace is not None for r in shifted_runs)
-        usable_runs = _RunsByKind(moved_runs, finer_runs, shifted_runs if are_usable else ())
+    if reason_unhalved:
+        finer_runs = shifted_runs = ()
+    elif not all(r.outcome is Outcome.OK and r.trace is not None for r in shifted_runs):
+        shifted_runs = ()
+    other_runs = moved_runs, finer_runs, shifted_runs
     findings = [
         finding
         for recording, comparison in compared
-        for finding in _find_doubts(recording, comparison, base, usable_runs)
+        for finding in _find_doubts(recording, comparison, base, other_runs)
     ]
     numbers = sum(
         len(line.numbers)
@@ -179,14 +180,6 @@ def _reason_unhalved(runs: Sequence[ScriptRun]) -> str:
         if run.trace is None or not run.trace.is_perturbed:
             return "no step of it can be halved"
     return ""
-
-
-class _RunsByKind(Struct, frozen=True):
-    """The runs of a script beside its ordinary one."""
-
-    moved: Sequence[ScriptRun]
-    finer: Sequence[ScriptRun] = ()
-    shifted: Sequence[ScriptRun] = ()
 
 
 def is_worth_moving(course: Course, recordings: Iterable[Recording], base: ScriptRun) -> bool:
@@ -230,9 +223,9 @@ def _find_doubts(
     recording: Recording,
     comparison: Comparison,
     base: ScriptRun,
-    runs: _RunsByKind,
+    runs: tuple[Sequence[ScriptRun], Sequence[ScriptRun], Sequence[ScriptRun]],
 ) -> Iterator[Doubt | Flip]:
-    """Numbers and texts of a recording that other runs change, in order."""
+    """Numbers and texts of a recording that moved, finer and shifted runs change, in order."""
     exact = replace(comparison, mode=Mode.EXACT)
 
     def find_changes(run: ScriptRun) -> dict[tuple[int, int], Change]:
@@ -240,7 +233,7 @@ def _find_doubts(
         return {(change.span.start, change.span.end): change for change in changes}
 
     changes_of_base = find_changes(base)
-    changes_by_run = [find_changes(run) for run in (*runs.moved, *runs.finer, *runs.shifted)]
+    changes_by_run = [find_changes(run) for run in chain(*runs)]
     first_changes = {place: c for changes in changes_by_run[::-1] for place, c in changes.items()}
     for place, first_change in sorted(first_changes.items()):
         recorded = first_change.recorded
@@ -248,8 +241,8 @@ def _find_doubts(
             changes[place].printed if place in changes else recorded
             for changes in (changes_of_base, *changes_by_run)
         )
-        finer_end = len(runs.moved) + len(runs.finer)
-        start_values, finer = values[: len(runs.moved)], values[len(runs.moved) : finer_end]
+        moved_end, finer_end = len(runs[0]), len(runs[0]) + len(runs[1])
+        start_values, finer = values[:moved_end], values[moved_end:finer_end]
         tick = _sampling_step(printed, values[finer_end:])
         if tick or any(value != printed for value in values[:finer_end]):
             yield from _judge_number(

@@ -157,7 +157,8 @@ class _File:
             if bound in self._meanings:
                 raise NotOneFileError(f"`{bound}` means two things in it")
             self._meanings[bound] = self._origin(module_name, name)
-        for bound, module_name, name in sorted(ours, key=self._is_whole):
+        wholes = [row for row in ours if self._find_module(".".join(filter(None, row[1:])))]
+        for bound, module_name, name in (*(row for row in ours if row not in wholes), *wholes):
             self._take(bound, module_name, name)
         return course_lines
 
@@ -179,10 +180,6 @@ class _File:
         row = next(row for row in module.imported(statement) if row[0] == name)
         is_ours = self._find_module(row[1]) is not None
         return self._origin(row[1], row[2]) if is_ours else self._external(module, name)
-
-    def _is_whole(self, row: tuple[str, str, str]) -> bool:
-        """Whether what is imported is a module."""
-        return self._find_module(".".join(filter(None, row[1:]))) is not None
 
     def _module(self, name: str, source: CourseModule) -> ModuleCode:
         if name not in self._modules:

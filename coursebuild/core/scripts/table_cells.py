@@ -47,7 +47,7 @@ from coursebuild.core.text.quantities import (
     unit_of_header,
 )
 from coursebuild.core.text.regex import regex
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.source import Span
 
 _TEX_COMMA = regex(r"\{,\}")
 _RUN = regex(r"\s{2,}|(?<![0-9])[^\S ]|[^\S ](?![0-9])")
@@ -192,7 +192,16 @@ def cell_text(
                 text, span = inline.text, inline.text_span
             case model.Math():
                 sign = MappedText.substitute_for(span.start, span.start, formula_sign)
-                stretches += (sign, _formula_text(inline.tex), sign)
+                # What a macro stands for stands where its name does, and `{,}` is a comma.
+                tex, starts = (
+                    inline.tex,
+                    [inline.tex.offset(at) for at in range(len(inline.tex.text))],
+                )
+                names = [COMMAND.match(tex.source.text, start) for start in starts]
+                pairs = zip(starts, names, strict=True)
+                ends = [start + 1 if name is None else name.end() for start, name in pairs]
+                formula = MappedText(tex.text, starts, ends).substitute(_TEX_COMMA, ",")
+                stretches += (sign, formula, sign)
                 continue
             case model.Image():
                 text = inline.alt
@@ -210,16 +219,6 @@ def cell_text(
     mapped = apply_filters(MappedText.join(stretches), filters)
     folded = mapped.substitute(_RUN, " ").substitute(_ENDS, "")
     return MappedText(folded.text.replace("\u2212", "-"), folded.starts, folded.ends)
-
-
-def _formula_text(tex: Excerpt) -> MappedText:
-    """A formula; what a macro stands for stands where its name does, and `{,}` is a comma."""
-    starts = [tex.offset(at) for at in range(len(tex.text))]
-    names = (COMMAND.match(tex.source.text, start) for start in starts)
-    ends = [
-        start + 1 if name is None else name.end() for start, name in zip(starts, names, strict=True)
-    ]
-    return MappedText(tex.text, starts, ends).substitute(_TEX_COMMA, ",")
 
 
 def cell_matches(recorded: Number, printed: Number, comparison: model.Comparison) -> bool:
@@ -242,29 +241,21 @@ def number_text(old: Number, new: Number, comparison: model.Comparison) -> str:
     return new.text
 
 
-def _find_places(
-    cell: CanonicalText, line: CanonicalText, start: int, numbers_match: SameNumber
-) -> Iterator[int]:
-    """Offsets from `start` on at which a cell stands in a line, whole words and numbers only."""
-    text = cell.skeleton
-    before = r"(?<!\w)" if _WORD_CHARACTER.match(text[0]) else ""
-    after = r"(?!\w)" if _WORD_CHARACTER.match(text[-1]) else ""
-    pattern = re.compile(f"(?={before}{re.escape(text)}{after})")
-    places = (match.start() for match in pattern.finditer(line.skeleton, start))
-    return (place for place in places if numbers_fit(cell, line, place, numbers_match))
-
-
 def find_rows(
     row: Sequence[RowCell], line: CanonicalText, start: int, numbers_match: SameNumber
 ) -> Iterator[tuple[int, ...]]:
-    """The ways in which the cells stand in a line in order, each after the one before."""
+    """The ways in which the cells stand in a line in order, as whole words and numbers."""
     if not row:
         yield ()
         return
-    cell = row[0].canonical
-    for place in _find_places(cell, line, start, numbers_match):
-        for rest in find_rows(row[1:], line, place + len(cell.skeleton), numbers_match):
-            yield (place, *rest)
+    cell, text = row[0].canonical, row[0].canonical.skeleton
+    before = r"(?<!\w)" if _WORD_CHARACTER.match(text[0]) else ""
+    after = r"(?!\w)" if _WORD_CHARACTER.match(text[-1]) else ""
+    pattern = re.compile(f"(?={before}{re.escape(text)}{after})")
+    for place in (match.start() for match in pattern.finditer(line.skeleton, start)):
+        if numbers_fit(cell, line, place, numbers_match):
+            for rest in find_rows(row[1:], line, place + len(text), numbers_match):
+                yield (place, *rest)
 
 
 _WORD_CHARACTER = regex(r"\w")

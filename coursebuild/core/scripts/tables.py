@@ -117,11 +117,17 @@ class TableMatcher:
         if not layouts:
             return TableMatch(tuple(self._match_rows(None)))
         is_right = any(self._right_rows(layout) == len(self.rows) for layout in layouts)
-        rivals = tuple(dict.fromkeys(map(self._describe, layouts))) if layouts[1:] else ()
+        rivals: tuple[str, ...] = ()
+        if layouts[1:]:
+            lines = ((at.heading, self.lines[self._fits_in(0, at)[0].line]) for at in layouts)
+            rivals = tuple(dict.fromkeys(plain_text(" / ".join(filter(None, p))) for p in lines))
         if rivals and not is_right:
-            nearest = (self._nearest_fit(row, layouts) for row in range(len(self.rows)))
-            rows = tuple(replace(fit, certain=False) for fit in nearest)
-            return TableMatch(rows, rivals)
+            fits_of_rows = (
+                [fit for layout in layouts for fit in self._fits_in(row, layout)]
+                for row in range(len(self.rows))
+            )
+            nearest = (min(fits, key=_distance) for fits in fits_of_rows)
+            return TableMatch(tuple(replace(fit, certain=False) for fit in nearest), rivals)
         matches = tuple(self._match_rows(layouts[0]))
         return TableMatch(matches, rivals, self._count_lines(layouts[0]))
 
@@ -162,10 +168,6 @@ class TableMatcher:
             if layout not in right and scores[layout][1:3] > scores[best[0]][1:3]
         )
         return [*best, *doubts]
-
-    def _describe(self, layout: LineLayout) -> str:
-        line = self.lines[self._fits_in(0, layout)[0].line]
-        return plain_text(f"{layout.heading} / {line}" if layout.heading else line)
 
     def _fits_in(self, row: int, layout: LineLayout) -> list[RowMatch]:
         return [fit for fit in self._fits_of_row(row) if fit.layout == layout]
@@ -273,15 +275,6 @@ class TableMatcher:
         }
         return lines == {fit.line}
 
-    def _nearest_fit(self, row: int, layouts: Sequence[LineLayout]) -> RowMatch:
-        """The way in which the numbers of a row are nearest to the printed ones."""
-
-        def distance(fit: RowMatch) -> float:
-            errors = [relative_error(a.value, b.value) for _, a, b in fit.pairs]
-            return sum(1.0 if error is None else min(1.0, float(error)) for error in errors)
-
-        return min((fit for layout in layouts for fit in self._fits_in(row, layout)), key=distance)
-
     def _weight(self, fit: RowMatch) -> int:
         """Less for a row more of whose numbers differ."""
         if fit.is_right:
@@ -380,6 +373,12 @@ class TableMatcher:
             for cell, _, number in row.pairs:
                 units.setdefault(cell.column, []).append(self.text.unit(row.line, number))
         return units
+
+
+def _distance(fit: RowMatch) -> float:
+    """How far the numbers of a row are from the printed ones."""
+    errors = [relative_error(a.value, b.value) for _, a, b in fit.pairs]
+    return sum(1.0 if error is None else min(1.0, float(error)) for error in errors)
 
 
 def updated_row(match: RowMatch, comparison: model.Comparison) -> tuple[RowCell, ...]:

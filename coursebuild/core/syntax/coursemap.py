@@ -205,18 +205,15 @@ _PAGE_FILE = regex(r"(?!~|[A-Za-z]:)(?:(?!\.{0,2}/)[^\x00-\x1f\\/]+/)*(?!\.md)[^
 def _check_ids(root: ObjectNode, lessons: Iterable[ObjectNode]) -> Iterator[Diagnostic]:
     kinds = (("level", root.objects("level")), ("lesson", lessons), ("page", root.objects("page")))
     for kind, nodes in kinds:
-        first_by_id: dict[str, tuple[str, Span]] = {}
+        first_by_id: dict[str, Span] = {}
         for node in (id_node for node in nodes if (id_node := node.get("id"))):
             name = _read_id(node)
-            first, span = first_by_id.setdefault(name.casefold(), (name, node.span))
+            span = first_by_id.setdefault(name.casefold(), node.span)
             if not name or span == node.span:
                 continue
-            message = f"the {kind} id `{shorten(name)}` is used twice"
-            if name != first:
-                differ = "differ in upper and lower case only"
-                message = f"the {kind} ids `{shorten(first)}` and `{shorten(name)}` {differ}"
+            message, help = f"the {kind} id `{shorten(name)}` is used twice", "case does not count"
             notes = (Note("the first one is here", span),)
-            yield diagnose("id-repeated", node.span, message, notes=notes)
+            yield diagnose("id-repeated", node.span, message, help=help, notes=notes)
 
 
 def _check_files(decoding: Decoding[CourseFile]) -> Iterator[Diagnostic]:

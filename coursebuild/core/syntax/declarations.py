@@ -163,11 +163,3 @@ def _check_scenarios(decoding: Decoding[ModelFile]) -> Iterator[Diagnostic]:
                 message = f"this command has {len(row)} numbers, and the first one has {first}"
                 help = "give one number for every actuator"
                 yield diagnose("field-value", item.mark, message, help=help)
-        if hold is not None and duration is not None and len(table.controls) > 1:
-            used_commands = -(-duration * (1 - _TOLERANCE) // hold)
-            if used_commands < len(table.controls):
-                message = (
-                    f"only {used_commands:g} of {len(table.controls)} commands come before the end"
-                )
-                help = "make `duration` longer, or leave the others out"
-                yield diagnose("field-value", node.place("controls"), message, help=help)

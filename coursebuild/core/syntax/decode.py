@@ -196,7 +196,7 @@ class _Decoder:
         name: str,
         remarks: Mapping[str, str],
     ) -> object:
-        problem, help = "", ""
+        problem, help, digits = "", "", node.raw.lower().partition("e")[0]
         try:
             double = float(node.value)
         except OverflowError:
@@ -204,10 +204,8 @@ class _Decoder:
         value = node.value if isinstance(type, inspect.IntType) else double
         if node.raw.strip("+-") in ("inf", "nan"):
             problem = f"must be a finite number, not {node.raw}"
-        elif math.isinf(double):
-            problem = "is too large: numbers end at about 1.8e308"
-        elif double == 0 and re.search(r"[1-9]", re.split(r"[eE]", node.raw)[0]):
-            problem = "is too small: it becomes 0"
+        elif math.isinf(double) or (double == 0 and re.search("[1-9]", digits)):
+            problem = "is outside what a number of a computer holds"
         for attribute, words, holds in () if problem else _BOUNDS:
             limit = getattr(type, attribute)
             if limit is not None and not holds(value, limit):

@@ -21,7 +21,6 @@ from coursebuild.core.syntax.nodes import ArrayNode, Node, StringNode
 from coursebuild.core.syntax.spans import NO_TEXT, PositionedToken, trim
 from coursebuild.core.text.diagnostics import (
     Diagnostic,
-    Fix,
     Note,
     Parsed,
     diagnose,
@@ -181,9 +180,7 @@ class Fence(Struct, frozen=True):
                     diagnose("fence-key-repeated", word.key_span, message, help=help, notes=notes)
                 )
             elif key not in values and word.value is not None:
-                is_yes = (word.value or "").lower() in ("true", "yes", "on", "1", key)
-                message = f"`{key}` takes no value"
-                help = Fix(f"write `{key}` alone", key if is_yes else None, safe=True)
+                message, help = f"`{key}` takes no value", f"write `{key}` alone"
                 diagnostics.append(diagnose("fence-key-value", word.span, message, help=help))
             elif word.value == "" or (key not in flags and word.value is None):
                 needs_value = True

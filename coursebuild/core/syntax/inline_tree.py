@@ -43,6 +43,7 @@ MAX_DEPTH = 60
 """How deep emphasis may nest; deeper marks are dropped."""
 
 _NUMBERS = ("number_binding", "number_given")
+_UNCLOSED = "display math is never closed"
 _CONTROL = regex("[\x01-\x08\x0b\x0e-\x1f\x7f-\x9f\u202a-\u202e]")
 _DEFINITION_HEAD = regex(r"\[(?:\\.|[^\[\]\\])*\]:\s*", re.DOTALL)
 
@@ -117,7 +118,10 @@ class _TokenReader:
             elif kind == "softbreak":
                 self.pieces.append(TextPiece("\n", token.start, token.end, False))
             elif kind == "math_unclosed":
-                self._read_unclosed_math(token)
+                place, message = self.content.span(token.start, token.end), _UNCLOSED
+                help = "close it with `$$` in the same paragraph, or write `\\$` for a dollar sign"
+                self.report(diagnose("math-unclosed", place, message, help=help))
+                self.pieces.append(TextPiece(token.content, token.start, token.end))
             elif token.nesting == 1:
                 self._open(token)
             elif token.nesting == -1:
@@ -126,7 +130,11 @@ class _TokenReader:
                 self._add_leaf(token)
         self._flush()
         for start, text in self.texts:
-            self._check_characters(start, text)
+            if (character := _CONTROL.search(text)) is not None:
+                message = f"the text contains the control character U+{ord(character[0]):04X}"
+                place = self.content.span(start + character.start(), start + character.end())
+                help = "delete it, or write the character that was meant"
+                self.report(diagnose("control-character", place, message, help=help))
             if (at := text.find("<!--")) >= 0:
                 message, at = "this comment is never closed", start + at
                 place = self.content.span(at, at + 4)
@@ -138,16 +146,6 @@ class _TokenReader:
                 self.state.diagnostics += check_unread_attributes(self.content, start, text)
         return tuple(self.stack[0].nodes)
 
-    # -- texts
-
-    def _check_characters(self, start: int, text: str) -> None:
-        """Report a character that no reader sees, or by which a browser shows others elsewhere."""
-        if (character := _CONTROL.search(text)) is not None:
-            message = f"the text contains the control character U+{ord(character[0]):04X}"
-            place = self.content.span(start + character.start(), start + character.end())
-            help = "delete it, or write the character that was meant"
-            self.report(diagnose("control-character", place, message, help=help))
-
     def _flush(self) -> None:
         pieces = self.pieces
         if not pieces:
@@ -158,12 +156,6 @@ class _TokenReader:
             nodes += link_mentions(pieces, self.content, self.state.words)
         else:
             nodes += text_inlines(pieces, self.content)
-
-    def _read_unclosed_math(self, token: PositionedToken) -> None:
-        span = self.content.span(token.start, token.end)
-        help = "close it with `$$` in the same paragraph, or write `\\$` for a dollar sign"
-        self.report(diagnose("math-unclosed", span, "display math is never closed", help=help))
-        self.pieces.append(TextPiece(token.content, token.start, token.end))
 
     # -- containers
 
@@ -275,7 +267,9 @@ class _TokenReader:
             case "hardbreak":
                 node = model.HardBreak(span)
             case "footnote_ref":
-                node = self._read_footnote(token, span)
+                node = self.state.notes.refer(token.content, span)
+                if node is None:
+                    self.pieces.append(TextPiece(f"[^{token.content}]", token.start, token.end))
             case "citation":
                 node = model.Citation(span, tuple(self._read_works(token)))
             case _:
@@ -370,12 +364,6 @@ class _TokenReader:
                 span, key.strip(), collapse_spaces(before), collapse_spaces(locator)
             )
             at += len(part) + 1
-
-    def _read_footnote(self, token: PositionedToken, span: Span) -> model.FootnoteRef | None:
-        reference = self.state.notes.refer(token.content, span)
-        if reference is None:
-            self.pieces.append(TextPiece(f"[^{token.content}]", token.start, token.end))
-        return reference
 
 
 def _find_address(text: Excerpt, start: int) -> Span | None:

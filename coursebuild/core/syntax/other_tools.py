@@ -6,7 +6,6 @@ as code.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
@@ -16,7 +15,7 @@ from coursebuild.core.syntax.fence import (
     split_words,
 )
 from coursebuild.core.syntax.nodes import shorten
-from coursebuild.core.text.diagnostics import Diagnostic, Fix, diagnose
+from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
 
 _CALLOUT = "a callout is a quotation: `> [!note]`, and `> ` before each line of it"
@@ -84,9 +83,7 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"
         help = "a script is a block of kind `python`"
-        is_python = re.fullmatch("i?py(?:thon)?3?", fence.kind) is not None
-        fix = Fix(help, "python" if is_python else None, safe=True)
-        yield diagnose("script-kind", kind.span(), message, help=fix)
+        yield diagnose("script-kind", kind.span(), message, help=help)
     elif kind.text.startswith("{"):
         message = f"a block of kind `{kind.text}` is shown as code: braces are read by MyST, Quarto"
         help = "write the kind alone, as in ```` ```python file=examples/a.py ````; " + _CALLOUT
@@ -94,6 +91,4 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     elif "=" in kind.text:
         message = f"the kind of this block is missing before `{kind.text}`"
         help = "the first word says what a block is, as in ```` ```python file=examples/a.py ````"
-        is_script = kind.text.startswith("file=") and kind.text.endswith(".py")
-        fix = Fix(help, f"python {kind.text}" if is_script else None, safe=True)
-        yield diagnose("fence-info", kind.span(), message, help=fix)
+        yield diagnose("fence-info", kind.span(), message, help=help)

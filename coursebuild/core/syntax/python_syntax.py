@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import ast
 import re
-import warnings
 from collections.abc import Iterator
-from functools import lru_cache
 
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.python_code import python_nodes
+from coursebuild.core.text.python_code import compile_error, python_nodes
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt
 
@@ -47,7 +45,7 @@ def find_windows(code: Excerpt) -> Iterator[Diagnostic]:
 
 def check_syntax(code: Excerpt) -> Iterator[Diagnostic]:
     """Report where and why a script does not parse, if it does not."""
-    error = _compile_error(code.text)
+    error = compile_error(code.text)
     if error is None:
         return
     rows = code.lines()
@@ -76,20 +74,3 @@ def _lower_first(sentence: str) -> str:
     if sentence[1:2].islower():
         return sentence[:1].lower() + sentence[1:]
     return sentence
-
-
-@lru_cache(maxsize=64)
-def _compile_error(code: str) -> SyntaxError | None:
-    """The first error of Python in a text; kept, as a preview parses unchanged blocks again."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            compile(code, "", "exec", dont_inherit=True)
-    except SyntaxError as error:
-        return error.with_traceback(None)
-    except (ValueError, MemoryError, RecursionError, OverflowError) as error:
-        message = f"the code cannot be compiled: {error}"
-        syntax_error = SyntaxError(message if str(error) else "the code is nested too deeply")
-        syntax_error.end_offset = 1
-        return syntax_error
-    return None

@@ -189,15 +189,6 @@ _WORDS_HELP = "the only words without quotes are `true` and `false`"
 _NUMBERS_HELP = "a number has no leading zeros, and digits on both sides of its point"
 
 
-def error_offset(text: str, message: str) -> int:
-    """The offset that a message of `tomllib` names; the end of the text if it names none."""
-    place = _PLACE.search(message)
-    if place is None or place[1] is None:
-        return len(text)
-    starts = [0, *(match.end() for match in re.finditer("\n", text))]
-    return min(starts[min(int(place[1]), len(starts)) - 1] + int(place[2]) - 1, len(text))
-
-
 def double_backslash(command: str) -> str:
     """How to write a command of TeX in a string."""
     help = f"double the backslash: `\\\\{command}`, or put the text between single quotes"
@@ -209,7 +200,10 @@ _Mistake = tuple[int, int, str, str]
 
 
 def _describe_mistake(text: str, message: str) -> _Mistake:
-    at = error_offset(text, message)
+    at, place = len(text), _PLACE.search(message)  # the end of the text, if it names no place
+    if place is not None and place[1] is not None:
+        starts = [0, *(match.end() for match in re.finditer("\n", text))]
+        at = min(starts[min(int(place[1]), len(starts)) - 1] + int(place[2]) - 1, len(text))
     char, words = text[at : at + 1], _PLACE.sub("", message).replace("'", "`")
     if odd := "a lone carriage return" if char == "\r" else nodes.odd_character(char):
         help: str = Fix("replace it by a plain space, or remove it", " ", safe=char != "\r")

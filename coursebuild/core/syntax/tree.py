@@ -187,11 +187,6 @@ class TextReader:
             label = self.state.take_label(braces, "tab")
             return replace(recording, body=replace(recording.body, label=label))
         message, help = "no table follows the caption of this label", "put one directly below it"
-        start_of_caption, _, text = caption.text.partition(":")
-        word = next(filter(start_of_caption.startswith, words.output), None)
-        if recording is None and text.strip() and word is not None:
-            message = f"`{start_of_caption}:` is the end of a caption"
-            help = f"write `{word}, {text.strip().rstrip('.')}:`"
         if recording is not None:
             message = "an output that is no table has no label"
             help = "write `{#lst:name}` on the first line of its script"

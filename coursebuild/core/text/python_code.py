@@ -1,4 +1,4 @@
-"""The syntax tree of Python texts."""
+"""Python texts: their syntax tree, or why they have none."""
 
 from __future__ import annotations
 
@@ -31,3 +31,20 @@ def _nodes(code: str) -> tuple[ast.AST, ...]:
             return tuple(ast.walk(ast.parse(code, "")))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return ()
+
+
+@functools.lru_cache(maxsize=64)
+def compile_error(code: str) -> SyntaxError | None:
+    """The first error of Python in a text; kept, as a preview parses unchanged blocks again."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            compile(code, "", "exec", dont_inherit=True)
+    except SyntaxError as error:
+        return error.with_traceback(None)
+    except (ValueError, MemoryError, RecursionError, OverflowError) as error:
+        message = f"the code cannot be compiled: {error}"
+        syntax_error = SyntaxError(message if str(error) else "the code is nested too deeply")
+        syntax_error.end_offset = 1
+        return syntax_error
+    return None

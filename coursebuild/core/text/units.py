@@ -114,9 +114,14 @@ class Unit(Struct, frozen=True):
         `None` where the size would be no rational number.
         """
         exponent = Fraction(power)
-        size = _raise(factor.size, exponent)
+        if exponent.denominator == 1:
+            size = factor.size ** int(exponent)
+        else:
+            size = Fraction(float(factor.size) ** float(exponent)).limit_denominator(10**12)
+            if size**exponent.denominator != factor.size**exponent.numerator:
+                return None
         pi = factor.pi * exponent
-        if size is None or pi.denominator != 1:
+        if pi.denominator != 1:
             return None
         powers = multiply(self.powers, factor.powers, exponent)
         return Unit(self.size * size, powers, self.pi + int(pi))
@@ -138,13 +143,6 @@ class Unit(Struct, frozen=True):
 
 
 ONE = Unit(Fraction(1))
-
-
-def _raise(size: Fraction, exponent: Fraction) -> Fraction | None:
-    if exponent.denominator == 1:
-        return size ** int(exponent)
-    root = Fraction(float(size) ** float(exponent)).limit_denominator(10**12)
-    return root if root**exponent.denominator == size**exponent.numerator else None
 
 
 def multiply(left: Dimension, right: Dimension, power: Fraction | int = 1) -> Dimension:

@@ -99,10 +99,6 @@ def unread_marks(document: Document) -> Iterator[Diagnostic]:
                 yield diagnose("shown-as-written", span, message, help=help)
 
 
-def _hide(match: re.Match[str]) -> str:
-    return _ESCAPED.get(match[0], _OTHER) + _OTHER * (len(match[0]) - 1)
-
-
 def _find_place(places: Sequence[tuple[int, int]], at: int) -> int:
     start, place = places[bisect_right(places, at, key=itemgetter(0)) - 1]
     return place + at - start
@@ -115,7 +111,10 @@ def _source_text(inlines: Iterable[model.Inline]) -> tuple[str, list[tuple[int, 
         match inline:
             case model.Text():
                 places.append((len(text), inline.span.start))
-                text += _HIDDEN.sub(_hide, inline.span.text)
+                text += _HIDDEN.sub(
+                    lambda m: _ESCAPED.get(m[0], _OTHER) + _OTHER * (len(m[0]) - 1),
+                    inline.span.text,
+                )
             case model.Emphasis() | model.Strong() | model.Strikethrough() | model.Term():
                 pass
             case _:

@@ -148,18 +148,18 @@ def unbound_results(course: model.Course) -> Iterator[tuple[model.Owner, tuple[S
     for owner, document in course.owned_documents:
         if isinstance(owner, model.Lesson) or owner.menu:
             claims = document_claims(read_again(course, owner, document))
-            of_map = _map_claims(owner, document.comma)
-            results = [*claims.open, *(claim for claim in of_map if claim.text not in bound)]
+            texts: tuple[str, ...] = ()
+            if isinstance(owner, model.Lesson):
+                texts = (owner.title, owner.summary, *owner.objectives)
+            of_map = [
+                _claim(number, owner.span, _unit_of(number, text))
+                for text in texts
+                for number in find_numbers(text, document.comma)
+                if number.text not in bound
+            ]
+            results = [*claims.open, *of_map]
             inputs = parts.inputs(document).union(claims.inputs) if results else ()
             yield owner, tuple(claim for claim in results if not claim.is_in(inputs))
-
-
-def _map_claims(owner: model.Owner, comma: bool) -> Iterator[StatedNumber]:
-    """Yield the numbers in what the map says about a lesson, which may be bound there."""
-    if isinstance(owner, model.Lesson):
-        for text in (owner.title, owner.summary, *owner.objectives):
-            numbers = find_numbers(text, comma)
-            yield from (_claim(n, owner.span, _unit_of(n, text)) for n in numbers)
 
 
 # --- found in a document
