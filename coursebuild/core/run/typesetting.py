@@ -1,10 +1,10 @@
 """Formulas to MathML: Temml in QuickJS, or many in V8, with limits on time and memory.
 
 QuickJS starts within a millisecond, needs no thread and no addresses that it does not use, and may
-be forked. V8 takes a fifth of its time for a formula, but as long to start as QuickJS for 60 to 300.
-So V8 typesets what comes after the first formulas, where it can start, and QuickJS judges: what V8
-refuses, QuickJS typesets again, and what could exceed QuickJS's stack, which is the smaller one,
-never comes to V8. Their bytes are the same.
+be forked. V8 takes a fifth of its time for a formula, but to start as long as QuickJS takes for 60
+to 300. So V8 typesets what comes after the first formulas, where it can start, and QuickJS judges:
+what V8 refuses, QuickJS typesets again, and what could exceed QuickJS's stack, which is the smaller
+one, never comes to V8. Their bytes are the same.
 
 Formulas are typeset many at a time, as JSON (see `typeset.js`). When a batch exceeds a limit of
 QuickJS, its context is thrown away, and its formulas are typeset one by one, to find the one to
