@@ -1,10 +1,10 @@
 """Formulas to MathML: Temml in QuickJS, or many in V8, with limits on time and memory.
 
 QuickJS starts within a millisecond, needs no thread and no addresses that it does not use, and may
-be forked. V8 takes a fifth of its time for a formula, but as long to start as QuickJS for some 80.
-So V8 typesets what comes after the first formulas, where it can start, and QuickJS judges: what V8
-refuses, QuickJS typesets again, and what could exceed QuickJS's stack, which is the smaller one,
-never comes to V8. Their bytes are the same.
+be forked. V8 takes a fifth of its time for a formula, but to start as long as QuickJS takes for 60
+to 300. So V8 typesets what comes after the first formulas, where it can start, and QuickJS judges:
+what V8 refuses, QuickJS typesets again, and what could exceed QuickJS's stack, which is the smaller
+one, never comes to V8. Their bytes are the same.
 
 Formulas are typeset many at a time, as JSON (see `typeset.js`). When a batch exceeds a limit of
 QuickJS, its context is thrown away, and its formulas are typeset one by one, to find the one to
@@ -36,8 +36,8 @@ _STACK = 4 << 20
 """Bytes at most: what the deepest formula takes that browsers draw."""
 _BATCH = 100
 """Formulas at a time; one takes about 0.3 ms."""
-_MANY = 100
-"""Formulas that QuickJS typesets before V8 is worth its start."""
+_MANY = 5_000
+"""Characters of the formulas that QuickJS typesets in the time in which V8 starts."""
 _SHALLOW = 400
 """Characters of a formula that can be nested as deep as it is long: half of what QuickJS takes."""
 _MOST_REMEMBERED = 2000
@@ -54,7 +54,7 @@ class MathEngine:
         self._context: Any = None
         self._isolate: Isolate | None = None
         self._has_v8 = True
-        self._new_count = 0
+        self._length = 0
         self._mathml: dict[Formula, str] = {}
         """Of formulas typeset before: half of those of a text stand in another one, too."""
         self._lock = threading.RLock()
@@ -62,7 +62,7 @@ class MathEngine:
     def close(self) -> None:
         """End V8 with its threads, so that this process can be forked; the engine still works."""
         with self._lock:
-            self._new_count = 0
+            self._length = 0
             if self._isolate is not None:
                 self._isolate.close()
                 self._isolate = None
@@ -78,9 +78,9 @@ class MathEngine:
                 formula: self._mathml[formula] for formula in formulas if formula in self._mathml
             }
             new = [formula for formula in dict.fromkeys(formulas) if formula not in results]
-            if new and self._has_v8 and self._new_count >= _MANY:
+            if new and self._has_v8 and self._length >= _MANY:
                 results |= self._typeset_in_v8(new)
-            self._new_count += len(new)
+            self._length += sum(len(formula.tex) for formula in new)
             others = [formula for formula in new if formula not in results]
             for start in range(0, len(others), _BATCH):
                 batch = others[start : start + _BATCH]

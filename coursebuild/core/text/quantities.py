@@ -12,6 +12,7 @@ program printed; `unit_behind(text)`, `unit_of_header(text)`, for what an author
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
@@ -118,8 +119,9 @@ class UnitText(Struct, frozen=True):
 NO_UNIT = UnitText()
 
 
+@functools.lru_cache(maxsize=1024)
 def read_unit(text: str) -> UnitText:
-    """The unit that a whole text is, with all its readings."""
+    """The unit that a whole text is, with all its readings; texts repeat what they measure."""
     text = plain_unit(text)
     readings = [*find_units(text)] if text.strip("()1 ") else []
     divisor = "" if readings else _DIVISOR.sub("", text)

@@ -51,8 +51,8 @@ _TAG = regex(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*
 _TABLE = regex(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
 _FILE = regex(r"examples/[\w./-]*\w\.[a-z]+")
 _CODE_WORD = regex(
-    r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*(?=\(|\s?=)|[Mm]j[A-Z]\w+"
-    r"|(?<=\")[A-Za-z]\w+(?=\")"
+    r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*+(?=\(|\s?=)|[Mm]j[A-Z]\w+"
+    r"|(?<=\")[A-Za-z]\w++(?=\")"
 )
 """A word of code that inline code could mean."""
 _CODE = (model.Script | model.ScriptPart | model.PlainCode | model.CodeBlock) | (
