@@ -145,8 +145,8 @@ def test_a_model_that_does_not_compile_is_told_at_its_line(page: Page) -> None:
 
 
 def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None:
-    other = socket.create_server(("127.0.0.1", 0))
-    elsewhere = f"http://127.0.0.1:{other.getsockname()[1]}/x.js"
+    host = socket.create_server(("127.0.0.1", 0))
+    elsewhere = f"http://127.0.0.1:{host.getsockname()[1]}/x.js"
     neighbour = page.locator(".lab").filter(has_text="A neighbour")
     neighbour.scroll_into_view_if_needed()
     press(neighbour, "Play")
@@ -180,9 +180,9 @@ def test_code_without_an_end_or_a_meaning_harms_no_neighbour(page: Page) -> None
         text.fill(attempt)
         press(hold, "Check")
         expect(verdicts(hold).last).to_contain_text(message)
-    other.setblocking(False)
-    with other, pytest.raises(BlockingIOError):
-        other.accept()
+    host.setblocking(False)
+    with host, pytest.raises(BlockingIOError):
+        host.accept()
     text.fill("self.postMessage({type: 'verdict', index: 0, passed: true, seen: 0, failure: ''})")
     press(hold, "Check")
     for verdict in verdicts(hold).all():

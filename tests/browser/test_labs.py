@@ -109,9 +109,6 @@ def native(course: Site, steps: int, angle: float, gravity: float = -9.8) -> np.
     return np.array([data.time, *data.qpos, *data.qvel])
 
 
-# ------------------------------------------------------------------------------ the swing
-
-
 def test_engine_is_fetched_only_when_something_is_asked_of_a_lab(
     browsers: Mapping[str, Browser], base: str
 ) -> None:
@@ -325,13 +322,10 @@ def test_body_is_pulled_by_a_spring(lesson: Lesson, swing: Locator) -> None:
     page.keyboard.up("Control")
     view.press(" ")
 
-    def hangs() -> bool:
-        return abs(float(readout(swing, "angle"))) < 0.6
-
     def stays() -> bool:
         """It hangs where it is drawn to, and does not only swing past."""
         for _ in range(6):
-            if not hangs():
+            if abs(float(readout(swing, "angle"))) >= 0.6:
                 return False
             pictures(page, 5)
         return True
@@ -391,9 +385,6 @@ def test_goal_that_was_shown_does_not_count(lesson: Lesson, swing: Locator) -> N
     press(swing, "Reset")
     expect(goal).to_contain_text("0.00 s of 0.2 s")
     expect(goal).not_to_contain_text("Reached")
-
-
-# ------------------------------------------------------------------------- the other labs
 
 
 def test_every_kind_of_geom_and_overlay_is_drawn_and_a_large_state_fits_into_a_link(

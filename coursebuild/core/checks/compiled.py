@@ -20,6 +20,7 @@ from coursebuild.core.model import (
     Mjcf,
     MjcfModel,
     document_blocks,
+    enclosure,
     find_blocks,
 )
 from coursebuild.core.model.results import CompileResult, ModelFacts
@@ -82,9 +83,9 @@ def mjcf_texts(course: Course) -> tuple[MjcfText, ...]:
     texts: list[MjcfText] = []
     for document in course.documents:
         for block in document_blocks(document):
-            if isinstance(block, Mjcf) and block.around:
-                opening = "".join(f"<{name}>" for name in block.around)
-                closing = "".join(f"</{name}>" for name in reversed(block.around))
+            if isinstance(block, Mjcf) and (names := enclosure(block)):
+                opening = "".join(f"<{name}>" for name in names)
+                closing = "".join(f"</{name}>" for name in reversed(names))
                 text = f"{opening}\n{block.code.text}\n{closing}"
                 texts.append(MjcfText(block, block.code, text, 1))
             elif isinstance(block, Mjcf):

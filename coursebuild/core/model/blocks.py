@@ -297,16 +297,6 @@ class Mjcf(Labelled, frozen=True):
     error: str | None
     error_span: Span | None
 
-    @property
-    def around(self) -> tuple[str, ...]:
-        """The elements around a part, from the outside; none around a whole model.
-
-        `fragment="worldbody/body"` names nested ones.
-        """
-        if self.fragment is None:
-            return ()
-        return ("mujoco", *(n for n in self.fragment.split("/") if n not in ("", "mujoco")))
-
 
 class SourcePart(Struct, frozen=True):
     """A part of a file of the project that a block shows: `show=src/x.py#function`."""

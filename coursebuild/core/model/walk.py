@@ -141,6 +141,16 @@ def find_blocks(document: Document, kind: type[AnyBlock]) -> Iterator[AnyBlock]:
     return (block for block in document_blocks(document) if isinstance(block, kind))
 
 
+def enclosure(block: Mjcf) -> tuple[str, ...]:
+    """The elements around a part of a model, from the outside; none around a whole one.
+
+    `fragment="worldbody/body"` names nested ones.
+    """
+    if block.fragment is None:
+        return ()
+    return ("mujoco", *(name for name in block.fragment.split("/") if name not in ("", "mujoco")))
+
+
 def output_numbers(document: Document) -> Mapping[int, int]:
     """The number of each recording among the outputs of its script, from 1, by offset."""
 

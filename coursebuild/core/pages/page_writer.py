@@ -136,6 +136,7 @@ class PageWriter(PageContext, frozen=True):
                     html=self.highlight("xml", block.code.text.rstrip("\n")),
                     engine=self.inputs.engine,
                     editor=self.code_href(block),
+                    enclosure=model.enclosure(block),
                 )
             case model.PlainCode():
                 code = self.highlight(block.language, block.code.text.rstrip("\n"))

@@ -29,7 +29,7 @@ from coursebuild.api import (
     find_blocks,
     urls,
 )
-from coursebuild.core.model import Mjcf, ModelTarget
+from coursebuild.core.model import Mjcf, ModelTarget, Owner
 from coursebuild.core.pages.library import BY_LAB
 from coursebuild.core.pages.marks import escape_marks, link, picture
 from coursebuild.core.pages.renderer import Strings
@@ -347,12 +347,12 @@ def editor_links(library: Library, place: Place, document: Document) -> dict[int
         for block in find_blocks(document, Mjcf)
         if block.error is None and is_editable(block.code.text)
     ]
-    owners = (*library.course.pages, *library.order) if listings else ()
-    for owner in (owner for owner in owners if owner.document is not None):
-        for lab in find_blocks(owner.document, Lab):
-            published = library.trial_value(lab)
-            if lab.kind == MJCF and isinstance(published, PublishedLab):
-                href = place.href(urls.owner_path(owner), published.name)
+    owners: tuple[Owner, ...] = (*library.course.pages, *library.order) if listings else ()
+    for owner in owners:
+        for lab in () if owner.document is None else find_blocks(owner.document, Lab):
+            publication = library.trial_value(lab)
+            if lab.kind == MJCF and isinstance(publication, PublishedLab):
+                href = place.href(urls.owner_path(owner), publication.name)
                 return dict.fromkeys(listings, href)
     return {}
 
