@@ -7,7 +7,8 @@
 3. Each archive of a lesson, and that of the whole course: its scripts, in their order.
 
 The interpreter has the packages of the course and nothing of the course itself; without `--python`,
-`uv run --offline` makes an environment for each file of what it declares.
+`uv run --offline` makes an environment for each file of what it declares, or for an archive of its
+`requirements.txt`.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from coursebuild.core.run import gate
 _PLACE = re.compile(r"\{\{control:(\d+)\}\}")
 _DOWNLOAD = re.compile(r'<a href="([^"]+\.(?:py|zip))" download>')
 _CONFIG = re.compile(r'data-config="([^"]+)"')
+_REQUIREMENTS = "requirements.txt"
 _SECONDS = 900
 
 
@@ -96,15 +98,16 @@ def run(thing: HandedOver, python: str | None) -> list[tuple[str, str]]:
     failures = []
     environment = {**os.environ, "MPLBACKEND": "Agg"}
     environment.pop("PYTHONPATH", None)
+    packages = ["--with-requirements", _REQUIREMENTS] if _REQUIREMENTS in thing.files else []
+    runner = ["uv", "run", "--offline", *packages] if python is None else [python]
     with tempfile.TemporaryDirectory() as folder:
         for path, data in thing.files.items():
             place = Path(folder, path)
             place.parent.mkdir(parents=True, exist_ok=True)
             place.write_bytes(data)
         for entry in thing.entries:
-            command = ["uv", "run", "--offline", entry] if python is None else [python, entry]
             try:
-                done = gate.finish(command, environment, folder=folder, seconds=_SECONDS)
+                done = gate.finish([*runner, entry], environment, folder=folder, seconds=_SECONDS)
             except TimeoutError as error:
                 failures.append((entry, str(error)))
                 continue

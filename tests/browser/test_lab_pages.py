@@ -174,26 +174,18 @@ def test_page_keeps_its_place_while_a_picture_arrives_late(
         expect(quiz).to_be_attached()
 
 
-def test_a_plot_grows_with_the_size_of_texts(browsers: Mapping[str, Browser], base: str) -> None:
+def test_a_plot_grows_with_the_size_of_texts_and_keeps_its_colours_in_high_contrast(
+    browsers: Mapping[str, Browser], base: str
+) -> None:
     larger = "document.documentElement.style.fontSize = '32px'"
-    with browsers["plain"].new_context() as context:
+    with browsers["plain"].new_context(forced_colors="active") as context:
         context.add_init_script(f"addEventListener('DOMContentLoaded', () => {{ {larger} }})")
         page, _ = watch_page(context)
         page.goto(base + PAGE)
         plot = lab(page, SWING, None).locator(".lab-live .lab-plot").first
         expect(plot).to_have_css("height", "340px")
         expect(plot.locator("text").first).to_have_css("font-size", "24px")
-
-
-def test_lines_of_a_plot_keep_their_colours_in_high_contrast(
-    browsers: Mapping[str, Browser], base: str
-) -> None:
-    with browsers["plain"].new_context(forced_colors="active") as context:
-        page, _ = watch_page(context)
-        page.goto(base + PAGE)
-        swing = lab(page, SWING, None)
-        line = swing.locator(".lab-live .lab-plot .lab-trace").first
-        expect(line).to_have_css("stroke", "rgb(0, 114, 178)")
+        expect(plot.locator(".lab-trace").first).to_have_css("stroke", "rgb(0, 114, 178)")
 
 
 # ------------------------------------------------------------------------------- the goal
@@ -264,11 +256,20 @@ def test_run_that_stopped_by_itself_is_gone_through_kept_and_repeated(
     press(swing, "One step")
     expect(clock).to_have_text("1.000 s")
     assert state_of(page, swing) == last
+    plot = swing.locator(".lab-live .lab-plot")
+    value, ghost = plot.locator(".lab-over").last, plot.locator(".lab-ghost")
+    expect(value).to_be_hidden()
+    plot.hover(position={"x": 60, "y": 60})
+    expect(value).to_be_visible()
     bar.fill("0.5")
     expect(clock).to_have_text("0.500 s")
-    plot = swing.locator(".lab-live .lab-plot")
     plot.click(position={"x": 60, "y": 60})
     wait_for_condition(page, lambda: 0 < time_of(swing) < 0.5)
+    with page.expect_download() as download:
+        press(swing, "Curves as CSV")
+    rows = download.value.path().read_text().splitlines()
+    assert rows[:2] == ["time (s),angle: angle (rad)", "0,2.5"]
+    assert float(rows[-1].split(",")[0]) == pytest.approx(1, abs=0.1)
     bar.press("End")
     expect(clock).to_have_text("1.000 s")
     press(swing, "Keep this run")
@@ -278,7 +279,10 @@ def test_run_that_stopped_by_itself_is_gone_through_kept_and_repeated(
     press(swing, "Reset")
     expect(clock).to_have_text("0.000 s")
     expect(bar).to_be_disabled()
-    expect(swing.get_by_role("button", name="Drop the kept run")).to_be_visible()
+    expect(ghost).to_have_attribute("d", re.compile("L"))
+    press(swing, "Drop the kept run")
+    expect(ghost).not_to_have_attribute("d", re.compile("L"))
+    expect(swing.get_by_role("button", name="Keep this run")).to_be_visible()
     assert play_to_the_end() == last
     note_changes(swing)
     press(swing, "Play")  # goes on from there

@@ -51,8 +51,6 @@ class Lesson:
 
     page: Page
     console: list[str]
-    requests: list[str]
-    """Addresses that were asked for before any lab was near."""
 
 
 @pytest.fixture(scope="module")
@@ -60,11 +58,8 @@ def lesson(browsers: Mapping[str, Browser], base: str) -> Iterator[Lesson]:
     size = {"width": 1000, "height": 800}
     with browsers["webgl"].new_context(viewport=size) as context:  # type: ignore[arg-type]
         page, console = watch_page(context)
-        requests: list[str] = []
-        page.on("request", lambda request: requests.append(request.url))
-        page.goto(base + PAGE, wait_until="networkidle")
-        first = list(requests)
-        yield Lesson(page, console, first)
+        page.goto(base + PAGE)
+        yield Lesson(page, console)
 
 
 @pytest.fixture
@@ -109,28 +104,22 @@ def native(course: Site, steps: int, angle: float, gravity: float = -9.8) -> np.
     return np.array([data.time, *data.qpos, *data.qvel])
 
 
-def test_engine_is_fetched_only_when_something_is_asked_of_a_lab(
+def test_engine_is_fetched_once_and_only_when_something_is_asked_of_a_lab(
     browsers: Mapping[str, Browser], base: str
 ) -> None:
+    fetched = "() => performance.getEntriesByType('resource').map(({ name }) => name)"
     with browsers["webgl"].new_context() as context:
         page, _ = watch_page(context)
-        engines: list[str] = []
-        page.on("worker", lambda worker: engines.append(worker.url))
-        page.goto(base + PAGE)
+        page.goto(base + PAGE, wait_until="networkidle")
+        addresses: list[str] = page.evaluate(fetched)
+        assert not [url for url in addresses if "/labs/" in url and not url.endswith(".png")]
         swing = lab(page, SWING, None)
         expect(swing).to_have_attribute("data-state", "asleep")
-        assert engines == []
+        assert page.workers == []
         press(swing, "Play")
         reach(page, SWING, "playing")
-        assert len(engines) == 1
-
-
-def test_engine_is_fetched_once(lesson: Lesson, swing: Locator) -> None:
-    assert not [url for url in lesson.requests if "/labs/" in url and not url.endswith(".png")]
-    entries = "() => performance.getEntriesByType('resource').map(({ name }) => name)"
-    addresses: list[str] = lesson.page.evaluate(entries)
-    (worker,) = lesson.page.workers
-    addresses += worker.evaluate(entries)
+        (worker,) = page.workers
+        addresses = page.evaluate(fetched) + worker.evaluate(fetched)
     names = [re.sub(r"\.[0-9a-f]{8}", "", url.rsplit("/", 1)[1]) for url in addresses]
     assert "lab.js" in names
     assert names.count("mujoco.wasm") == 1
@@ -267,38 +256,6 @@ def test_time_goes_back_and_on_to_the_last_bit(
     expect(swing.locator(".lab-time")).to_have_text(re.compile(r"^0\.500* s$"))
 
 
-def test_pointer_on_a_curve_sets_the_time_and_curves_are_downloaded(
-    lesson: Lesson, swing: Locator
-) -> None:
-    page = lesson.page
-    press(swing, "Play")
-    wait_for_condition(page, lambda: time_of(swing) > 1)
-    press(swing, "Pause")
-    reach(page, SWING, "paused")
-    plot = swing.locator(".lab-live .lab-plot")
-    value = plot.locator(".lab-over").last
-    expect(value).to_be_hidden()
-    plot.hover(position={"x": 60, "y": 60})
-    expect(value).to_be_visible()
-    end = time_of(swing)
-    plot.click(position={"x": 60, "y": 60})
-    wait_for_condition(page, lambda: 0 < time_of(swing) < end)
-    with page.expect_download() as download:
-        press(swing, "Curves as CSV")
-    rows = download.value.path().read_text().splitlines()
-    assert rows[:2] == ["time (s),angle: angle (rad)", "0,2.5"]
-    assert float(rows[-1].split(",")[0]) == pytest.approx(end, abs=0.1)
-    press(swing, "Keep this run")
-    press(swing, "Reset")
-    expect(swing.locator(".lab-time")).to_have_text(re.compile(r"^0\.000* s$"))
-    page.mouse.move(0, 0)
-    ghost = plot.locator(".lab-ghost")
-    expect(ghost).to_have_attribute("d", re.compile("L"))
-    press(swing, "Drop the kept run")
-    expect(ghost).not_to_have_attribute("d", re.compile("L"))
-    expect(swing.get_by_role("button", name="Keep this run")).to_be_visible()
-
-
 def _places(view: Locator) -> tuple[tuple[float, float], ...]:
     """Where the rod's end is drawn, at 2.5 rad from below, where it would hang, and a corner."""
     view.scroll_into_view_if_needed()
@@ -406,15 +363,7 @@ def test_every_kind_of_geom_and_overlay_is_drawn_and_a_large_state_fits_into_a_l
     state = state_of(page, lab_element)
     assert floats(state).size > 500
     expect(lab_element.locator(".lab-message")).not_to_contain_text("controls only")
-    second_page, console = watch_page(page.context)
-    second_page.goto(page.evaluate("() => location.href"))
-    again = lab(second_page, ALL)
-    wait_for_condition(second_page, lambda: time_of(again) > 0)
-    back = state_of(second_page, again)
-    assert (back["n"], back["t"]) == (state["n"], state["t"])
-    assert floats(back).tobytes() == floats(state).tobytes()
-    assert [*lesson.console, *console] == []
-    second_page.close()
+    assert lesson.console == []
 
 
 def test_lab_of_a_kind_of_the_course_runs_two_simulations(lesson: Lesson) -> None:

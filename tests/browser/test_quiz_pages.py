@@ -135,7 +135,14 @@ def test_each_answer_is_told_to_scripts_and_to_another_tab(
 
 def test_quizzes_work_from_a_disk(sites: Mapping[str, Site], calm: BrowserContext) -> None:
     page = calm.new_page()
+    count = "document.documentElement.dataset.live = document.querySelectorAll('.is-live').length"
+    page.add_init_script(f"addEventListener('load', () => {{ {count} }})")
+    requests: list[str] = []
+    page.on("request", lambda request: requests.append(request.url))
     visit(page, (sites["quizzes"].public / PATH).as_uri())
+    # All are alive with the page: else they would push what is below them away from the pointer.
+    expect(page.locator("html")).to_have_attribute("data-live", str(QUESTIONS))
+    assert sum("/quiz." in url for url in requests) == 1
     answer_field(page, NUMBER).fill("0.08")
     press(page, NUMBER)
     expect(verdict(page, NUMBER)).to_contain_text("Right.")
@@ -165,20 +172,6 @@ def test_on_paper_questions_and_answers_are_there_and_no_buttons(page: Page) -> 
     # What paper shows is no hint that was taken.
     expect(hints.first).not_to_have_attribute("open", "")
     expect(hints.nth(1)).to_be_hidden()
-
-
-def test_quizzes_are_alive_when_their_page_is_loaded(
-    sites: Mapping[str, Site], calm: BrowserContext
-) -> None:
-    """Else they would push what is below them away from the pointer of who goes to press it."""
-    page = calm.new_page()
-    count = "document.documentElement.dataset.live = document.querySelectorAll('.is-live').length"
-    page.add_init_script(f"addEventListener('load', () => {{ {count} }})")
-    requests: list[str] = []
-    page.on("request", lambda request: requests.append(request.url))
-    page.goto((sites["quizzes"].public / PATH).as_uri())
-    expect(page.locator("html")).to_have_attribute("data-live", str(QUESTIONS))
-    assert sum("/quiz." in url for url in requests) == 1
 
 
 # ------------------------------------------------------------------------------ the preview

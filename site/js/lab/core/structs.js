@@ -116,42 +116,36 @@ export class ModelWords {
     const [first, length] = [words[end >> 2], model.nbuffer]
     const { byteOffset: inside } = model.body_mass
     if (start >= end || inside < first || inside >= first + length) throw new EngineError(WRONG, true)
-    this.parts = [[start >> 2, (end - start) >> 2], [first >> 2, length >> 2]]
+    this.parts = [[start, end], [first, first + length]].map((part) => part.map((at) => at >> 2)) // words
     this.begin()
   }
 
-  views() {
-    const buffer = memory(this.data)
-    return this.parts.map(([at, length]) => new Int32Array(buffer, 4 * at, length))
+  words() {
+    return new Int32Array(memory(this.data))
   }
 
   /** Compare with the model as it is now from here on. */
   begin() {
-    this.bases = this.views().map((view) => view.slice())
+    const words = this.words()
+    this.bases = this.parts.map(([start, end]) => words.slice(start, end))
   }
 
   /** The words that have changed since `begin`: the place of each, then the word. */
   read() {
+    const words = this.words()
     const changed = []
-    let offset = 0
-    this.views().forEach((view, part) => {
+    this.parts.forEach(([start, end], part) => {
       const base = this.bases[part]
-      for (let i = 0; i < base.length; i++) if (view[i] !== base[i]) changed.push(offset + i, view[i])
-      offset += base.length
+      for (let i = start; i < end; i++) if (words[i] !== base[i - start]) changed.push(i, words[i])
     })
     return Int32Array.from(changed)
   }
 
   /** Go to the model of which `read` said what has changed. @param {Int32Array} changed */
   write(changed) {
-    const [options, arrays] = this.views()
-    options.set(this.bases[0])
-    arrays.set(this.bases[1])
-    for (let i = 0; i < changed.length; i += 2) {
-      const place = changed[i]
-      if (place < options.length) options[place] = changed[i + 1]
-      else arrays[place - options.length] = changed[i + 1]
-    }
+    const words = this.words()
+    this.parts.forEach(([start], part) => words.set(this.bases[part], start))
+    for (let i = 0; i < changed.length; i += 2) words[changed[i]] = changed[i + 1]
   }
 }
 

@@ -169,8 +169,7 @@ export class Tape {
     const state = states.findLast((item) => item.time <= time + TOLERANCE * lab.option.timestep) ?? states[0]
     if (state === undefined) return
     this.restore(state)
-    const { timestep } = lab.option // which controls may have changed
-    this.repeat(state, state.step + Math.floor((time - state.time) / timestep + TOLERANCE))
+    this.repeat(state, state.step + Math.floor((time - state.time) / lab.option.timestep + TOLERANCE))
   }
 
   go(step) {
@@ -181,7 +180,7 @@ export class Tape {
   }
 
   restore({ before, numbers, model, ctx, values, random, seen, step }) {
-    const { lab, end } = this
+    const { lab } = this
     const { mj } = lab.engine
     lab.queue = []
     lab.drag.release()
@@ -198,9 +197,7 @@ export class Tape {
     lab.draw.write(random)
     lab.sampler.write(seen)
     lab.steps = step
-    lab.log = end.log
     this.contacts = -1
-    lab.arrive()
   }
 
   /** Repeat the steps from a state up to another step, unless the hand that pulled then is missing. */
