@@ -275,7 +275,7 @@ def path_mistake(path: str, *, is_python: bool = True) -> str:
         return f"`{path}` would be imported by Python scripts beside it"
     is_portable = stem and not _UNPORTABLE.search(path) and all(map(_PORTABLE.fullmatch, parts))
     if not is_portable or max(len(part.encode()) for part in parts) > 255:
-        return f"`{path}` has a part that not every file system and shell takes"
+        return f"`{path}` has a part that is no file name on every system"
     if is_python and stem in _UNUSABLE_NAMES:
         return f"`{path}` would be imported in place of the module `{stem}` by its neighbours"
     return ""
