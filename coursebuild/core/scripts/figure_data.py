@@ -211,8 +211,7 @@ def _part_difference(old: DrawnPart, new: DrawnPart, axes: Axes) -> str:
     if old.shape != new.shape:
         sizes = ["×".join(map(str, part.shape)) for part in (new, old)]
         return "has {} values where {} are recorded".format(*sizes)
-    is_alike = (old.style, old.sizes) == (new.style, new.sizes)
-    return _value_difference(old, new) or ("" if is_alike else "has another style")
+    return _value_difference(old, new) or _style_difference(old, new)
 
 
 def _value_difference(old: DrawnPart, new: DrawnPart) -> str:
@@ -230,6 +229,17 @@ def _value_difference(old: DrawnPart, new: DrawnPart) -> str:
             place = f"row {row + 1}, column {rest // math.prod(old.shape[2:]) + 1}"
         suffix = f", and {len(different) - 1} more differ" if len(different) > 1 else ""
         return f"has the value {now:.4g} at {place} where {before:.4g} is recorded{suffix}"
+    return ""
+
+
+def _style_difference(old: DrawnPart, new: DrawnPart) -> str:
+    for name, before in old.style.items():
+        now = new.style.get(name, "")
+        if before != now:
+            words = [", ".join(v[:5]) if isinstance(v, list) else v for v in (now, before)]
+            return f"has the {name} {words[0]} where {words[1]} is recorded"
+    if old.sizes != new.sizes:
+        return "has markers of other sizes"
     return ""
 
 

@@ -51,7 +51,7 @@ def differentiate(expression: Expression, name: str) -> Expression:
         )
     if kind == "derivative":
         return differentiate(differentiate(parts[0], parts[1].text), name)
-    if kind == "integral":
+    if kind == "integral" and len(parts) == 4:
         return _differentiate_integral(expression, name)
     if kind == "sum" and not any(name in limit.names() for limit in parts[2:]):
         return replace(expression, parts=(differentiate(parts[0], name), *parts[1:]))

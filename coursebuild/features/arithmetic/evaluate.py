@@ -378,6 +378,8 @@ class _Evaluator:
 
     def _evaluate_integral(self, expression: Expression) -> PhysicalQuantity:
         body, variable, *ends = expression.parts
+        if not ends:
+            raise expression.not_understood("it is not a number")
         point = self.evaluate(variable)
         limits = [self.evaluate(end).value for end in ends]
         inside = limits[0] + (limits[1] - limits[0]) * Real.of("0.382")

@@ -31,7 +31,7 @@ class Expression(Struct, frozen=True):
     """An operation on expressions, or a number, symbol or unit.
 
     `kind` is `number`, `symbol`, `unit`, one of `+ - * / ^`, `abs`, `derivative` (parts: function,
-    variable), `integral` (parts: function, variable, first, last), `sum` or
+    variable), `integral` (parts: function, variable, and the limits if there are any), `sum` or
     `prod` (parts: term, index, first, last), `index`, `factorial`, `binom`, or the name of a
     function, as `sin`.
     """
@@ -71,7 +71,7 @@ class Expression(Struct, frozen=True):
         """The names of the symbols on which its value depends."""
         if self.kind == "symbol":
             return {self.text}
-        if self.kind == "integral":
+        if self.kind == "integral" and len(self.parts) == 4:
             integrand, variable, first, last = self.parts
             return (integrand.names() - {variable.text}) | first.names() | last.names()
         return set().union(*(part.names() for part in self.parts))

@@ -5,7 +5,8 @@ Entry points: `read_domain(text)`, of `x > 0, 0 \le y < 1`; `check_identity(tex,
 Both sides are computed at the same points, with dimensions: whole numbers, tiny and large ones, of
 both signs where the domain has them. Points where a side is no real number do not count. If the
 balls of both sides have no number in common, the identity is refuted, and the point is told. If
-they agree at all points, it was tried, and not proven.
+they agree at all points, it was tried, and not proven. Where one side is an integral without
+limits, its integrand is compared with the derivative of the other side.
 """
 
 from __future__ import annotations
@@ -130,6 +131,8 @@ def _try_identity(
     Raises:
         NotUnderstood: they differ, or there are too few points where they can be compared.
     """
+    left, right = _without_integral(left, right)
+    right, left = _without_integral(right, left)
     parts = [*left.walk(), *right.walk()]
     for condition in domain.conditions():
         parts += [*condition[0].walk(), *condition[2].walk()]
@@ -216,3 +219,12 @@ _SIZES = (
     lambda generator: Fraction(generator.randint(10, 99) * 10 ** generator.randint(1, 5), 7),
 )
 """Numbers of the size of one, whole ones, tiny ones and large ones."""
+
+
+def _without_integral(side: Expression, opposite: Expression) -> tuple[Expression, Expression]:
+    """Differentiate both sides, if the first is an integral without limits."""
+    if side.kind != "integral" or len(side.parts) > 2:
+        return side, opposite
+    integrand, variable = side.parts
+    derivative = Expression("derivative", opposite.start, opposite.end, (opposite, variable))
+    return integrand, derivative

@@ -380,12 +380,12 @@ class _Reader:
             raise self.not_understood("the differential stands before what is integrated")
         integrand = self.sum()
         differential = self.match(_DIFFERENTIAL)
-        if differential is None or len(limits) < 2:
+        if differential is None or len(limits) == 1:
             raise self.not_understood("the integral has no differential, or no limits")
         self.at = differential.end()
         symbol = self.symbol()
-        parts = (integrand, symbol, limits["_"], limits["^"])
-        return Expression("integral", start, self.at, parts)
+        ends = (limits["_"], limits["^"]) if limits else ()
+        return Expression("integral", start, self.at, (integrand, symbol, *ends))
 
     def series(self, name: str, start: int) -> Expression:
         """Parse a sum or a product of a product's terms, from one whole number to another."""
