@@ -16,7 +16,8 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from fractions import Fraction
 
 from msgspec.structs import replace
 
@@ -39,6 +40,7 @@ from coursebuild.features.arithmetic.expressions import (
     Expression,
     NotUnderstood,
 )
+from coursebuild.features.arithmetic.real import Real
 from coursebuild.features.arithmetic.statements import (
     FormulaSide,
     Statement,
@@ -58,16 +60,23 @@ from coursebuild.features.arithmetic.symbol_comparison import (
 
 @functools.lru_cache(maxsize=1024)
 def check_arithmetic(
-    tex: str, symbols: tuple[SymbolQuantity, ...] = (), unit: str = "", comma: bool = False
+    tex: str,
+    symbols: tuple[SymbolQuantity, ...] = (),
+    unit: str = "",
+    comma: bool = False,
+    has_word: bool = False,
 ) -> tuple[FormulaComparison, ...]:
     """Compare the numbers, and the symbols, between which a formula states a relation.
 
-    `unit`: what follows the formula in the text; `comma`: it may stand before decimals.
+    `unit`: that which follows the formula in the text; `comma`: it may stand before decimals;
+    `has_word`: a word follows that is no unit.
     """
     if not (symbols or re.search(r"\d", tex)):
         return ()
     comparisons = _check_statements(tex, symbols, unit, comma)
     is_wrong = any(comparison.kind == "wrong" for comparison in comparisons)
+    if is_wrong and (unit or has_word) and _counts_what_follows(read_statements(tex, comma), unit):
+        return (FormulaComparison("unread", 0, len(tex), "what follows may belong to its number"),)
     if is_wrong and comma and (reason := second_reading(tex)):
         return (FormulaComparison("unread", 0, len(tex), reason),)
     if is_wrong and not comma and point_decimals(tex, comma=True) != point_decimals(tex):
@@ -148,6 +157,30 @@ def _check_chain(
         yield mistake or FormulaComparison("holds", left.start, right.end, sign=sign)
 
 
+def _counts_what_follows(statements: Sequence[Statement], unit: str) -> bool:
+    """Whether the last number is right if what follows multiplies it: `8^8 ≈ 17` million, `25` %.
+
+    A word may be one of a number, which are powers of ten from a hundred on.
+    """
+    sides = statements[-1].sides[-2:]
+    if len(sides) < 2 or not all(side.is_numeric for side in sides):
+        return False
+    factors = [found.size for found in find_units(unit)] if unit else _NUMBER_WORDS
+    try:
+        left, right = (side.get_expression() for side in sides)
+        numeral = read_numeral(right)
+        if numeral is None or (left.has("unit") and not unit):
+            return False
+        value, of_decimals = evaluate(left).value, left.has_decimals()
+    except NotUnderstood:
+        return False
+    relation = statements[-1].relations[-1]
+    return any(
+        agrees(numeral, value / Real.of(factor), relation, of_decimals=of_decimals)
+        for factor in factors
+    )
+
+
 def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
     r"""Return how a wrong relation may be meant; empty where numbers are what they say.
 
@@ -197,6 +230,7 @@ def _is_of_numbers(side: FormulaSide, symbols: Mapping[str, SymbolQuantity]) -> 
     return not (side.expression.names() & symbols.keys())
 
 
+_NUMBER_WORDS = [Fraction(10) ** power for power in range(2, 19)]
 _OF_ONE_NUMBER = {"deg"} | {symbol for symbol, row in UNITS.items() if row.base == "1"}
 """Units that are part of their number, as % is: no other side leaves them out."""
 

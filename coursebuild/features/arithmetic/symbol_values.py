@@ -25,6 +25,7 @@ from msgspec.structs import replace
 from coursebuild.api import Diagnostic, Note, Span, diagnose, model
 from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.quantities import unit_behind
+from coursebuild.core.text.regex import regex
 from coursebuild.core.text.units import Unit, find_unit
 from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (
@@ -41,6 +42,7 @@ from coursebuild.features.arithmetic.statements import read_statements
 from coursebuild.features.arithmetic.symbol_comparison import SymbolQuantity
 
 _NUMBER = Unit(Fraction(1))
+_WORD_BEHIND = regex(r"\s*[^\W\d_]")
 _Formula = model.Math | model.MathBlock
 _Level = tuple[int, ...]
 """The number of a section, then the offsets of the callouts and questions inside it."""
@@ -53,6 +55,8 @@ class _Place(Struct, frozen=True):
     level: _Level
     unit: str
     """The unit in the text right after it."""
+    has_word: bool
+    """Whether a word stands there."""
     comma: bool
     """Whether it may stand before decimals."""
 
@@ -124,7 +128,7 @@ def _compare_all(
             continue
         tex, quantities = formula.tex, (*letters, *levels[place.level])
         comparisons[tex.span().start] = check_arithmetic(
-            tex.text, quantities, place.unit, place.comma
+            tex.text, quantities, place.unit, place.comma, place.has_word
         )
     return comparisons
 
@@ -256,4 +260,6 @@ def _read_places(document: model.Document) -> Iterator[_Place]:
         start = formula.tex.span().start
         level = bisect_right(headings, start), *(s for s, end in parts if s <= start < end)
         text = texts.get(formula.span.end, "") if isinstance(formula, model.Math) else ""
-        yield _Place(formula, level, unit_behind(text).text if text else "", document.comma)
+        unit = unit_behind(text).text if text else ""
+        has_word = _WORD_BEHIND.match(text) is not None
+        yield _Place(formula, level, unit, has_word, document.comma)
