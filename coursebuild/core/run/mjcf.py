@@ -212,6 +212,7 @@ def existing_files(root: Path, path: str, text: str) -> tuple[str, ...]:
 
 
 _LINE = re.compile(r"\bline (\d+)|Line number=(\d+)", re.IGNORECASE)
+_QUOTED = re.compile(r"'([^'\s]+)'")
 _ELEMENT_AND_LINE = re.compile(r"Element name '([^']*)', id -?\d+, line \d+$")
 
 
@@ -220,19 +221,24 @@ def error_line(message: str, text: str) -> int | None:
 
     MuJoCo gives line 0 for what comes from an included file, and no hint for what comes from an
     attached model: there the line counts only if the name of the element stands on it or below it.
+    Without a line, it is that of the element with a name that the message quotes, if only one has
+    that name.
     """
     numbers = [int(a or b) for a, b in _LINE.findall(message)]
     lines = text.splitlines()
     # A message about an inner file is quoted before the place of the element that pulls it in.
-    if not numbers or not 1 <= numbers[-1] <= max(len(lines), 1):
-        return None
-    line = numbers[-1]
-    match = _ELEMENT_AND_LINE.search(message)
-    if match and "<attach" in text:
-        name = match.group(1)
-        if not name or name not in "\n".join(lines[line - 1 : line + 3]):
-            return None
-    return line
+    if numbers and 1 <= numbers[-1] <= max(len(lines), 1):
+        line = numbers[-1]
+        match = _ELEMENT_AND_LINE.search(message)
+        name = match.group(1) if match and "<attach" in text else None
+        if name is None or (name and name in "\n".join(lines[line - 1 : line + 3])):
+            return line
+    values = [(v, tag.line) for tag in read_tags(text) for _, v, _ in tag.attributes]
+    for name in _QUOTED.findall(message):  # of a file perhaps with the folder of its kind
+        places = [n for v, n in values for w in v.split() if f"/{name}".endswith(f"/{w}")]
+        if len(places) == 1:
+            return places[0]
+    return None
 
 
 # --- names in MJCF

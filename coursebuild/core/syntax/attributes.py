@@ -38,7 +38,7 @@ LABEL = regex(r"[ \t]*(\{#[^{}$\n]{0,200}\}?)")
 missing."""
 _GIVEN = regex(r'(?:^|(?<=\s))\{given="([^{}"]*\S[^{}"]*)"\}$')
 _LAST_LABEL = regex(r"(?:^|(?<=\s))\{#[^{}$\n]{0,200}\}?$")
-_PAIR = regex(r"""\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|([^\s"{}“”„‟‘’‚‛«»'`]+)))?(?=\s|$)""")
+_PAIR = regex(r"""\s*([^\s={}"]+)(?:=(?:"([^"{}]*)"|((?![“”„‟‘’‚‛«»'`])[^\s"{}]+)))?(?=\s|$)""")
 _SPACES = regex(r"\s+")
 _NUMBER = regex(r"[-−]?(?:\d+(?:\.\d+)?|\.\d+)(?:[eE][-+]?\d{1,3})?")
 _RESULT = regex(rf"(?s:.*)(?:[=≈]|\\approx)\s*({_NUMBER.pattern})(?!\{{?[,\d])((?s:.*))\Z")
@@ -196,9 +196,9 @@ _HELPS = {
 
 def check_unread_attributes(content: Excerpt, start: int, text: str) -> Iterator[Diagnostic]:
     """Report the attributes that begin in a text of a block's content: what is read is no text."""
-    for match in _UNREAD.finditer(content.text, start) if "{" in text else ():
-        if match.start() >= start + len(text):
-            break
+    whole, end = content.text, start + len(text)
+    braces = re.finditer(r"\{", whole[start:end])
+    for match in filter(None, (_UNREAD.match(whole, start + b.start()) for b in braces)):
         kind = match.lastgroup or ""
         message, help = f"`{collapse_spaces(match[0])}` cannot be read", _HELPS[kind]
         if re.fullmatch(r'\{given(?:="\s*")?\}', match[0]):

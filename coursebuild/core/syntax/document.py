@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator
 
@@ -226,7 +227,9 @@ def find_conflict(source: Source) -> Diagnostic | None:
         for match in _CONFLICT_MARK.finditer(text)
         if not any(start <= match.start() < end for start, end in examples)
     ]
-    if not any(mark.text[0] in "<>" for mark in marks):
+    # A line of `=` above the first one of the others is that of a heading.
+    marks = [*itertools.dropwhile(lambda mark: mark.text[0] not in "<>", marks)]
+    if not marks:
         return None
     lines = ", ".join(str(mark.line) for mark in marks)
     message = f"a merge conflict was left here: its marks are in lines {lines}"

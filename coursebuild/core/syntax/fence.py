@@ -29,7 +29,7 @@ from coursebuild.core.text.diagnostics import (
 from coursebuild.core.text.regex import regex
 from coursebuild.core.text.source import Excerpt, Span
 
-_WORD = regex(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|([^\s"“”„‟‘’‚‛«»'`]*)))?""")
+_WORD = regex(r"""([^\s="]*)(?:(=)(?:"((?:\\["\\]|[^"])*)"|((?![“”„‟‘’‚‛«»'`])[^\s"]*)))?""")
 _KIND = regex(r"\s*(\S*)")
 _NOT_SPACE = regex(r"\S")
 _REST = regex(r"\S*")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import binascii
 import contextlib
 import posixpath
 import re
@@ -225,7 +224,7 @@ class LessonContext(Struct, frozen=True, kw_only=True):
     def resolve_picture(self, source: str) -> str:
         """Return the new address of a picture or file; empty where none here has it."""
         if data := _DATA.fullmatch(source):
-            with contextlib.suppress(binascii.Error):
+            with contextlib.suppress(ValueError):
                 name = f"{stem_of(self.path)}/{fingerprint(source)[:8]}.{data['kind']}"
                 return self._add_copy(name, b64decode(data["text"]))
         path = self.resolve_path(urlsplit(source).path)

@@ -15,7 +15,7 @@ from coursebuild.features.importer.source_files import find_group, value_at
 
 WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
 """Words in a formula that hold a formula themselves."""
-_CODE = r"(?P<ticks>`+)(?!`)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
+_CODE = r"(?<!(?<!\\)`)(?P<ticks>`++)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
 _PRICE = r"(?<!\$)\$(?=(?:[^$\\\n]|\\.|\$(?!\$))+\$\$)"
 """A dollar sign in a displayed formula, which ends in its line; MathJax shows it as it stands."""
 _DISPLAY = regex(

@@ -16,7 +16,7 @@ _DIRECTIVE = regex(
 )
 """A directive, a label, or a comment."""
 _INLINE = regex(
-    r"(?P<code>``.+?``)|:(?P<role>[A-Za-z][\w:+.-]*):`(?P<body>[^`]+)`"
+    r"(?P<code>``.+?``)|(?<![\w:]):(?P<role>[A-Za-z][\w:+.-]*):`(?P<body>[^`]+)`"
     r"|`(?P<words>[^`<>]*\S)\s*<(?P<address>[^`<>]+)>`__?"
 )
 _TERM = regex(r"^(?![-*+|#]|\d+[.)])(\S.*\n)[ ]+(?=\S)(.*(?:\n[ ]+\S.*)*)", re.MULTILINE)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import binascii
 import contextlib
 import json
 import re
@@ -425,7 +424,7 @@ def _recorded_picture(outputs: Iterable[Mapping[str, Any]]) -> tuple[str, bytes]
     data = {kind: text for output in outputs for kind, text in (output.get("data") or {}).items()}
     if not outputs or "application/javascript" in data:
         return None
-    with contextlib.suppress(binascii.Error, KeyError):
+    with contextlib.suppress(ValueError, KeyError):
         return ".png", base64.b64decode(join_lines(data["image/png"]))
     return ".svg", join_lines(data.get("image/svg+xml") or "").encode()
 

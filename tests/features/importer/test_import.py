@@ -236,6 +236,7 @@ def test_single_file_is_imported_with_what_it_names(
     (tmp_path / "linked.ipynb").symlink_to("beats.ipynb")
     text = (
         "# Beats\n\n![x](img/x.png) ![o](img/out.png) [e](.env) ![a](attachment:../../../../a.png)"
+        " ![b](data:image/png;base64,é)"
     )
     attachments = {"../../../../a.png": {"image/png": "iVBORw0KGgo="}}
     cell = {"cell_type": "markdown", "source": text, "attachments": attachments}
