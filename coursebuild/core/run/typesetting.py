@@ -81,9 +81,9 @@ class MathEngine:
             if new and self._has_v8 and self._length >= _MANY:
                 results |= self._typeset_in_v8(new)
             self._length += sum(len(formula.tex) for formula in new)
-            left = [formula for formula in new if formula not in results]
-            for start in range(0, len(left), _BATCH):
-                batch = left[start : start + _BATCH]
+            remaining_formulas = [formula for formula in new if formula not in results]
+            for start in range(0, len(remaining_formulas), _BATCH):
+                batch = remaining_formulas[start : start + _BATCH]
                 results.update(zip(batch, self._batch(batch), strict=True))
             if len(self._mathml) > _MOST_REMEMBERED:
                 self._mathml.clear()
