@@ -183,6 +183,7 @@ _PLACE = regex(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 _SCALAR = regex(r"[^\n,\]}#]*")
 _WORD = regex(r"[\w.+-]+|\S")
 _CURLY_QUOTES = tuple("“”„‟‘’‚‛«»")
+_TRIPLES = ('"""', "'''")
 _REPEATED = "this is given twice"
 _QUOTES_HELP = "TOML knows only the straight quotes `\"` and `'`"
 _WORDS_HELP = "the only words without quotes are `true` and `false`"
@@ -214,6 +215,9 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
         line = text[start:].split("\n", 1)[0]
         help = "if there are several, each header has two brackets, as in `[[level]]`"
         return start, start + len(line), _REPEATED, help if line.startswith("[") else ""
+    if words.startswith(("Unterminated", 'Expected "')):
+        opening = max(map(text.rfind, _TRIPLES))
+        return opening, opening + 3, f"`{text[opening : opening + 3]}` is never closed", ""
     if words.startswith("Illegal") and char == "\n":
         help = "text of several lines stands between three quotes"
         return at, at, "the string is not closed on its line", help

@@ -22,10 +22,9 @@ from fractions import Fraction
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import Diagnostic, Note, Span, diagnose, model
+from coursebuild.api import Diagnostic, Note, Span, diagnose, model, regex
 from coursebuild.core.registry import kind_of_block
 from coursebuild.core.text.quantities import unit_behind
-from coursebuild.core.text.regex import regex
 from coursebuild.core.text.units import Unit, find_unit
 from coursebuild.features.arithmetic.chains import check_arithmetic
 from coursebuild.features.arithmetic.evaluate import (
