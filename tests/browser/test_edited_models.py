@@ -286,7 +286,7 @@ def test_listing_opens_in_the_editor_of_the_course(page: Page, base: str) -> Non
     second_page = page.context.new_page()
     second_page.goto(base + PAGE)
     listing = second_page.locator(".mjcf")
-    part = listing.locator("code").inner_text().strip()
+    part = (listing.locator("code").text_content() or "").strip()
     press(listing, "Open in the editor")
     text = editor_of(second_page)[1]
     expect(text).to_have_value(f"<mujoco><worldbody>\n{part}\n</worldbody></mujoco>")

@@ -87,5 +87,17 @@ def _check_core_rules(
 
 def _check_features(course: Course, documents: Collection[Document]) -> Iterator[Diagnostic]:
     for feature in features():
-        if feature.check is not None:
+        if feature.check is None:
+            continue
+        try:
             yield from feature.check(course, documents)
+        except Exception as error:
+            note = "it fails for no text alone"
+            for document in documents:
+                try:
+                    tuple(feature.check(course, (document,)))
+                except Exception:
+                    note = f"it fails for {document.source.path}"
+                    break
+            error.add_note(note)
+            raise

@@ -165,7 +165,7 @@ def _counts_what_follows(statements: Sequence[Statement], unit: str) -> bool:
     sides = statements[-1].sides[-2:]
     if len(sides) < 2 or not all(side.is_numeric for side in sides):
         return False
-    factors = [found.size for found in find_units(unit)] if unit else _NUMBER_WORDS
+    factors = [reading.size for reading in find_units(unit)] if unit else _NUMBER_WORDS
     try:
         left, right = (side.get_expression() for side in sides)
         numeral = read_numeral(right)
