@@ -215,8 +215,9 @@ def _describe_mistake(text: str, message: str) -> _Mistake:
         line = text[start:].split("\n", 1)[0]
         help = "if there are several, each header has two brackets, as in `[[level]]`"
         return start, start + len(line), _REPEATED, help if line.startswith("[") else ""
-    if words.startswith(("Unterminated", 'Expected "')):
-        opening = max(map(text.rfind, _TRIPLES))
+    openings = [text.rfind(quotes) for quotes in _TRIPLES if text.count(quotes) % 2]
+    if openings and words.startswith(("Unterminated", 'Expected "')):
+        opening = max(openings)
         return opening, opening + 3, f"`{text[opening : opening + 3]}` is never closed", ""
     if words.startswith("Illegal") and char == "\n":
         help = "text of several lines stands between three quotes"
