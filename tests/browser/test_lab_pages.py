@@ -395,3 +395,23 @@ def test_what_is_pointed_at_below_a_lab_keeps_its_place_when_the_lab_arrives(
     expect(swing.locator(".lab-play")).to_be_attached()
     wait_for_condition(page, lambda: swing.evaluate("(lab) => lab.offsetHeight") > height + 50)
     wait_for_condition(page, lambda: abs(below.evaluate(place) - top) < 1)
+
+
+def test_lab_of_a_home_page_is_as_high_before_it_starts_as_after(
+    calm: BrowserContext, sites: Mapping[str, Site]
+) -> None:
+    page, _ = watch_page(calm)
+    late: list[Route] = []
+    page.route(re.compile(r"/labs/lab\.[0-9a-f]+\.js$"), lambda route: late.append(route))
+    height = "(lab) => lab.offsetHeight"
+    for width, tall in ((1440, 900), (1440, 1600), (1024, 1366)):
+        late.clear()
+        page.set_viewport_size({"width": width, "height": tall})
+        page.goto(sites["real"].url(), wait_until="load")
+        wait_for_condition(page, lambda: late != [])
+        opening = page.locator(".opening .lab")
+        before = opening.evaluate(height)
+        for route in late:
+            route.continue_()
+        expect(opening.locator(".lab-play:visible")).to_be_attached()
+        assert opening.evaluate(height) == before, (width, tall)
