@@ -21,7 +21,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import Span, model, regex
-from coursebuild.core.text.python_code import python_nodes
+from coursebuild.core.text.python_code import bound_name, python_nodes
 
 Kind: TypeAlias = Literal[
     "word",
@@ -60,7 +60,6 @@ _CODE = (model.Script | model.ScriptPart | model.PlainCode | model.CodeBlock) | 
 )
 _CALLED = regex(r"([A-Za-z_]\w*)\(.*\)")
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
-_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 
 class Claim(Struct, frozen=True, array_like=True):
@@ -170,16 +169,10 @@ def _read_script(script: model.Script, names: CodeNames) -> None:
                 names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
     structures: dict[int, str] = {}
     for node in nodes:
-        definition = ""
         if type(node) is ast.Assign and len(node.targets) == 1:
             structures[id(node.targets[0])] = _find_structure(node.value, names.imports)
-        elif type(node) is ast.arg:
-            definition = node.arg
-        elif isinstance(node, _DEFINITIONS):
-            definition = node.name
-        elif type(node) is ast.Name and type(node.ctx) is ast.Store:
-            definition = node.id
-        if definition:
+        definition = None if isinstance(node, ast.alias) else bound_name(node)
+        if definition is not None:
             line = getattr(node, "lineno", 1)
             names.definitions.setdefault(definition, (script.path, line))
     for node in nodes:
