@@ -88,25 +88,6 @@ class EngineNames(Struct, frozen=True, dict=True):
         places = (attributes for e in self.elements.values() for attributes in e.values())
         return frozenset(attribute for attributes in places for attribute in attributes)
 
-    @functools.cached_property
-    def words(self) -> frozenset[str]:
-        """Every single name, and every parameter of a function."""
-        signatures = (function.text for function in self.functions.values())
-        parameters = {part for text in signatures for part in text.replace("(", " ").split()}
-        return frozenset(
-            (
-                *self.functions,
-                *self.constants,
-                *self.enums,
-                *self.enum_of,
-                *self.classes,
-                *self.classes_of,
-                *self.elements,
-                *self.attributes,
-                *(part.strip(":,()") for part in parameters if part.isascii()),
-            )
-        )
-
 
 class EngineTable(Struct, frozen=True, dict=True):
     """The names as they are kept: decoded when the first one is looked up."""
