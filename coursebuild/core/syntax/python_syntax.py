@@ -82,8 +82,10 @@ def find_undefined_names(code: Excerpt) -> Iterator[Span]:
             names.add(node.id)
             row = rows[min(node.lineno, len(rows)) - 1]
             data = row.text.encode()  # in which Python counts
-            start, end = (len(data[:n].decode()) for n in (node.col_offset, node.end_col_offset))
-            yield row.span(start, end)
+            start = len(data[: node.col_offset].decode(errors="replace"))
+            end = start + len(node.id)
+            if row.text[start:end] == node.id:  # not so behind a CR alone, which ends a line, too
+                yield row.span(start, end)
 
 
 def check_syntax(code: Excerpt) -> Iterator[Diagnostic]:

@@ -15,8 +15,6 @@ from coursebuild import MANUAL
 from coursebuild.api import Course, did_you_mean, document_scripts, regex
 from coursebuild.core.model import Script
 from coursebuild.core.model.addresses import line_anchor
-from coursebuild.core.text.diagnostics import propose
-from coursebuild.core.text.near import nearest
 from coursebuild.features.names import known_names
 from coursebuild.features.names.claims import ENGINE_WORD, Claim, DocumentNames, course_names
 from coursebuild.features.names.known_names import (
@@ -30,6 +28,7 @@ from coursebuild.features.names.known_names import (
     class_href,
     element_href,
     find_engine_name,
+    unknown,
 )
 
 _MANUAL_ID = "coursebuild-manual"
@@ -114,8 +113,8 @@ class Resolver:
             return None
         if name in engine.declared or name in engine.functions:
             return None
-        help = did_you_mean(name, (*engine.functions, *engine.declared))
-        return Unknown(f"MuJoCo {engine.version} has no function `{name}`", help, name)
+        lead = f"MuJoCo {engine.version} has no function"
+        return unknown(lead, name, (*engine.functions, *engine.declared))
 
     def _path(self, parts: list[str], names: DocumentNames) -> Answer:
         engine, root = self.engine, _BRACKETS.sub("", parts[0])
@@ -156,8 +155,8 @@ class Resolver:
                 break
             member = members.get(name)
             if member is None:
-                message = f"`{class_name}` of MuJoCo {self.engine.version} has no `{name}`"
-                return Unknown(message, did_you_mean(name, members), name)
+                lead = f"`{class_name}` of MuJoCo {self.engine.version} has no"
+                return unknown(lead, name, members)
             class_name = member.type
             if class_name.endswith("List"):
                 class_name = ITEM_CLASSES.get(class_name, "") if "[]" in part else ""
@@ -172,11 +171,7 @@ class Resolver:
         if script is None:
             return None
         words = frozenset(re.findall(r"\w+", script.code.text))
-        if name in words:
-            return KnownName()
-        likely = nearest(name, words)
-        help = propose(name, likely) if likely else ""
-        return Unknown(f"`{path}` has no `{name}`", help, name)
+        return KnownName() if name in words else unknown(f"`{path}` has no", name, words)
 
     # --- MJCF
 
@@ -197,8 +192,8 @@ class Resolver:
         if not attribute or attribute in names:
             text = attribute or f"<{element}>"
             return KnownName(element_href(engine, element, attribute), text, engine=True)
-        message = f"`<{element}>` of MuJoCo {engine.version} has no attribute `{attribute}`"
-        return Unknown(message, did_you_mean(attribute, names), attribute)
+        lead = f"`<{element}>` of MuJoCo {engine.version} has no attribute"
+        return unknown(lead, attribute, names)
 
     # --- the manual
 
