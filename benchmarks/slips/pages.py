@@ -19,6 +19,8 @@ _PUNCTUATION = set(".,;:!?'\"()-/‘’“”–—…")
 _CODE = {"code", "pre", "math", "script", "style", "kbd", "samp"}
 _SAID = ("alt", "title", "aria-label", "content", "placeholder")
 """Attributes that hold prose."""
+_ZERO = re.compile(r"(?<![\d.])0+(?=\.\d)")
+"""Before a decimal point, where `0.5` and `.5` are one number."""
 _KEY = re.compile("[0-9a-f]{8}")
 """What the tool made of words: a hash, which may be a number."""
 _HASH = re.compile(r"\.[0-9a-f]{8}(?=\.\w+$)")
@@ -66,6 +68,7 @@ class _Reader(HTMLParser):
             self._open.pop()
 
     def handle_data(self, data: str) -> None:
+        data = _ZERO.sub("", data)
         if self._in_code() and "comment" not in self._open:
             self.tokens += (("code", word) for word in data.split())
         else:

@@ -325,7 +325,14 @@ def without_prose(document: Document) -> Document:
                 pass
     if is_blank(blocks) and not is_blank(document_blocks(document)):
         blocks.append(ThematicBreak(document.blocks[0].span))
-    return Document(document.source, tuple(blocks), (), document.title_anchor, document.unclaimed)
+    return Document(
+        document.source,
+        tuple(blocks),
+        (),
+        document.title_anchor,
+        document.unclaimed,
+        document.lost_names,
+    )
 
 
 def _paragraph_of(span: Span, inlines: tuple[Inline, ...]) -> Iterator[Paragraph]:

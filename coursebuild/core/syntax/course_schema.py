@@ -9,7 +9,7 @@ import copy
 import re
 import unicodedata
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import msgspec
 from msgspec import Meta, Struct
@@ -246,10 +246,6 @@ class CourseTable(Struct, frozen=True, forbid_unknown_fields=True):
 
 class VerifyTable(Struct, frozen=True, forbid_unknown_fields=True):
     """How recorded outputs are compared where a fence says nothing."""
-
-    replaced: ClassVar = {
-        "truth": "delete it: no share is required; `check --truth` lists what nothing gives"
-    }
 
     compare: Annotated[
         Literal["exact", "digits", "rtol"] | None,

@@ -269,11 +269,6 @@ class _Decoder:
                 unknown.append(member.key)
         for key_node in unknown:
             key = key_node.value
-            replacement = getattr(type.cls, "replaced", {}).get(key, "")
-            if replacement:  # said for one release
-                message = f"{format_name(key)} is a field of an earlier version"
-                self.report("field-unknown", key_node.span, message, replacement)
-                continue
             help = did_you_mean(key, set(fields) - set(values))
             if owners := _variants_with_field(key, variants or {}):
                 names = " and ".join(f'`"{type.tag_field}": "{owner}"`' for owner in owners)

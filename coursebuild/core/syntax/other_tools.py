@@ -9,11 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from coursebuild.core.registry import CORE_FENCES, fence_names, missing_package
-from coursebuild.core.syntax.fence import (
-    Fence,
-    kind_of,
-    split_words,
-)
+from coursebuild.core.syntax.fence import Fence, kind_of, split_words
 from coursebuild.core.syntax.nodes import shorten
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.core.text.source import Excerpt
@@ -43,8 +39,6 @@ _MARKS = {
     ".. toctree::": ("a directive of reStructuredText", "content/course.toml lists the lessons"),
 }
 """How blocks of other tools begin: what each is, and what to write in its place."""
-_REPLACED = {"truth": "delete it: `coursebuild check --truth` lists what nothing gives"}
-"""Kinds that went in the last release, and what took their place."""
 _FIRST_LETTERS = "".join({mark[0] for mark in _MARKS})
 
 
@@ -76,9 +70,6 @@ def check_kind(fence: Fence) -> Iterator[Diagnostic]:
     if package:
         message = f"nothing that is installed reads a block of kind `{fence.kind}`"
         yield diagnose("feature-missing", fence.head, message, help=f"install {package}")
-    if kind.text in _REPLACED:
-        message = f"a block of kind `{kind.text}` is one of an earlier version"
-        yield diagnose("feature-missing", fence.head, message, help=_REPLACED[kind.text])
     words = split_words(fence.info).value
     if any(word.key == "file" and (word.value or "").endswith(".py") for word in words):
         message = f"a block of kind `{kind.text}` is shown but never run, and this one has a `file`"

@@ -23,6 +23,22 @@ def python_nodes(code: str) -> tuple[ast.AST, ...]:
     return _nodes(code.rstrip("\n"))
 
 
+def bound_name(node: ast.AST) -> str | None:
+    """The name to which a node gives a meaning, if it does; `*` for all names of a module."""
+    match node:
+        case ast.Name():
+            return node.id if isinstance(node.ctx, ast.Store) else None
+        case ast.alias():
+            return node.asname or node.name.partition(".")[0]
+        case ast.arg():
+            return node.arg
+        case ast.MatchMapping():
+            return node.rest
+        case _:  # a function, a class, an exception, a part of a pattern, a parameter of a type
+            name = getattr(node, "name", None)
+            return name if isinstance(name, str) else None
+
+
 @functools.lru_cache(maxsize=8)
 def _nodes(code: str) -> tuple[ast.AST, ...]:
     try:

@@ -15,6 +15,7 @@ import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import msgspec
 from msgspec import Struct
@@ -60,9 +61,15 @@ from coursebuild.features.lab.export.script import (
     export_script,
     kept_export,
 )
+from coursebuild.features.lab.javascript import parse
 from coursebuild.features.lab.model import Test, Writing
 from coursebuild.features.lab.trial import Engines
-from coursebuild.features.lab.verdict import play_text
+from coursebuild.features.lab.verdict import (
+    NameReference,
+    code_references,
+    name_diagnostics,
+    play_text,
+)
 
 
 class TrialVerdict(Struct, frozen=True):
@@ -93,6 +100,8 @@ class Judgements(Struct, frozen=True):
     of_attempts: tuple[Judgement, ...]
     seconds: float
     timestamp: int
+    names: tuple[dict[str, Any], ...] = ()
+    """What the engine has of each name in the start."""
 
 
 class ExerciseTrials:
@@ -138,9 +147,11 @@ class ExerciseTrials:
                 mjb = save_model(context, self._engines.native, model)
         except NativeError:
             return None  # its lab reports it
-        key = fingerprint((inputs.text, inputs.conditions, mjb, lab_digest("picture")))
+        names = _names(exercise)
+        paths = [name.path for name in names]
+        key = fingerprint((inputs.text, inputs.conditions, mjb, paths, lab_digest("picture")))
         kept_judgements = runs.store.get_value("exercises", key, Judgements)
-        judgements = kept_judgements or self._judge_all(trial, exercise, mjb)
+        judgements = kept_judgements or self._judge_all(trial, exercise, mjb, paths)
         diagnostics = list(_diagnose(exercise, judgements.of_attempts))
         lasting = all(judgement.refused != _ENDLESS for judgement in judgements.of_attempts)
         if kept_judgements is None and lasting:
@@ -171,16 +182,22 @@ class ExerciseTrials:
             unexported=export.reason,
         )
         output = ExerciseOutput(export.script, start.picture)
-        return TrialResult(exercise.span, line, output), diagnostics
+        unknown_names = name_diagnostics(names, judgements.names)
+        warnings = (replace(diagnostic, rule="exercise-name") for diagnostic in unknown_names)
+        return TrialResult(exercise.span, line, output), [*diagnostics, *warnings]
 
-    def _judge_all(self, trial: Trial, exercise: Exercise, mjb: bytes) -> Judgements:
+    def _judge_all(
+        self, trial: Trial, exercise: Exercise, mjb: bytes, paths: Sequence[tuple[str, ...]]
+    ) -> Judgements:
         start, module = time.time(), compile_lab(exercise.lab, trial.name)
         mistakes = (attempt.text.text for attempt in exercise.wrong)
         texts = (exercise.solution.text, exercise.start.text, *mistakes)
         judgements = tuple(
             self._judge(module, exercise, text, mjb, plays=i == 1) for i, text in enumerate(texts)
         )
-        return Judgements(judgements, round(time.time() - start, 4), int(start))
+        seconds = self._context.course.limits.lab
+        names = tuple(self._engines.browser.look_up(paths, mjb, seconds)) if paths else ()
+        return Judgements(judgements, round(time.time() - start, 4), int(start), names)
 
     def _judge(
         self, module: LabModule, exercise: Exercise, text: str, mjb: bytes, *, plays: bool
@@ -199,6 +216,13 @@ class ExerciseTrials:
 
             picture = draw_picture(exercise.lab, begin)
         return msgspec.convert({**reply, "picture": picture}, Judgement)
+
+
+def _names(exercise: Exercise) -> list[NameReference]:
+    """What a controller to begin with names of the model and the engine; nothing of half a text."""
+    if exercise.subject != CONTROLLER or parse(exercise.start.text).has_error:
+        return []
+    return [n for n in code_references(exercise.start) if n.path[0] in ("model", "data", "mj")]
 
 
 _ENDLESS = "it does not end in time"

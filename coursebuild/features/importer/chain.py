@@ -11,6 +11,7 @@ from textwrap import shorten
 from coursebuild.api import Edit, Options, Recording, ScriptRun, Span, marks, model, regex
 from coursebuild.core.run.part_marks import FAILURE
 from coursebuild.core.run.script_environment import distributions
+from coursebuild.core.text.python_code import bound_name
 from coursebuild.features.importer.cells import imported_names
 from coursebuild.features.importer.commands.findings import Rank
 from coursebuild.features.importer.context import script_path_of
@@ -212,13 +213,5 @@ def _loaded_names(code: str) -> set[str]:
 
 def _bound_names(tree: ast.AST) -> set[str]:
     """The names that code gives."""
-    names = set[str]()
-    for node in ast.walk(tree):
-        match node:
-            case ast.Name(id=name, ctx=ast.Store()):
-                names.add(name)
-            case ast.FunctionDef() | ast.ClassDef() | ast.AsyncFunctionDef():
-                names.add(node.name)
-            case _:
-                names |= {name.partition(".")[0] for name in imported_names(node).values()}
-    return names
+    nodes = (n for n in ast.walk(tree) if not isinstance(n, ast.arg | ast.ExceptHandler))
+    return {name for node in nodes if (name := bound_name(node))}

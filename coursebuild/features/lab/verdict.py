@@ -306,24 +306,28 @@ def _written_pieces(lab: Lab) -> Iterator[tuple[LabCode, Excerpt]]:
 
 def references(lab: Lab) -> list[NameReference]:
     """List the names that the pieces of a lab use and do not declare themselves."""
+    return [name for _, text in _written_pieces(lab) for name in code_references(text)]
+
+
+def code_references(text: Excerpt) -> list[NameReference]:
+    """The same of a piece of code."""
     names: list[NameReference] = []
-    for _, text in _written_pieces(lab):
-        nodes = list(walk(parse(text.text)))
-        declared_names = _declared_names(nodes)
-        for node in nodes:
-            parts = dotted_names(node) if node.type == "member_expression" else ()
-            path = tuple(map(text_of, parts))
-            outer = node.parent
-            is_longer_name = outer is not None and outer.type == "member_expression"
-            if len(path) < 2 or path[0] in (*declared_names, *_OPEN_OBJECTS) or is_longer_name:
-                continue
-            places = tuple(_place_in(text, part) for part in parts)
-            index = outer.child_by_field_name("index") if outer is not None else None
-            if outer is not None and index is not None and text_of(index).isdecimal():
-                place = _place_in(text, outer)
-                names.append(NameReference(path, places, int(text_of(index)), place))
-            else:
-                names.append(NameReference(path, places))
+    nodes = list(walk(parse(text.text)))
+    declared_names = _declared_names(nodes)
+    for node in nodes:
+        parts = dotted_names(node) if node.type == "member_expression" else ()
+        path = tuple(map(text_of, parts))
+        outer = node.parent
+        is_longer_name = outer is not None and outer.type == "member_expression"
+        if len(path) < 2 or path[0] in (*declared_names, *_OPEN_OBJECTS) or is_longer_name:
+            continue
+        places = tuple(_place_in(text, part) for part in parts)
+        index = outer.child_by_field_name("index") if outer is not None else None
+        if outer is not None and index is not None and text_of(index).isdecimal():
+            place = _place_in(text, outer)
+            names.append(NameReference(path, places, int(text_of(index)), place))
+        else:
+            names.append(NameReference(path, places))
     return names
 
 

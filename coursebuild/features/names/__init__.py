@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator
 from fnmatch import fnmatchcase
 
@@ -50,10 +51,15 @@ def check(course: Course, documents: Collection[Document]) -> Iterator[Diagnosti
         note = document.summary_of(DocumentNames)
         if note is None or id(document) in free:
             continue
+        codes = {code.start: code.text for _, code, _ in note.claims}.values()
         for claim, code, span in note.claims:
-            answer = resolver.resolve(claim, note.names)
+            answer = resolver.resolve(claim, note)
             if not isinstance(answer, Unknown):
                 continue
+            name = rf"\b{answer.part}\b"
+            uses = [len(re.findall(name, text)) for text in (code.source.text, "\n".join(codes))]
+            if answer.part.startswith("mj") and uses[0] > uses[1]:
+                continue  # of code that is shown, which may be in C
             words = (code.text.strip("` "), answer.part)
             if any(fnmatchcase(word, name) for word in words for name in course.names):
                 continue
@@ -66,11 +72,11 @@ def lost_names(course: Course, python: str) -> Iterator[Diagnostic]:
     """Report names of MuJoCo that the one of another interpreter has lost, or deprecated."""
     resolver = resolver_of(course)
     uses = [
-        (claim, span, note.names, meaning)
+        (claim, span, note, meaning)
         for document in course.documents
         if (note := document.summary_of(DocumentNames)) is not None
         for claim, _, span in note.claims
-        if isinstance(meaning := resolver.resolve(claim, note.names), KnownName) and meaning.engine
+        if isinstance(meaning := resolver.resolve(claim, note), KnownName) and meaning.engine
     ]
     if not uses or resolver.engine is None:
         return
@@ -97,7 +103,7 @@ def code_links(library: Library, place: urls.Place, document: Document) -> dict[
     resolver = resolver_of(library.course)
     pages = {page.path: page for page in library.course.pages}
     for claim, code, _ in note.claims:
-        answer = resolver.resolve(claim, note.names) if claim.linked else None
+        answer = resolver.resolve(claim, note) if claim.linked else None
         href = answer.href if isinstance(answer, KnownName) else ""
         page = pages.get(href)
         if href.startswith("#examples/"):

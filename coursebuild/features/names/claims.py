@@ -1,7 +1,7 @@
 """Finds names in a document: what its inline code may name, and what its code defines.
 
 Entry points: `document_names`, what `resolve` must know of a document; `claims_of`, the claims of
-one piece of inline code; `Claim` and `CodeNames`.
+one piece of inline code; `Claim` and `DocumentNames`.
 
 Inline code may be a name where it has the shape of one: a call, a dotted name, a word with an
 underscore or one that begins as MuJoCo's do, elements and attributes of MJCF, a command or an
@@ -11,17 +11,15 @@ option of coursebuild, a table of the course map, a script of the course.
 from __future__ import annotations
 
 import ast
-import functools
 import re
 from collections.abc import Iterator, Mapping
 from typing import Literal, TypeAlias
 
-import msgspec
 from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import Span, model, regex
-from coursebuild.core.text.python_code import python_nodes
+from coursebuild.core.text import python_code
 
 Kind: TypeAlias = Literal[
     "word",
@@ -50,17 +48,8 @@ _ATTRIBUTES = regex(r'\s*([A-Za-z_][\w:-]*)\s*=\s*"[^"]*"')
 _TAG = regex(rf"<(/?)([A-Za-z]\w*)((?:{_ATTRIBUTES.pattern[:-7]}\"[^\"]*\")*)\s*/?>")
 _TABLE = regex(r"(\[\[?)([a-z][\w.]*)\]\]?(?: (\w+)(?: =.*)?)?")
 _FILE = regex(r"examples/[\w./-]*\w\.[a-z]+")
-_CODE_WORD = regex(
-    r"\b\w*[A-Za-z0-9]_\w+|(?<=\.)[A-Za-z]\w*|[A-Za-z]\w*+(?=\(|\s?=)|[Mm]j[A-Z]\w+"
-    r"|(?<=\")[A-Za-z]\w++(?=\")"
-)
-"""A word of code that inline code could mean."""
-_CODE = (model.Script | model.ScriptPart | model.PlainCode | model.CodeBlock) | (
-    model.Mjcf | model.FeatureBlock | model.Recording
-)
 _CALLED = regex(r"([A-Za-z_]\w*)\(.*\)")
 _STRUCTURES = {"MjData", "MjModel", "MjSpec"}
-_DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
 
 
 class Claim(Struct, frozen=True, array_like=True):
@@ -75,12 +64,11 @@ class Claim(Struct, frozen=True, array_like=True):
     """Whether the whole code can link to what this name means."""
 
 
-class CodeNames(Struct, frozen=True):
-    """The names of a document, but for their places."""
+class DocumentNames(Struct, frozen=True):
+    """The names of a document."""
 
-    claims: tuple[Claim, ...]
-    words: frozenset[str]
-    """Words of its blocks of code, which the text may use."""
+    claims: tuple[tuple[Claim, Span, Span], ...]
+    """Each with the place of its inline code and its own."""
     definitions: dict[str, tuple[str, int]]
     """The names that its scripts define, each with the script's path and the line."""
     imports: dict[str, str]
@@ -90,38 +78,15 @@ class CodeNames(Struct, frozen=True):
     that may be anything else."""
 
 
-class DocumentNames(Struct, frozen=True, dict=True):
-    """The names of a document as they are kept, since all documents are asked for words."""
-
-    data: bytes
-    codes: tuple[Span, ...]
-    """Of each claim the place of its inline code."""
-    places: tuple[Span, ...]
-    """Of each claim its own."""
-
-    @functools.cached_property
-    def names(self) -> CodeNames:
-        return msgspec.json.decode(self.data, type=CodeNames)
-
-    @property
-    def claims(self) -> Iterator[tuple[Claim, Span, Span]]:
-        """Each claim with the place of its code and its own."""
-        return zip(self.names.claims, self.codes, self.places, strict=True)
-
-
-def course_names(course: model.Course) -> tuple[CodeNames, ...]:
-    """Return the names of each document of a course."""
-    notes = (document.summary_of(DocumentNames) for document in course.documents)
-    return tuple(note.names for note in notes if note is not None)
+def course_names(course: model.Course) -> Iterator[DocumentNames]:
+    """Yield the names of each document of a course."""
+    return filter(None, (document.summary_of(DocumentNames) for document in course.documents))
 
 
 def document_names(document: model.Document) -> DocumentNames | None:
-    """Return the names of a document; `None` if it has neither claims nor code."""
-    claims: list[Claim] = []
-    codes: list[Span] = []
-    places: list[Span] = []
-    words: set[str] = set()
-    names = CodeNames((), frozenset(), {}, {}, {})
+    """Return the names of a document; `None` if it has none."""
+    claims: list[tuple[Claim, Span, Span]] = []
+    names = DocumentNames((), {}, {}, {})
     for script in model.document_scripts(document):
         _read_script(script, names)
     inner: set[int] = set()
@@ -130,11 +95,6 @@ def document_names(document: model.Document) -> DocumentNames | None:
             inner |= {id(part) for part in model.walk_blocks(block.child_blocks())}
         # A heading, an option of a quiz and a title may stand in a link or a button.
         may_link = isinstance(block, model.Paragraph | model.Table) and id(block) not in inner
-        if isinstance(block, _CODE):
-            text = block.span.text
-            if isinstance(block, model.FeatureBlock):  # its inline code makes claims of its own
-                text = re.sub(r"(?<!`)`[^`\n]+`(?!`)", "", text)
-            words.update(_CODE_WORD.findall(text))
         link_parts: set[int] = set()
         for inline in inlines:
             path = ""
@@ -143,23 +103,16 @@ def document_names(document: model.Document) -> DocumentNames | None:
                 if isinstance(inline.target, model.ExampleTarget) and len(inline.children) == 1:
                     path, inline = inline.target.path, inline.children[0]
             if isinstance(inline, model.CodeSpan) and not inline.literal:
+                is_free = may_link and id(inline) not in link_parts
                 for claim, place in claims_of(inline, path):
-                    claims.append(
-                        replace(
-                            claim, linked=may_link and claim.linked and id(inline) not in link_parts
-                        )
-                    )
-                    codes.append(inline.span)
-                    places.append(place)
-    if not (claims or words):
-        return None
-    names = replace(names, claims=tuple(claims), words=frozenset(words))
-    data = msgspec.json.encode(names, order="deterministic")
-    return DocumentNames(data, tuple(codes), tuple(places))
+                    claim = replace(claim, linked=claim.linked and is_free)
+                    claims.append((claim, inline.span, place))
+    names = replace(names, claims=tuple(claims))
+    return names if claims or names.definitions or names.imports else None
 
 
-def _read_script(script: model.Script, names: CodeNames) -> None:
-    nodes = python_nodes(script.code.text)
+def _read_script(script: model.Script, names: DocumentNames) -> None:
+    nodes = python_code.python_nodes(script.code.text)
     for node in nodes:
         if type(node) is ast.Import:
             for alias in node.names:
@@ -170,16 +123,10 @@ def _read_script(script: model.Script, names: CodeNames) -> None:
                 names.imports[alias.asname or alias.name] = f"{node.module}.{alias.name}"
     structures: dict[int, str] = {}
     for node in nodes:
-        definition = ""
         if type(node) is ast.Assign and len(node.targets) == 1:
             structures[id(node.targets[0])] = _find_structure(node.value, names.imports)
-        elif type(node) is ast.arg:
-            definition = node.arg
-        elif isinstance(node, _DEFINITIONS):
-            definition = node.name
-        elif type(node) is ast.Name and type(node.ctx) is ast.Store:
-            definition = node.id
-        if definition:
+        definition = None if isinstance(node, ast.alias) else python_code.bound_name(node)
+        if definition is not None:
             line = getattr(node, "lineno", 1)
             names.definitions.setdefault(definition, (script.path, line))
     for node in nodes:
@@ -244,17 +191,12 @@ def _find(text: str, page: str) -> Iterator[tuple[Kind, str, str]]:
 
 
 def _find_python(text: str) -> Iterator[tuple[Kind, str, str]]:
-    try:
-        tree = ast.parse(text.replace("…", "_").replace("->", "."), "")
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        for word in ENGINE_WORD.findall(text):
-            yield "word", word, word
-        return
+    nodes = python_code.python_nodes(text.replace("…", "_").replace("->", "."))
+    for word in () if nodes else ENGINE_WORD.findall(text):
+        yield "word", word, word
     parts: set[int] = set()
-    targets = {
-        n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
-    }
-    for node in ast.walk(tree):
+    targets = {python_code.bound_name(node) for node in nodes}
+    for node in nodes:
         if id(node) in parts:
             continue
         if isinstance(node, ast.Attribute | ast.Call):

@@ -88,25 +88,6 @@ class EngineNames(Struct, frozen=True, dict=True):
         places = (attributes for e in self.elements.values() for attributes in e.values())
         return frozenset(attribute for attributes in places for attribute in attributes)
 
-    @functools.cached_property
-    def words(self) -> frozenset[str]:
-        """Every single name, and every parameter of a function."""
-        signatures = (function.text for function in self.functions.values())
-        parameters = {part for text in signatures for part in text.replace("(", " ").split()}
-        return frozenset(
-            (
-                *self.functions,
-                *self.constants,
-                *self.enums,
-                *self.enum_of,
-                *self.classes,
-                *self.classes_of,
-                *self.elements,
-                *self.attributes,
-                *(part.strip(":,()") for part in parameters if part.isascii()),
-            )
-        )
-
 
 class EngineTable(Struct, frozen=True, dict=True):
     """The names as they are kept: decoded when the first one is looked up."""
@@ -188,6 +169,11 @@ class Unknown(Struct, frozen=True):
 
 Answer: TypeAlias = KnownName | Unknown | None
 """`None` means that nobody can say."""
+
+
+def unknown(lead: str, name: str, names: Iterable[str]) -> Unknown:
+    """Why a name is none of these; `lead` says whose these are."""
+    return Unknown(f"{lead} `{name}`", did_you_mean(name, names), name)
 
 
 def find_engine_name(engine: EngineNames, name: str) -> KnownName | None:
@@ -291,24 +277,19 @@ def tables_of(root: type[Struct]) -> dict[str, frozenset[str]]:
 
 def resolve_command(manual: str, name: str) -> Answer:
     """What a command means, with its page of the manual."""
-    if name in options_by_command():
-        return KnownName(manual)
-    help = did_you_mean(name, options_by_command())
-    return Unknown(f"coursebuild has no command `{name}`", help, name)
+    known_names = options_by_command()
+    lead = "coursebuild has no command"
+    return KnownName(manual) if name in known_names else unknown(lead, name, known_names)
 
 
 def resolve_option(manual: str, command: str, name: str) -> Answer:
     """What an option of a command, or of any, means, with its page of the manual."""
     commands = options_by_command()
-    options = commands.get(command)
-    if options is None:
-        options = frozenset(option for options in commands.values() for option in options)
+    options = commands.get(command, frozenset[str]().union(*commands.values()))
     if name in options:
         return KnownName(manual)
-    if not command:
-        return None  # it may be of another program
-    message = f"`coursebuild {command}` has no option `{name}`"
-    return Unknown(message, did_you_mean(name, options), name)
+    # Alone, it may be of another program.
+    return unknown(f"`coursebuild {command}` has no option", name, options) if command else None
 
 
 def resolve_table(manual: str, table: str, key: str) -> Answer:
@@ -318,6 +299,5 @@ def resolve_table(manual: str, table: str, key: str) -> Answer:
     if name not in tables:
         return None  # it may be of another file
     if key and tables[name] and key not in tables[name]:
-        help = did_you_mean(key, tables[name])
-        return Unknown(f"the table `{name}` of the course map has no key `{key}`", help, key)
+        return unknown(f"the table `{name}` of the course map has no key", key, tables[name])
     return KnownName(manual)

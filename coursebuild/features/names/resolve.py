@@ -15,10 +15,8 @@ from coursebuild import MANUAL
 from coursebuild.api import Course, did_you_mean, document_scripts, regex
 from coursebuild.core.model import Script
 from coursebuild.core.model.addresses import line_anchor
-from coursebuild.core.text.diagnostics import propose
-from coursebuild.core.text.near import nearest
 from coursebuild.features.names import known_names
-from coursebuild.features.names.claims import ENGINE_WORD, Claim, CodeNames, course_names
+from coursebuild.features.names.claims import ENGINE_WORD, Claim, DocumentNames, course_names
 from coursebuild.features.names.known_names import (
     ITEM_CLASSES,
     Answer,
@@ -30,6 +28,7 @@ from coursebuild.features.names.known_names import (
     class_href,
     element_href,
     find_engine_name,
+    unknown,
 )
 
 _MANUAL_ID = "coursebuild-manual"
@@ -63,11 +62,10 @@ class Resolver:
         """Whether the course is about MuJoCo, so that `model` and `data` may be its structures."""
         if self.course.models or self.course.engine:
             return True
-        documents = course_names(self.course)
-        modules = {module for names in documents for module in names.imports.values()}
-        uses = (claim for names in documents for claim in names.claims if claim.kind == "word")
-        return any(module.split(".")[0] == "mujoco" for module in modules) or any(
-            ENGINE_WORD.fullmatch(claim.name) for claim in uses
+        return any(
+            any(module.split(".")[0] == "mujoco" for module in names.imports.values())
+            or any(c.kind == "word" and ENGINE_WORD.fullmatch(c.name) for c, _, _ in names.claims)
+            for names in course_names(self.course)
         )
 
     @functools.cached_property
@@ -76,13 +74,13 @@ class Resolver:
         documents = self.course.documents
         return {s.path: s for document in documents for s in document_scripts(document)}
 
-    def resolve(self, claim: Claim, names: CodeNames) -> Answer:
+    def resolve(self, claim: Claim, names: DocumentNames) -> Answer:
         """What a name in a document means."""
         match claim.kind:
             case "word":
                 return self._word(claim.name, names)
             case "call":
-                return self._word(claim.name, names) or self._function(claim.name, names)
+                return self._word(claim.name, names) or self._function(claim.name)
             case "path":
                 return self._path(claim.name.split("."), names)
             case "defined":
@@ -103,22 +101,22 @@ class Resolver:
 
     # --- Python
 
-    def _word(self, name: str, names: CodeNames) -> Answer:
+    def _word(self, name: str, names: DocumentNames) -> Answer:
         if name in names.definitions:
             return KnownName(f"#{line_anchor(*names.definitions[name])}", name)
         return None if self.engine is None else find_engine_name(self.engine, name)
 
-    def _function(self, name: str, names: CodeNames) -> Answer:
+    def _function(self, name: str) -> Answer:
         """That there is no function of MuJoCo with this name, if it has the form of one."""
         engine = self.engine
         if engine is None or not _FUNCTION.fullmatch(name):
             return None
-        if name in engine.declared or name in engine.functions or name in names.words:
+        if name in engine.declared or name in engine.functions:
             return None
-        help = did_you_mean(name, (*engine.functions, *engine.declared))
-        return Unknown(f"MuJoCo {engine.version} has no function `{name}`", help, name)
+        lead = f"MuJoCo {engine.version} has no function"
+        return unknown(lead, name, (*engine.functions, *engine.declared))
 
-    def _path(self, parts: list[str], names: CodeNames) -> Answer:
+    def _path(self, parts: list[str], names: DocumentNames) -> Answer:
         engine, root = self.engine, _BRACKETS.sub("", parts[0])
         if engine is None:
             return None
@@ -134,7 +132,7 @@ class Resolver:
         answer = self._member(class_name, parts[1:])
         return answer if isinstance(answer, KnownName) else None
 
-    def _module_member(self, parts: list[str], names: CodeNames) -> Answer:
+    def _module_member(self, parts: list[str], names: DocumentNames) -> Answer:
         """What a path means that begins at the module of MuJoCo."""
         assert self.engine is not None
         name = _BRACKETS.sub("", parts[0])
@@ -142,7 +140,7 @@ class Resolver:
             return self._path(parts, names)
         answer = self._member(name, parts[1:]) or find_engine_name(self.engine, name)
         if answer is None and parts[0].startswith(f"{name}()"):
-            return self._function(name, names)
+            return self._function(name)
         return answer if isinstance(answer, KnownName) else None
 
     def _member(self, class_name: str, parts: list[str]) -> Answer:
@@ -157,8 +155,8 @@ class Resolver:
                 break
             member = members.get(name)
             if member is None:
-                message = f"`{class_name}` of MuJoCo {self.engine.version} has no `{name}`"
-                return Unknown(message, did_you_mean(name, members), name)
+                lead = f"`{class_name}` of MuJoCo {self.engine.version} has no"
+                return unknown(lead, name, members)
             class_name = member.type
             if class_name.endswith("List"):
                 class_name = ITEM_CLASSES.get(class_name, "") if "[]" in part else ""
@@ -173,11 +171,7 @@ class Resolver:
         if script is None:
             return None
         words = frozenset(re.findall(r"\w+", script.code.text))
-        if name in words:
-            return KnownName()
-        likely = nearest(name, words)
-        help = propose(name, likely) if likely else ""
-        return Unknown(f"`{path}` has no `{name}`", help, name)
+        return KnownName() if name in words else unknown(f"`{path}` has no", name, words)
 
     # --- MJCF
 
@@ -198,8 +192,8 @@ class Resolver:
         if not attribute or attribute in names:
             text = attribute or f"<{element}>"
             return KnownName(element_href(engine, element, attribute), text, engine=True)
-        message = f"`<{element}>` of MuJoCo {engine.version} has no attribute `{attribute}`"
-        return Unknown(message, did_you_mean(attribute, names), attribute)
+        lead = f"`<{element}>` of MuJoCo {engine.version} has no attribute"
+        return unknown(lead, attribute, names)
 
     # --- the manual
 

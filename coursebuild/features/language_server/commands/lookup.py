@@ -342,10 +342,10 @@ class _Lookup:
         claims = [] if note is None else [c for c in note.claims if c[1].start == code.span.start]
         for claim, _, span in sorted(claims, key=lambda claim: not _touches(claim[2], offset)):
             assert note is not None
-            meaning = resolver.resolve(claim, note.names)
+            meaning = resolver.resolve(claim, note)
             if not isinstance(meaning, KnownName) or not meaning.text:
                 continue
-            path, line = note.names.definitions.get(claim.name, ("", 0))
+            path, line = note.definitions.get(claim.name, ("", 0))
             text, place = fence("python", meaning.text), None
             if path in library.scripts:
                 script = library.scripts[path][0].code

@@ -175,7 +175,7 @@ def _find_engine_names(
 ) -> Mapping[str, str]:
     engine, document = resolver_of(texts.library.course).engine, texts.document(source)
     note = None if document is None else document_names(document)
-    names = {} if note is None else dict.fromkeys(note.names.definitions, "")
+    names = {} if note is None else dict.fromkeys(note.definitions, "")
     if engine is None:
         return names if subject == "name" else {}
     if subject == "element":
@@ -184,7 +184,8 @@ def _find_engine_names(
         places = engine.elements.get(prefix["tag"], {}).values()
         return {attribute: "" for attributes in places for attribute in attributes}
     functions = {name: function.text for name, function in engine.functions.items()}
-    words = sorted(name for name in engine.words if name.lower().startswith("mj"))
+    all_words = (*engine.constants, *engine.enums, *engine.enum_of, *engine.classes)
+    words = sorted(word for word in all_words if word.lower().startswith("mj"))
     fields = {
         name: member.text
         for kind in ("MjModel", "MjData")
