@@ -52,7 +52,6 @@ from coursebuild.core.text.diagnostics import Diagnostic, Parsed, diagnose
 from coursebuild.core.text.near import nearest
 from coursebuild.core.text.source import Source, Span
 from coursebuild.pipeline.reader import Reader
-from coursebuild.pipeline.theme_files import load_theme
 
 Code: TypeAlias = Literal["run", "known", "run before", "none", "refuse"]
 """What becomes of a course's own features: they run; they do if they have run before, and if not
@@ -249,6 +248,8 @@ class _Loader:
     def _load_theme(self, theme: Theme) -> Theme:
         if theme == Theme() and not (self.root / TEMPLATES).is_dir():
             return theme
+        from coursebuild.pipeline.theme_files import load_theme
+
         parsed_theme = load_theme(self.root, theme)
         self.diagnostics += parsed_theme.diagnostics
         return parsed_theme.value

@@ -37,13 +37,9 @@ from coursebuild.core.model.course import Words
 from coursebuild.core.model.results import Formula, MathError
 from coursebuild.core.model.walk import without_prose
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.context import PageContext
-from coursebuild.core.pages.draft_writer import DraftWriter
-from coursebuild.core.pages.listings import highlight_lines
+from coursebuild.core.pages.context import PageContext, PageRecord
 from coursebuild.core.pages.materials import renderer_for
 from coursebuild.core.pages.numbering import items_of
-from coursebuild.core.pages.page_writer import PageWriter, draw
-from coursebuild.core.pages.record import PageRecord, record
 from coursebuild.core.pages.renderer import Renderer, Texts, direction, known_mathml
 from coursebuild.core.pages.typography import isolate_formulas
 from coursebuild.core.pages.urls import Place
@@ -221,6 +217,8 @@ class Reader:
         missing = [text for text in texts if summaries[text.key] is None]
         if len(missing) >= _MIN_PARALLEL:
             # What is imported here, worker processes share, and what is prepared at its first use.
+            from coursebuild.core.pages.listings import highlight_lines
+
             self._whole_document(missing[0])
             highlight_lines("python", "x")
         answers = self._answer_all("reading lessons and pages", iter(missing))
@@ -321,6 +319,11 @@ class Reader:
 
     def draw_page(self, request: PageRequest) -> DrawnPage:
         """Draw a page here, and store it."""
+        # A check draws none.
+        from coursebuild.core.pages.draft_writer import DraftWriter
+        from coursebuild.core.pages.page_writer import PageWriter, draw
+        from coursebuild.core.pages.record import record
+
         with self._lock:
             whole = None if request.text is None else self._whole_document(request.text)
             document = None if whole is None else whole.document
@@ -332,10 +335,11 @@ class Reader:
             head, html, context = draw(inputs, document, renderer, writer)
             body = isolate_formulas(html) if direction(request.language) == "rtl" else html
             page_record, body = record(head, body, request.base_url, context)
-            all_notes = {
-                f.name: f.note(inputs, context, body) for f in features() if f.note is not None
+            notes = {
+                f.name: note
+                for f in features()
+                if f.note is not None and (note := f.note(inputs, context, body))
             }
-            notes = {name: note for name, note in all_notes.items() if note}
             digests = ((name, hashlib.sha256(note).hexdigest()) for name, note in notes.items())
             page_record = replace(page_record, notes=tuple(digests))
             page = DrawnPage(head, page_record, notes, body.encode())
@@ -344,6 +348,8 @@ class Reader:
 
     def page_context(self, request: PageRequest) -> PageContext:
         """Return what is needed to draw parts of a page's document, with all its text."""
+        from coursebuild.core.pages.page_writer import PageWriter
+
         inputs = request.inputs
         assert request.text is not None and inputs.document_inputs is not None
         with self._lock:

@@ -25,8 +25,7 @@ from coursebuild.core.model import (
 )
 from coursebuild.core.model.course import Words
 from coursebuild.core.model.results import Reports, Results
-from coursebuild.core.pages.context import Mistakes, PageHead, PageInputs
-from coursebuild.core.pages.record import PageRecord
+from coursebuild.core.pages.context import Mistakes, PageHead, PageInputs, PageRecord
 from coursebuild.core.pages.renderer import Texts
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic, Parsed

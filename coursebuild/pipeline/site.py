@@ -31,7 +31,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.results import CachedFile, FileList, OutputFile, SiteFile
 from coursebuild.core.pages import urls
 from coursebuild.core.pages.assets import Names, compressed_files
-from coursebuild.core.pages.context import Mistakes, NotedPage, SiteContext
+from coursebuild.core.pages.context import Mistakes, NotedPage, PageRecord, SiteContext
 from coursebuild.core.pages.frame import (
     FrameInputs,
     PageFrame,
@@ -44,7 +44,6 @@ from coursebuild.core.pages.materials import in_language
 from coursebuild.core.pages.page_list import PageEntry, page_list
 from coursebuild.core.pages.record import (
     PageFacts,
-    PageRecord,
     common_characters,
     common_files,
 )

@@ -40,8 +40,7 @@ def course(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.site
 def test_the_recorded_outputs_are_those_of_the_scripts(course: Path) -> None:
-    result = Folder(course).main("check")
-    assert result.status == 0, result.out + result.err
+    result = Folder(course).main("check").require_success()
     assert "16 lessons, 16 scripts run: everything holds" in result.out
 
 
@@ -49,8 +48,7 @@ def test_the_recorded_outputs_are_those_of_the_scripts(course: Path) -> None:
 def test_so_are_those_of_scripts_with_mujoco(tmp_path: Path) -> None:
     folder = tmp_path / "course"
     write_course(folder, 2, scripts="mujoco")
-    result = Folder(folder).main("check")
-    assert result.status == 0, result.out + result.err
+    result = Folder(folder).main("check").require_success()
     assert "2 lessons, 2 scripts run: everything holds" in result.out
 
 

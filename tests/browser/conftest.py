@@ -46,8 +46,7 @@ def site(sites: Sites) -> str:
 def scorm(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Path:
     """A SCORM package, unpacked as a platform does."""
     folder = course_copy("scorm", tmp_path_factory.mktemp("scorm") / "course", stores)
-    result = folder.main("export", "scorm")
-    assert result.status == 0, result.out + result.err
+    folder.main("export", "scorm").require_success()
     shutil.unpack_archive(folder.root / "course-scorm.zip", folder.root / "package")
     return folder.root / "package"
 

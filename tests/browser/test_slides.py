@@ -22,8 +22,9 @@ pytestmark = pytest.mark.browser
 def export(built_courses: BuiltCourses, tmp_path: Path) -> Callable[[str], Path]:
     def export(name: str) -> Path:
         out = tmp_path / f"{name}.html"
-        result = built_courses[name].main("export", "slides", "1.1", "--quiet", "--out", str(out))
-        assert result.status == 0, result.out + result.err
+        built_courses[name].main(
+            "export", "slides", "1.1", "--quiet", "--out", str(out)
+        ).require_success()
         return out
 
     return export

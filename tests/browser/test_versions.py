@@ -29,8 +29,7 @@ def docs(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Iterator[str
         for name, title in (("home", "A manual"), ("page", "A page"), ("rules", "Rules")):
             folder.write(f"{name}.md", f"# {title}\n\nWords.\n")
         folder.borrow(stores)
-        result = folder.main("build", "--strict")
-        assert result.status == 0, result.out + result.err
+        folder.main("build", "--strict").require_success()
         site = top / f"site-{page}"
         site.mkdir()
         (folder.root / "public").rename(site / "docs")

@@ -50,8 +50,7 @@ def test_lab_of_formulas_and_build_need_no_extra(
     folder.fill([LESSONS["formula"]], stores)
     for package in ("mjbench", "scipy", "matplotlib", "PIL", "pygls", "fsspec"):
         monkeypatch.setitem(sys.modules, package, None)
-    result = folder.main("build")
-    assert result.status == 0, result.out + result.err
+    folder.main("build").require_success()
     assert (folder.root / "public/index.html").is_file()
 
 

@@ -50,8 +50,7 @@ def test_the_course_of_the_readme_is_two_files(course: Folder) -> None:
 @pytest.mark.site
 def test_the_course_of_the_readme_builds_by_its_commands(course: Folder) -> None:
     for command in ("update", "check", "build"):
-        result = course.main(command)
-        assert result.status == 0, result.out + result.err
+        course.main(command).require_success()
     assert "every recorded output is up to date" in course.main("update").out
     page = course.text("public/lessons/1.1-free-fall.html")
     assert "after 1.000 s the ball has fallen 4.9148 m" in page

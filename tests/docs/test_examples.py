@@ -112,8 +112,7 @@ def swings(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
     folder.write("content/lessons/4.2-mass.md", SCRIPT.format("l4_2"))
     folder.write(".gitignore", "public\n.coursebuild\nexamples\n")
     folder.borrow(stores)
-    result = folder.main("build")
-    assert result.status == 0, result.out
+    folder.main("build").require_success()
     folder.main("check", "--write-timings", "timings.json")
     git(folder.root, "init", "-q", "-b", "main")
     commit(folder.root)

@@ -43,8 +43,7 @@ def zoo(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> Folder:
 
 
 def export(folder: Folder, kind: str, name: str) -> Package:
-    result = folder.main("export", kind)
-    assert result.status == 0, result.out + result.err
+    result = folder.main("export", kind).require_success()
     return Package(folder, result, entries(folder.root / name))
 
 

@@ -40,8 +40,7 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 
 @pytest.mark.site
 def test_a_fence_of_a_feature_follows_its_code_and_the_map(course: Folder) -> None:
-    result = course.main("build")
-    assert result.status == 0, result.out
+    course.main("build").require_success()
     assert "<p>LISTEN &lt;NOW&gt;</p>" in course.text(PAGE)
     assert "LISTEN <NOW>" in course.text("public/lessons/1.1-one.md")
     styles = [text for path, text in course.tree("public").items() if path.endswith(".css")]
@@ -114,8 +113,7 @@ def test_a_feature_sees_its_document_and_the_course(course: Folder) -> None:
     course.write("features/shout.py", fixture_text("scripts/task_feature.txt"))
     task = '\n```task name="A & B"\nDo **this**.\n```\n'
     course.write("content/lessons/1.1-one.md", f"## Hello\n{task}")
-    result = course.main("build")
-    assert result.status == 0, result.out
+    course.main("build").require_success()
     html = (
         '<div class="task"><p><b>Task 1.</b> A &amp; B</p>\n<p>Do <strong>this</strong>.</p></div>'
     )
@@ -140,8 +138,7 @@ def test_the_walk_of_the_docs_ends_with_diagrams(course: Folder) -> None:
     course.write("features/mermaid.py", ast.unparse(ast.Module([first, *nodes], [])))
     diagram = '```mermaid alt="One & two"\nflowchart LR\n  one --> two\n```\n'
     course.write("content/lessons/1.1-one.md", f"## Hello\n\n{diagram}")
-    result = course.main("build")
-    assert result.status == 0, result.out
+    course.main("build").require_success()
     assert re.search(r'<img src="data:image/svg[^"]+" alt="One &amp; two">', course.text(PAGE))
     assert "```mermaid\nflowchart LR\n" in course.text(PAGE.replace(".html", ".md"))
     for old, new, rule in ((' alt="One & two"', "", "alt"), ("flowchart", "flow", "syntax")):
@@ -179,8 +176,7 @@ def inventory(course: Folder) -> Folder:
 
 @pytest.mark.site
 def test_the_page_of_the_docs_is_a_page_of_the_site(inventory: Folder) -> None:
-    result = inventory.main("build")
-    assert result.status == 0, result.out
+    inventory.main("build").require_success()
     html = inventory.text("public/inventory/index.html")
     assert '<li><a href="../models/box.html">box</a>, used 0 times</li>' in html
     assert "<title>Inventory · " in html

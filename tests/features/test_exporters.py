@@ -29,8 +29,7 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 
 
 def test_example_of_the_docs_writes_the_lessons_as_a_table(course: Folder) -> None:
-    result = course.main("export", "lessons")
-    assert result.status == 0, result.out + result.err
+    result = course.main("export", "lessons").require_success()
     assert "wrote lessons.csv, 0.1 kB" in result.out
     table = 'id,title,scripts\r\n1.1,Lesson one,1\r\n1.2,"Two, ""quoted""",0\r\n'
     assert course.read("lessons.csv") == table.encode()
@@ -127,6 +126,5 @@ def test_same_course_gives_the_same_package(
     folder = request.getfixturevalue(kind).folder
     first_export = folder.read(name)
     for options in ((), ("--no-cache", "--jobs", "1")):
-        result = folder.main("export", kind, *options, "--out", "sub/other.zip")
-        assert result.status == 0, result.out + result.err
+        folder.main("export", kind, *options, "--out", "sub/other.zip").require_success()
         assert folder.read("sub/other.zip") == first_export, options

@@ -10,7 +10,7 @@ import pytest
 
 from coursebuild.core.files.locks import project_lock
 from support.fixture_cases import fixture_text
-from support.preview_process import Events, serve_preview
+from support.preview_process import serve_preview
 from support.scratch_course import GOOD, WAIT_FOR_GO, Make, block
 
 pytestmark = pytest.mark.site
@@ -24,12 +24,7 @@ def test_output_is_accepted(make: Make) -> None:
     )
     folder = make(lesson)
     with serve_preview(folder) as preview, preview.events() as events:
-
-        def offered(page: Events) -> bool:
-            return any(output.get("offer") for output in page.news["outputs"])
-
-        events.until(offered)
-        (output,) = events.news["outputs"]
+        (output,) = events.offered()
         assert (output["script"], output["nth"], output["state"]) == (
             "examples/hello.py",
             0,
@@ -137,8 +132,7 @@ def test_what_runs_is_told_with_the_time_that_it_took(make: Make) -> None:
 def test_what_changed_since_is_not_written(make: Make) -> None:
     folder = make(GOOD.replace("hello 3.14159", "hello 3"))
     with serve_preview(folder) as preview, preview.events() as events:
-        events.until(lambda page: any(o.get("offer") for o in page.news["outputs"]))
-        id = events.news["outputs"][0]["offer"]
+        id = events.offered()[0]["offer"]
         # A lesson is saved while the server is suspended, so that it has not noticed.
         preview.process.send_signal(signal.SIGSTOP)
         folder.replace(folder.lesson(), "## Hello", "## Mine")
@@ -222,8 +216,7 @@ def test_other_words_around_the_same_numbers_keep_every_address(make: Make, comm
     folder.replace(folder.lesson(), prose, re.sub('="[a-z]+"', "", prose))
     folder.replace(folder.lesson(), "'period'", "'whole'")
     with serve_preview(folder, code=command) as preview, preview.events() as events:
-        events.until(lambda page: any(o.get("offer") for o in page.news["outputs"]))
-        assert preview.accept_offer(events.news["outputs"][0]["offer"]) == (200, {"message": ""})
+        assert preview.accept_offer(events.offered()[0]["offer"]) == (200, {"message": ""})
         events.wait_until_settled()
     assert folder.main("check").status == 0
     folder.replace(folder.lesson(), "'half'", "'every other'")

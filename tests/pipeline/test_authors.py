@@ -77,8 +77,7 @@ def test_packages_for_learning_platforms_name_the_authors_too(make: Make) -> Non
         ("scorm", NAMESPACES["imsmd_rootv1p2p1.xsd"], scorm_schema(), ("vcard", "catalogentry")),
         ("qti", LOM, packaging_schema(), ("entity", "identifier")),
     ):
-        result = folder.main("export", export, "--out", "package.zip")
-        assert result.status == 0, result.out
+        folder.main("export", export, "--out", "package.zip").require_success()
         manifest = entries(folder.root / "package.zip")["imsmanifest.xml"]
         assert mistakes(schema, manifest) == []
         root = etree.fromstring(manifest)

@@ -104,8 +104,7 @@ def test_a_lab_that_was_not_tried_is_listed_in_every_format(make: Make) -> None:
 def test_a_lab_of_a_kind_of_the_course_is_not_said_to_hold(make: Make) -> None:
     folder = make('## One\n\n```lab dial\n{"title": "A dial"}\n```\n')
     folder.write("content/labs/dial.js", "export default () => {};\n")
-    result = folder.main("check")
-    assert result.status == 0, result.out
+    result = folder.main("check").require_success()
     assert result.out.splitlines()[-1] == (
         "1 lesson, 0 scripts run: holds, but for 1 lab that was not tried (a kind of the course's)"
     )

@@ -64,8 +64,7 @@ def test_what_a_page_hands_over_runs_alone_or_has_no_button(make: Make, tmp_path
     assert page.count("not run alone") == 1
 
     folder.write("content/lessons/1.1-one.md", LESSON.replace('isdir("content")', 'isdir(".")'))
-    mended = folder.main("build")
-    assert mended.status == 0, mended.out
+    folder.main("build").require_success()
     assert 'astray.py" download' in folder.text("public/lessons/1.1-one.html")
 
 
@@ -93,8 +92,7 @@ def test_an_archive_of_a_lesson_holds_what_its_scripts_need(make: Make, tmp_path
         "matplotlibrc": "font.size: 11\n",
     }.items():
         folder.write(path, text)
-    build = folder.main("build")
-    assert build.status == 0, build.out
+    folder.main("build").require_success()
     with unpack(folder, "public/lessons/1.1-one.zip") as archive:
         paths = [path for path in archive.namelist() if "/mjcourse/" not in path]
         assert {entry.date_time for entry in archive.infolist()} == {(1980, 1, 1, 0, 0, 0)}

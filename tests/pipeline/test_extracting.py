@@ -88,8 +88,7 @@ def test_edit_is_adopted_into_a_block_of_every_shape(make: Make) -> None:
         assert folder.main("extract").status == 0
         for number in range(1, len(texts) + 1):
             folder.write(f"examples/x{number}.py", file)
-        result = folder.main("extract", "--adopt")
-        assert result.status == 0, result.out
+        result = folder.main("extract", "--adopt").require_success()
         for number, (shape, text) in enumerate(zip(SHAPES, texts, strict=True), 1):
             before, _, after = text.partition("print(1)" + newline)
             lead = before.rpartition(newline)[2]
@@ -231,8 +230,7 @@ def test_unpacked_archive_runs_with_the_packages_of_the_course(make: Make, tmp_p
     folder.replace("content/course.toml", "[course]\n", '[course]\npackages = ["src", "lib"]\n')
     for path, text in FILES.items():
         folder.write(path, text)
-    build = folder.run("build")
-    assert build.status == 0, build.out
+    folder.run("build").require_success()
     for name in ("examples.zip", "lessons/1.1-one.zip"):
         with zipfile.ZipFile(folder.root / "public" / name) as archive:
             archive.extractall(tmp_path / name)

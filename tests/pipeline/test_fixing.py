@@ -28,8 +28,7 @@ def test_fix_mends_all_form_and_undo_takes_it_back(make: Make) -> None:
     """And no other byte."""
     before = ("\ufeff" + SLIPS).replace("\n", "\r\n")
     folder = make(before, "## Two\n\nText.\n")
-    result = folder.main("check", "--fix")
-    assert result.status == 0, result.out
+    result = folder.main("check", "--fix").require_success()
     assert folder.text(folder.lesson()) == ("\ufeff" + MENDED).replace("\n", "\r\n")
     assert '-  {"kind": "open", "q": "Why?", "reference": "Because.",}\n' in result.out
     assert "\nfixed 2 mistakes in 1 file (" in result.out

@@ -279,10 +279,9 @@ def test_build_elsewhere_in_another_environment_gives_the_same_bytes(
         "USER": "somebody",
     }
     root = str(folder.root)
-    result = folder.run(
+    folder.run(
         "-C", root, "build", "--jobs", "3", "--quiet", cwd=tmp_path, env=environment
-    )
-    assert result.status == 0, result.out
+    ).require_success()
     assert differences(original.tree(), folder.tree()) == []
 
 
@@ -301,8 +300,7 @@ def test_build_without_caches_and_with_files_in_another_order_gives_the_same_byt
             target.chmod(0o600)
     folder = Folder(root)
     folder.tmp.mkdir()
-    result = folder.run("build", env={"PYTHONHASHSEED": "1"})
-    assert result.status == 0, result.out
+    folder.run("build", env={"PYTHONHASHSEED": "1"}).require_success()
     assert differences(original.tree(), folder.tree()) == []
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from coursebuild.core.files.resources import template_texts
 from support.fixture_cases import fixture_text
-from support.preview_process import Events, serve_preview
+from support.preview_process import serve_preview
 from support.scratch_course import GOOD, Folder, Make, block
 from support.workflows import git
 
@@ -52,8 +52,7 @@ def recordings(text: str) -> list[dict[str, Any]]:
 
 def test_update_writes_what_a_recording_was_made_with(make: Make) -> None:
     folder = make(numpy_lesson("0"))
-    update = folder.main("update")
-    assert update.status == 0, update.out
+    update = folder.main("update").require_success()
     assert f"wrote {RECORD}" in update.out
     (recording,) = recordings(folder.text(RECORD))
     assert recording["of"] == "examples/total.py output 1"
@@ -137,8 +136,7 @@ def record_on_branch(folder: Folder, branch: str, numbers: str) -> None:
         end = text.index("```", start)
         text = f"{text[:start]}examples/{name}.py\nprint({number})\n{text[end:]}"
     folder.write(folder.lesson(), text)
-    update = folder.main("update")
-    assert update.status == 0, update.out
+    folder.main("update").require_success()
     commit(folder)
 
 
@@ -152,10 +150,8 @@ def merge(folder: Folder) -> None:
     git(folder.root, "checkout", "-q", "left")
     git(folder.root, "merge", "-q", "-m", "merged", "right")
     text = folder.text(RECORD)
-    check = folder.main("check")
-    assert check.status == 0, check.out
-    update = folder.main("update")
-    assert update.status == 0, update.out
+    folder.main("check").require_success()
+    folder.main("update").require_success()
     of = [recording["of"] for recording in recordings(text)]
     assert of == [f"examples/{name}.py output 1" for name in "abc"]
 
@@ -253,12 +249,7 @@ def test_figure_recorded_before_gets_its_data(make: Make) -> None:
 def test_accepted_output_is_recorded_with_what_printed_it(make: Make) -> None:
     folder = make(numpy_lesson("2.0"))
     with serve_preview(folder) as preview, preview.events() as events:
-
-        def offered(page: Events) -> bool:
-            return any(output.get("offer") for output in page.news["outputs"])
-
-        events.until(offered)
-        (output,) = events.news["outputs"]
+        (output,) = events.offered()
         assert preview.accept_offer(output["offer"]) == (200, {"message": ""})
         events.wait_until_settled()
     assert NUMPY in folder.text(RECORD)

@@ -24,8 +24,7 @@ THIRD = fixture_text("documents/symbols_third.md")
 def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> dict[str, str]:
     folder = Folder(tmp_path_factory.mktemp("lookup") / "course")
     folder.fill([FIRST, SECOND, THIRD], stores)
-    result = folder.main("build")
-    assert result.status == 0, result.out + result.err
+    folder.main("build").require_success()
     return {
         path: data.decode()
         for path, data in folder.tree("public").items()
@@ -194,8 +193,7 @@ def test_a_lesson_shows_what_it_needs_and_leads_to(make: Make) -> None:
         "1.5": ["1.3", "1.1"],
     }
     mapped(folder, lessons, {"1.2": '<img src=x onerror="alert(1)"> & عنوان', "1.4": "x" * 300})
-    result = folder.main("build")
-    assert result.status == 0, result.out
+    folder.main("build").require_success()
     picture = drawing(folder.text("public/lessons/1.1-l0.html"), "wide")
     assert re.findall(r'class="node-id"[^>]*>(.*?)<', picture) == ["1.1", "1.2", "1.3", "1.5"]
     heads = re.search(r'class="heads" d="(.*?)"', picture)
@@ -214,8 +212,7 @@ def test_large_levels_and_lessons_with_many_heirs_stay_small(make: Make) -> None
     many = {f"1.{n}": ["1.1"] if n > 1 else [] for n in range(1, 41)}
     many |= {f"2.{n}": ["1.1", f"1.{n % 39 + 2}"] for n in range(1, 61)}
     mapped(folder, many, {})
-    result = folder.main("build")
-    assert result.status == 0, result.out
+    folder.main("build").require_success()
     html = folder.text("public/lessons/1.1-l0.html")
     assert drawing(html, "wide").count('class="node-id"') == 6
     assert 'class="graph-' in folder.text("public/levels/1.html")

@@ -75,8 +75,7 @@ class Course:
         self.folder.write(STABILITY.path(), file_of(STABILITY, cases))
 
     def build(self) -> str:
-        result = self.folder.main("build", "-q")
-        assert result.status == 0, result.out
+        result = self.folder.main("build", "-q").require_success()
         return result.out
 
     def page(self, path: str = PAGE) -> str:

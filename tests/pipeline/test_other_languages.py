@@ -24,8 +24,7 @@ def course(make: Make) -> Folder:
 
 
 def test_an_output_is_verified_and_its_numbers_are_bound(course: Folder) -> None:
-    result = course.run("check", "--strict")
-    assert result.status == 0, result.out
+    course.run("check", "--strict").require_success()
     assert course.run("build").status == 0
     assert course.text("examples/sum.sh").startswith("echo")
     page = course.text("public/lessons/1.1-one.html")
@@ -43,8 +42,7 @@ def test_an_output_is_verified_and_its_numbers_are_bound(course: Folder) -> None
 def test_without_a_runner_it_is_shown_and_said_to_be_not_run(course: Folder) -> None:
     text = '```r file=examples/mean.R\ncat(mean(c(1, 3)), "\\n")\n```\n\n```output\n7\n```\n'
     course.write(course.lesson(), f"## Mean\n\n{text}")
-    result = course.run("build")
-    assert result.status == 0, result.out
+    result = course.run("build").require_success()
     assert "norun    examples/mean.R  (no runner for `r`; " in result.out
     page = course.text("public/lessons/1.1-one.html")
     assert "this script is not run when the site is built" in page
@@ -102,16 +100,14 @@ def test_a_sandbox_holds_what_a_runner_starts(course: Folder) -> None:
     script = "echo harm > harm.txt || echo refused\n"
     text = f"## Harm\n\n```sh file=examples/a.sh\n{script}```\n\n```output\nrefused\n```\n"
     course.write(course.lesson(), text)
-    result = course.run("check", "--sandbox")
-    assert result.status == 0, result.out
+    course.run("check", "--sandbox").require_success()
     assert not (course.root / "harm.txt").exists()
 
 
 def test_code_of_other_tools_stays_code(course: Folder) -> None:
     text = "## Code\n\n```js file=./src/say-hi.js\nlet x = \n```\n\n```rust show=tui\nfn\n```\n"
     course.write(course.lesson(), text + '\n```c title="a.c" linenos\nint x;\n```\n')
-    result = course.run("check", "--strict")
-    assert result.status == 0, result.out
+    course.run("check", "--strict").require_success()
 
 
 def test_lines_of_a_file_of_any_language_are_shown(course: Folder) -> None:

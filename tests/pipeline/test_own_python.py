@@ -66,8 +66,7 @@ def install(packages: Path, version: str, name: str) -> None:
 def test_scripts_find_what_is_installed_in_the_environment_of_the_course(course: Folder) -> None:
     """They run again when something is installed there, and find only `mjcourse` of ours."""
     (packages,) = (course.root / ".venv").glob("lib/python*/site-packages")
-    result = course.run("check")
-    assert result.status == 0, result.out + result.err
+    result = course.run("check").require_success()
     assert "1 script" in result.out
     again = course.run("check")
     assert again.status == 0
@@ -96,8 +95,7 @@ def test_runners_of_other_languages_may_lie_in_this_environment(make: Make) -> N
     folder.write("content/course.toml", f"{course_map}\n{runner}")
     script = "```lisp file=examples/a.lisp\n(print 1)\n```\n\n```output\nlisp\n```\n"
     folder.write(folder.lesson(), folder.text(folder.lesson()) + f"\n{script}")
-    result = folder.run("check", "--strict")
-    assert result.status == 0, result.out
+    folder.run("check", "--strict").require_success()
     (folder.root / ".venv/bin/no-such-lisp").unlink()
     assert "needs no-such-lisp" in folder.run("check").out
 
@@ -163,8 +161,7 @@ def test_the_sandbox_has_this_environment_and_no_other_folder_it_names(make: Mak
     home = folder.root.parent / "home"
     (home / "lib").mkdir(parents=True)
     folder.replace(folder.lesson(), "file=examples/a.py", f'file=examples/a.py args="{home}"')
-    result = folder.main("check", "--sandbox")
-    assert result.status == 0, result.out
+    folder.main("check", "--sandbox").require_success()
     settings = folder.root / ".venv/pyvenv.cfg"
     home_line = f"home = {home}/bin\n"
     lines = settings.read_text().splitlines(keepends=True)

@@ -21,8 +21,7 @@ LESSON = (
 def assert_told(make: Make, lesson: str, old: str, new: str, remark: str) -> None:
     """Check a right lesson, change it, and check that a remark comes of it; if empty, none."""
     folder = make(lesson)
-    result = folder.main("check")
-    assert result.status == 0, result.out
+    result = folder.main("check").require_success()
     assert "is not now" not in result.out
     folder.write(folder.lesson(1), lesson.replace(old, new))
     out = folder.main("check").out

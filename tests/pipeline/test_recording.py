@@ -57,8 +57,7 @@ def test_a_new_script_runs_once_until_it_is_measured(course: Folder) -> None:
     page = course.text("public/lessons/1.1-one.html")
     assert "Recorded, not yet repeated: one run printed this, with MuJoCo" in page
 
-    result = course.main("check", "--sensitivity", "--strict")
-    assert result.status == 0, result.out
+    result = course.main("check", "--sensitivity", "--strict").require_success()
     stages = ("moving initial states", "halving timesteps", "shifting steps")
     repeats = sum(map(result.err.count, stages))
     assert (count(course), repeats >= 7) == (1 + repeats, True)
@@ -199,8 +198,7 @@ def test_preview_offers_what_one_run_printed_and_repeats_it_when_idle(
     folder.write("runs/log", "")
     page = "/lessons/1.1-one.html"
     with serve_preview(folder) as preview, preview.events() as events:
-        events.until(lambda page: any(o.get("offer") for o in page.news["outputs"]))
-        assert preview.accept_offer(events.news["outputs"][0]["offer"])[0] == 200
+        assert preview.accept_offer(events.offered()[0]["offer"])[0] == 200
         events.until(lambda _: "Verified with " in preview.get(page)[2].decode())
         events.wait_until_settled()
     assert count(folder) >= 2 + more_runs
@@ -248,8 +246,7 @@ def test_figure_is_recorded_compared_and_shown(make: Make) -> None:
     first = folder.main("check")
     assert first.status == 1
     assert "figure-drift]: no figure of `examples/line.py` is recorded yet" in first.out
-    update = folder.main("update")
-    assert update.status == 0, update.out
+    update = folder.main("update").require_success()
     assert "drew content/lessons/line.svg" in update.out
     assert not (folder.root / "line.svg").exists()
     assert folder.main("check").status == 0
@@ -277,8 +274,7 @@ def test_data_are_recorded_and_linked(make: Make) -> None:
     lesson = block("line.py", code, "drawn True", info="figure=line.csv,line.svg")
     text = f"## A line\n\n{lesson}Figure: A line that rises.\n"
     folder = make(text)
-    update = folder.main("update")
-    assert update.status == 0, update.out
+    folder.main("update").require_success()
     assert folder.text("content/lessons/line.csv") == "x\n9\n"
     assert folder.main("build").status == 0
     page = folder.text("public/lessons/1.1-one.html")

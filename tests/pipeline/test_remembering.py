@@ -24,8 +24,7 @@ def cups(folder: Folder) -> str:
 def make_cups(make: Make) -> Folder:
     script = f"```python file=examples/cups.py\n{CUPS}\n```\n\n"
     folder = make(f"## Cups\n\n{script}{TABLE}")
-    result = folder.main("check")
-    assert result.status == 0, result.out
+    folder.main("check").require_success()
     return folder
 
 
@@ -33,8 +32,7 @@ def test_a_table_and_its_numbers_follow_a_changed_parameter(make: Make) -> None:
     """The rates of the cups, and not the quartiles that are printed above them."""
     folder = make_cups(make)
     folder.replace(folder.lesson(), "scale = 1.0", "scale = 2.0")
-    result = folder.main("update")
-    assert result.status == 0, result.out
+    folder.main("update").require_success()
     assert "| steel | 169.8 | 0.0121 | 167.0 |" in cups(folder)
     assert '`157.0 min`{out="mean of tau"}, and for glass `147.0`{out}.' in cups(folder)
     assert 'For steel it takes `167.0`{out="steel τ"} min.' in cups(folder)
@@ -178,8 +176,7 @@ def test_numbers_are_bound_wherever_a_course_shows_them(make: Make) -> None:
     folder.replace("content/course.toml", lesson, lesson + objectives.format("2.006"))
     folder.write("content/lessons/swing.svg", "")
     assert folder.main("update").status == 0
-    check = folder.main("check")
-    assert check.status == 0, check.out
+    folder.main("check").require_success()
     folder.replace(folder.lesson(), "period = 2.006", "period = 2.5")
     assert folder.main("update").status == 0
     text, course_map = folder.text(folder.lesson()), folder.text("content/course.toml")

@@ -21,12 +21,11 @@ from coursebuild.core.model.diet_findings import DietReport
 from coursebuild.core.model.measurements import CaseReport, SceneReport
 from coursebuild.core.model.results import Reports
 from coursebuild.core.pages.assets import Assets
-from coursebuild.core.pages.context import PageHead
+from coursebuild.core.pages.context import PageHead, PageRecord
 from coursebuild.core.pages.frame import FrameInputs, Names, PageFrame
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.materials import make_library
 from coursebuild.core.pages.page_list import page_list
-from coursebuild.core.pages.record import PageRecord
 from coursebuild.core.text.source import Excerpt, Source, Span
 from coursebuild.pipeline.check import read_and_verify
 from coursebuild.pipeline.reader import PageRequest, Reader

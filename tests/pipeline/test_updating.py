@@ -33,8 +33,7 @@ UPDATED_LESSON = (
 def test_update_changes_outputs_and_no_other_byte(make: Make) -> None:
     """Not even line ends of Windows or a byte order mark."""
     folder = make(("\ufeff" + FULL_LESSON).replace("\n", "\r\n").encode())
-    result = folder.main("update")
-    assert result.status == 0, result.out
+    folder.main("update").require_success()
     text = folder.text(folder.lesson())
     assert text == ("\ufeff" + UPDATED_LESSON).replace("\n", "\r\n").replace("never", clock(text))
     assert folder.main("check").status == 0

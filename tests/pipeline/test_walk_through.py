@@ -23,8 +23,7 @@ def test_outputs_are_those_of_their_parts_and_everything_else_has_the_whole_file
     make: Make,
 ) -> None:
     folder = make(LESSON.replace("#L16-L17", "#L12-L14").replace("\n", "\r\n"))
-    result = folder.main("update")
-    assert result.status == 0, result.out
+    result = folder.main("update").require_success()
     assert "1 script run" in result.out and folder.text(PATH) == FILE
     text = folder.text(folder.lesson())
     assert "\n" not in text.replace("\r\n", "")
@@ -34,8 +33,7 @@ def test_outputs_are_those_of_their_parts_and_everything_else_has_the_whole_file
     assert "#step\ndef step(u):\n    inner" in plain
     assert "#L12-L14\nfor _ in range(3):\n    rod = step(rod)\nprint" in plain
     assert folder.main("check").status == 0
-    result = folder.main("build")
-    assert result.status == 0, result.out
+    folder.main("build").require_success()
     page = folder.text("public/lessons/1.1-one.html")
     figures = re.findall(r"<figure [^>]*data-script=.*?</figure>", page, re.DOTALL)
     bare = [re.sub(r"<[^>]*>", "", figure).replace("&quot;", '"') for figure in figures]
@@ -97,8 +95,7 @@ def test_an_edited_file_goes_back_into_its_parts(make: Make) -> None:
     assert folder.main("update").status == 0
     text, code = folder.text(folder.lesson()), folder.text(PATH)
     folder.write(PATH, code.replace("0.25 *", "0.5 *").replace('"max"', '"largest"'))
-    result = folder.main("extract", "--adopt")
-    assert result.status == 0, result.out
+    folder.main("extract", "--adopt").require_success()
     changed = text.replace(">     return [u[0], *(b + 0.25", ">     return [u[0], *(b + 0.5")
     assert folder.text(folder.lesson()) == changed.replace('   print("max"', '   print("largest"')
     assert "every script is extracted already" in folder.main("extract", "--adopt").out

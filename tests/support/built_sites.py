@@ -77,8 +77,7 @@ class BuiltCourses:
                 else:
                     shutil.rmtree(folder.root, ignore_errors=True)
                     course = course_copy(name, folder.root, self.stores)
-                    result = course.main("build", "--quiet")
-                    assert result.status == 0, result.out + result.err
+                    course.main("build", "--quiet").require_success()
                 marker.touch()
         return folder
 

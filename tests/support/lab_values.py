@@ -13,8 +13,8 @@ from coursebuild.core.run.run_store import RunStore
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
-from coursebuild.features.lab.compile import compile_lab, lab_trials
-from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.compile import compile_lab
+from coursebuild.features.lab.model import Lab, lab_trials
 from coursebuild.features.lab.trial import Engines, LabTrials
 from coursebuild.pipeline.options import Options
 

@@ -138,6 +138,11 @@ class Events:
                     raise AssertionError(name)
         return self
 
+    def offered(self) -> list[dict[str, Any]]:
+        """The outputs of the page, once one of them can be accepted."""
+        self.until(lambda events: any(o.get("offer") for o in events.news["outputs"]))
+        return [*self.news["outputs"]]
+
     def wait_for_change(self) -> Events:
         before = self.state
         return self.until(lambda events: events.state != before)

@@ -52,6 +52,10 @@ class CommandResult:
     out: str
     err: str
 
+    def require_success(self) -> CommandResult:
+        assert self.status == 0, self.out + self.err
+        return self
+
 
 @dataclass(frozen=True, slots=True)
 class Folder:

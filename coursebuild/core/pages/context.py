@@ -24,7 +24,7 @@ from coursebuild.core.pages.assets import Assets, Names
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.markup import HtmlWriter
 from coursebuild.core.pages.numbering import item_name, number_items, with_row_numbers
-from coursebuild.core.pages.references import ids_and_addresses
+from coursebuild.core.pages.references import Reference, ids_and_addresses
 from coursebuild.core.pages.renderer import Renderer, Strings, direction
 from coursebuild.core.pages.zips import Archive
 from coursebuild.core.text.source import Span
@@ -177,6 +177,28 @@ class PageHead(Struct, frozen=True):
     indexed: bool = True
     language: str = ""
     """Empty for that of the course."""
+
+
+class PageRecord(Struct, frozen=True, array_like=True):
+    """What the site must know of a page, without its body."""
+
+    kind: str
+    title: str
+    indexed: bool
+    text: str
+    """Characters of its text, as in `record.PageFacts`, sorted, like those of formulas."""
+    mathematics: str
+    declarations: tuple[str, ...]
+    ids: tuple[str, ...]
+    """Anchors, sorted; see `references.merge_line_ids`."""
+    references: tuple[Reference, ...]
+    """The targets of its links, sorted, each once."""
+    repeated_ids: tuple[tuple[str, int, int], ...] = ()
+    """Ids that several elements have, sorted; each with the start and end of its place in the
+    page's document (`PageContext.find_repetition`), or zeros."""
+    parts: tuple[str, ...] = ()
+    notes: tuple[tuple[str, str], ...] = ()
+    """The features' notes of the page: a feature's name and a digest; see `SiteContext`."""
 
 
 class PageInputs(Struct, frozen=True):

@@ -24,11 +24,10 @@ from coursebuild.core.model.course import Theme, ThemeFile
 from coursebuild.core.model.results import CachedFile, OutputFile, SiteFile
 from coursebuild.core.pages import typography
 from coursebuild.core.pages.assets import SCRIPTS, Assets, Names, hashed_name, page_script
-from coursebuild.core.pages.context import PageContext, PageHead
+from coursebuild.core.pages.context import PageContext, PageHead, PageRecord
 from coursebuild.core.pages.frame import FRAME_IDS, LOGO_HEIGHT, parts_of, script_words
 from coursebuild.core.pages.library import Library
 from coursebuild.core.pages.references import (
-    Reference,
     ids_and_addresses,
     merge_line_ids,
     references,
@@ -58,28 +57,6 @@ class PageFacts(Struct, frozen=True):
     """Characters of its formulas outside ASCII; and a blank if it has a formula."""
     declarations: frozenset[str]
     parts: frozenset[str]
-
-
-class PageRecord(Struct, frozen=True, array_like=True):
-    """What the site must know of a page, without its body."""
-
-    kind: str
-    title: str
-    indexed: bool
-    text: str
-    """Characters of its text, as in `PageFacts`, sorted, like those of formulas."""
-    mathematics: str
-    declarations: tuple[str, ...]
-    ids: tuple[str, ...]
-    """Anchors, sorted; see `references.merge_line_ids`."""
-    references: tuple[Reference, ...]
-    """The targets of its links, sorted, each once."""
-    repeated_ids: tuple[tuple[str, int, int], ...] = ()
-    """Ids that several elements have, sorted; each with the start and end of its place in the
-    page's document (`PageContext.find_repetition`), or zeros."""
-    parts: tuple[str, ...] = ()
-    notes: tuple[tuple[str, str], ...] = ()
-    """The features' notes of the page: a feature's name and a digest; see `SiteContext`."""
 
 
 def record(
@@ -199,8 +176,8 @@ _FOREIGN = regex(r"[^\x00-\x7f]")
 def page_characters(html: str) -> tuple[frozenset[str], frozenset[str]]:
     """The characters outside ASCII of a page's text and of its formulas; see `PageFacts`."""
     parts = FORMULA.split(html)
-    formulas = frozenset(" " if len(parts) > 1 else "")
-    return _characters("\n".join(parts[::2])), formulas.union(*map(_characters, parts[1::2]))
+    formulas = _characters("\n".join(parts[1::2]))
+    return _characters("\n".join(parts[::2])), formulas.union(" " if len(parts) > 1 else "")
 
 
 def _characters(html: str) -> frozenset[str]:

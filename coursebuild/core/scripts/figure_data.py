@@ -15,8 +15,8 @@ import struct
 import xml.etree.ElementTree as ET
 import zlib
 from collections.abc import Iterator
+from html import unescape
 from typing import TypeAlias
-from xml.sax.saxutils import unescape
 
 import msgspec
 from msgspec import Struct

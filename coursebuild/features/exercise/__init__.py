@@ -22,7 +22,6 @@ from coursebuild.features.exercise.model import (
     Exercise,
     ExerciseOutput,
     PublishedExercise,
-    exercise_inputs,
     exercise_trials,
 )
 from coursebuild.features.exercise.schema import ExerciseFile
@@ -63,7 +62,7 @@ FEATURE = Feature(
     trials=Trials(
         find=exercise_trials,
         start=on_demand("coursebuild.features.exercise.trial:ExerciseTrials"),
-        inputs=exercise_inputs,
+        inputs=on_demand("coursebuild.features.exercise.trial:exercise_inputs"),
         publish=publish,
     ),
     schemas={"exercise": (ExerciseFile, "An exercise fence")},

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from typing import Any, Literal, TypeAlias
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import Block, Course, Excerpt, FeatureBlock, Inputs, Span, Trial, find_blocks
-from coursebuild.core.text.source import key_of
+from coursebuild.api import Block, Course, Excerpt, FeatureBlock, Span, Trial, find_blocks
 from coursebuild.features.exercise.schema import HiddenTrial
-from coursebuild.features.lab.compile import LabCode, compile_lab, inputs_of
-from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.model import Lab, LabCode
 
 Subject: TypeAlias = Literal["model", "controller", "formula"]
 """What the reader writes."""
@@ -152,14 +149,3 @@ def exercise_trials(course: Course) -> Iterator[Trial]:
     for owner, document in course.owned_documents:
         for number, exercise in enumerate(find_blocks(document, Exercise), 1):
             yield Trial(f"{owner.id}-exercise-{number}", owner.id, exercise)
-
-
-def exercise_inputs(trial: Trial) -> Inputs | None:
-    """What the trial of an exercise depends on besides the files of its model."""
-    exercise = trial.block
-    if not isinstance(exercise, Exercise):
-        return None
-    inputs = inputs_of(exercise.lab, compile_lab(exercise.lab, trial.name))
-    attempts = (attempt.text.text for attempt in exercise.wrong)
-    texts = (exercise.solution.text, exercise.start.text, *attempts, json.dumps(exercise.data()))
-    return replace(inputs, path=f"exercise {trial.name}", text=key_of(inputs.text, *texts))

@@ -11,6 +11,7 @@ which has to pass, and with the start, of which it has to say what the page says
 
 from __future__ import annotations
 
+import json
 import re
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,6 +24,7 @@ from msgspec.structs import replace
 
 from coursebuild.api import (
     Diagnostic,
+    Inputs,
     Note,
     Source,
     Trial,
@@ -35,6 +37,7 @@ from coursebuild.core.model.results import TrialLine
 from coursebuild.core.run.alone import AloneJob, Runner
 from coursebuild.core.run.mjcf import readable_error
 from coursebuild.core.run.v8 import LimitError, ScriptError
+from coursebuild.core.text.source import key_of
 from coursebuild.core.values import fingerprint
 from coursebuild.features.exercise.model import (
     CONTROLLER,
@@ -43,9 +46,8 @@ from coursebuild.features.exercise.model import (
     MODEL,
     Exercise,
     ExerciseOutput,
-    exercise_inputs,
 )
-from coursebuild.features.lab.compile import LabModule, compile_lab, trial_data
+from coursebuild.features.lab.compile import LabModule, compile_lab, inputs_of, trial_data
 from coursebuild.features.lab.course_models import files_of, find_model, save_model
 from coursebuild.features.lab.engines.native import (
     LAB_ENGINE,
@@ -70,6 +72,17 @@ from coursebuild.features.lab.verdict import (
     name_diagnostics,
     play_text,
 )
+
+
+def exercise_inputs(trial: Trial) -> Inputs | None:
+    """What the trial of an exercise depends on besides the files of its model."""
+    exercise = trial.block
+    if not isinstance(exercise, Exercise):
+        return None
+    inputs = inputs_of(exercise.lab, compile_lab(exercise.lab, trial.name))
+    attempts = (attempt.text.text for attempt in exercise.wrong)
+    texts = (exercise.solution.text, exercise.start.text, *attempts, json.dumps(exercise.data()))
+    return replace(inputs, path=f"exercise {trial.name}", text=key_of(inputs.text, *texts))
 
 
 class TrialVerdict(Struct, frozen=True):

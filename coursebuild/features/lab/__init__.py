@@ -8,8 +8,7 @@ Labs of formulas and equations, which need no engine, are read and tried in `equ
 from __future__ import annotations
 
 from coursebuild.api import Feature, FenceKind, ModelPart, PagePart, Trials, on_demand
-from coursebuild.features.lab.compile import lab_trials, trial_inputs
-from coursebuild.features.lab.model import Lab
+from coursebuild.features.lab.model import Lab, lab_trials
 from coursebuild.features.lab.relations import check_labs, check_model_names
 from coursebuild.features.lab.reply import publish_labs
 from coursebuild.features.lab.schema import OdeLab, PlotLab, SimLab, refine_schema
@@ -51,7 +50,7 @@ FEATURE = Feature(
     trials=Trials(
         find=lab_trials,
         start=on_demand("coursebuild.features.lab.trial:LabTrials"),
-        inputs=trial_inputs,
+        inputs=on_demand("coursebuild.features.lab.compile:trial_inputs"),
         publish=publish_labs,
     ),
     schemas={

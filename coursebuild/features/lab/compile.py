@@ -14,42 +14,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal
+from typing import Any
 
 from msgspec import Struct, to_builtins
 
-from coursebuild.api import Course, Inputs, Trial, find_blocks
+from coursebuild.api import Inputs, Trial
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.script_environment import package_version
 from coursebuild.core.text.source import key_of
 from coursebuild.features.lab import schema
 from coursebuild.features.lab.engines import native
-from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Entry, Lab
-from coursebuild.features.lab.page import gallery_labs
-
-_NAMES = "{model, data, mj, sim, ctx, lib}"
-_FUNCTIONS = {
-    "statements": "({}) => {{ {}\n}}",
-    "setter": "({}, value) => {{ {}\n}}",
-    "expression": "({}) => ({}\n)",
-    "target": "({}, value) => {{ ({}\n) = value;\n}}",
-}
-"""Functions by their form, of names and code; a line end closes a comment with which it may end."""
-
-
-class LabCode(Struct, frozen=True):
-    """A piece of lab code."""
-
-    entry: Entry
-    form: Literal["statements", "setter", "expression", "target"]
-    """Statements are run; so is a setter, which reads `value`; an expression has a value; a target
-    can be assigned to."""
-    code: str
-
-    @property
-    def function(self) -> str:
-        """The piece as a function, as it stands in the module."""
-        return _FUNCTIONS[self.form].format(_NAMES, self.code)
+from coursebuild.features.lab.model import BUILT_IN_KINDS, MJCF, ODE, PLOT, Entry, Lab, LabCode
 
 
 class LabModule(Struct, frozen=True):
@@ -198,15 +173,6 @@ def control_data(control: schema.Control) -> dict[str, Any]:
 
 _DISPLAY_FIELDS = ("id", "title", "model", "height", "toggles", "still")
 """Data of a lab on which no trial depends."""
-
-
-def lab_trials(course: Course) -> Iterator[Trial]:
-    """Yield every lab of a course, in order; then those made for models that no text shows."""
-    for owner, document in course.owned_documents:
-        for number, lab in enumerate(find_blocks(document, Lab), 1):
-            yield Trial(f"{owner.id}-lab-{number}", owner.id, lab)
-    for model, lab in gallery_labs(course):
-        yield Trial(f"model-{model.name.replace('/', '-')}", model.name, lab)
 
 
 def trial_inputs(trial: Trial) -> Inputs | None:

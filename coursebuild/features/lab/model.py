@@ -1,19 +1,30 @@
-"""A lab as a value."""
+"""A lab as a value, and the labs of a course."""
 
 from __future__ import annotations
 
 import itertools
 import json
 from collections.abc import Iterator
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import Block, Excerpt, FeatureBlock, Inline, Span
+from coursebuild.api import (
+    Block,
+    Course,
+    Document,
+    Excerpt,
+    FeatureBlock,
+    Inline,
+    MjcfModel,
+    Span,
+    Trial,
+    find_blocks,
+)
 from coursebuild.core.syntax.nodes import ArrayNode, Node, ObjectNode
 from coursebuild.core.text.source import key_of
-from coursebuild.features.lab.schema import SimLab, Verify
+from coursebuild.features.lab.schema import Overlay, SimLab, Verify
 
 SIMLAB = "simlab"
 """The kind of a lab that does not name one."""
@@ -149,3 +160,84 @@ def values_in(node: Node, path: Entry) -> Iterator[tuple[Entry, Node]]:
     for name, value in parts:
         yield (*path, name), value
         yield from values_in(value, (*path, name))
+
+
+_NAMES = "{model, data, mj, sim, ctx, lib}"
+_FUNCTIONS = {
+    "statements": "({}) => {{ {}\n}}",
+    "setter": "({}, value) => {{ {}\n}}",
+    "expression": "({}) => ({}\n)",
+    "target": "({}, value) => {{ ({}\n) = value;\n}}",
+}
+"""Functions by their form, of names and code; a line end closes a comment with which it may end."""
+
+
+class LabCode(Struct, frozen=True):
+    """A piece of lab code."""
+
+    entry: Entry
+    form: Literal["statements", "setter", "expression", "target"]
+    """Statements are run; so is a setter, which reads `value`; an expression has a value; a target
+    can be assigned to."""
+    code: str
+
+    @property
+    def function(self) -> str:
+        """The piece as a function, as it stands in the module."""
+        return _FUNCTIONS[self.form].format(_NAMES, self.code)
+
+
+# --- the labs of a course
+
+_TOGGLES: tuple[Overlay, ...] = ("frames", "com", "inertia", "joints", "axis")
+_DRIFT = "else if (model.nu === 0 && Math.hypot(...model.opt.gravity) === 0) data.qvel.fill(0.5);"
+"""Lets a model move that nothing would move."""
+
+
+def lab_trials(course: Course) -> Iterator[Trial]:
+    """Yield every lab of a course, in order; then those made for models that no text shows."""
+    for owner, document in course.owned_documents:
+        for number, lab in enumerate(find_blocks(document, Lab), 1):
+            yield Trial(f"{owner.id}-lab-{number}", owner.id, lab)
+    for model, lab in gallery_labs(course):
+        yield Trial(f"model-{model.name.replace('/', '-')}", model.name, lab)
+
+
+def gallery_labs(course: Course) -> Iterator[tuple[MjcfModel, Lab]]:
+    """Make a lab for each model that no lab of a text shows."""
+    models_in_texts = {name for document in course.documents for name in labs_by_model(document)}
+    for model in course.models:
+        if model.name not in models_in_texts:
+            yield model, gallery_lab(model)
+
+
+def labs_by_model(document: Document) -> dict[str, Lab]:
+    """Map models to their first labs; those in questions are left out, as in summaries."""
+    labs: dict[str, Lab] = {}
+    blocks = [*find_blocks(document, FeatureBlock)]
+    for lab in blocks:
+        if isinstance(lab, Lab) and not any(
+            block.span.contains(lab.span) for block in blocks if not isinstance(block, Lab)
+        ):
+            for name in lab.models():
+                labs.setdefault(name, lab)
+    return labs
+
+
+def gallery_lab(model: MjcfModel) -> Lab:
+    """The lab of a model that no lab of a text shows."""
+    place = model.source.span(0, 0)
+    return Lab(
+        place,
+        SIMLAB,
+        place,
+        "",
+        SimLab(
+            model=model.name,
+            title=model.name,
+            toggles=_TOGGLES,
+            setup=f"{START} {_DRIFT}",
+            # What drifts goes on for ever: the camera shows how it begins.
+            verify=Verify(seconds=3),
+        ),
+    )

@@ -7,7 +7,6 @@ gets a lab of its own.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from urllib.parse import quote
 
 from markupsafe import Markup, escape
@@ -15,9 +14,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.api import (
-    Course,
     Document,
-    FeatureBlock,
     IndexReader,
     Library,
     MarkdownWriter,
@@ -35,17 +32,14 @@ from coursebuild.core.pages.marks import escape_marks, link, picture
 from coursebuild.core.pages.renderer import Strings
 from coursebuild.core.text.quantities import with_unit
 from coursebuild.features.lab.engines.native import LAB_ENGINE
-from coursebuild.features.lab.model import MJCF, ODE, PLOT, SIMLAB, START, Lab
+from coursebuild.features.lab.model import MJCF, ODE, PLOT, Lab, gallery_lab, labs_by_model
 from coursebuild.features.lab.relations import is_editable
 from coursebuild.features.lab.reply import LabRecord, PublishedLab
 from coursebuild.features.lab.schema import (
     Control,
-    Overlay,
     Plot,
     Select,
-    SimLab,
     Slider,
-    Verify,
 )
 
 
@@ -253,56 +247,10 @@ def _plot(words: Strings, plot: Plot) -> tuple[str, tuple[str, ...]]:
     return title, (*(trace.label for trace in plot.traces), *marks)
 
 
-_TOGGLES: tuple[Overlay, ...] = ("frames", "com", "inertia", "joints", "axis")
-
-
-def gallery_labs(course: Course) -> Iterator[tuple[MjcfModel, Lab]]:
-    """Make a lab for each model that no lab of a text shows."""
-    models_in_texts = {name for document in course.documents for name in _labs_by_model(document)}
-    for model in course.models:
-        if model.name not in models_in_texts:
-            yield model, _gallery_lab(model)
-
-
-def _labs_by_model(document: Document) -> dict[str, Lab]:
-    """Map models to their first labs; those in questions are left out, as in summaries."""
-    labs: dict[str, Lab] = {}
-    blocks = [*find_blocks(document, FeatureBlock)]
-    for lab in blocks:
-        if isinstance(lab, Lab) and not any(
-            block.span.contains(lab.span) for block in blocks if not isinstance(block, Lab)
-        ):
-            for name in lab.models():
-                labs.setdefault(name, lab)
-    return labs
-
-
-_DRIFT = "else if (model.nu === 0 && Math.hypot(...model.opt.gravity) === 0) data.qvel.fill(0.5);"
-"""Lets a model move that nothing would move."""
-
-
-def _gallery_lab(model: MjcfModel) -> Lab:
-    place = model.source.span(0, 0)
-    return Lab(
-        place,
-        SIMLAB,
-        place,
-        "",
-        SimLab(
-            model=model.name,
-            title=model.name,
-            toggles=_TOGGLES,
-            setup=f"{START} {_DRIFT}",
-            # What drifts goes on for ever: the camera shows how it begins.
-            verify=Verify(seconds=3),
-        ),
-    )
-
-
 def _find_lab(library: Library, model: MjcfModel) -> tuple[Lab, PublishedLab | None]:
     documents = (use.owner.document for use in library.uses[model.name] if BY_LAB in use.ways)
-    labs = (_labs_by_model(document).get(model.name) for document in documents if document)
-    lab = next(filter(None, labs), None) or _gallery_lab(model)
+    labs = (labs_by_model(document).get(model.name) for document in documents if document)
+    lab = next(filter(None, labs), None) or gallery_lab(model)
     publication = library.trial_value(lab)
     return lab, publication if isinstance(publication, PublishedLab) else None
 

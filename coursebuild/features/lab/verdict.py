@@ -11,9 +11,9 @@ from tree_sitter import Node
 from coursebuild.api import Diagnostic, Excerpt, Fix, Span, diagnose, did_you_mean, regex
 from coursebuild.core.checks.compiled import line_span
 from coursebuild.core.run.mjcf import error_line, readable_error
-from coursebuild.features.lab.compile import LabCode, pieces
+from coursebuild.features.lab.compile import pieces
 from coursebuild.features.lab.javascript import dotted_names, parse, text_of, walk
-from coursebuild.features.lab.model import MJCF, Entry, Lab
+from coursebuild.features.lab.model import MJCF, Entry, Lab, LabCode
 from coursebuild.features.lab.reply import TrialFailure, TrialReply
 from coursebuild.features.lab.schema import Button
 

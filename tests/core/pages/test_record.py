@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from markupsafe import Markup
 
 from coursebuild.core.files.resources import template_texts
-from coursebuild.core.pages.context import PageHead
+from coursebuild.core.pages.context import PageHead, PageRecord
 from coursebuild.core.pages.frame import FRAME_IDS
 from coursebuild.core.pages.html_xml import HtmlElement, parse_html, to_html, to_xml
-from coursebuild.core.pages.record import PageRecord, class_name, hoist_styles, record
+from coursebuild.core.pages.record import class_name, hoist_styles, record
 from coursebuild.core.pages.theme import BASE, dark_colours, dark_drawing
 from support.fixture_cases import fixture_tables
 from support.hostile_html import PAGES

@@ -25,8 +25,7 @@ from support.scratch_course import Folder, Make
 
 
 def export(folder: Folder, kind: str) -> Path:
-    process = folder.main("export", kind, "--quiet")
-    assert process.status == 0, process.out
+    folder.main("export", kind, "--quiet").require_success()
     return folder.root / {"epub": "course.epub", "page": "course.html"}[kind]
 
 
@@ -113,8 +112,7 @@ def test_page_of_every_construct_and_of_wild_html_is_self_contained(full_course:
 @pytest.mark.parametrize("name", ["unicode", "real"])
 def test_ebook_of_course_is_valid(built_courses: BuiltCourses, name: str, tmp_path: Path) -> None:
     book = tmp_path / "course.epub"
-    process = built_courses[name].main("export", "epub", "--quiet", "--out", str(book))
-    assert process.status == 0, process.out
+    built_courses[name].main("export", "epub", "--quiet", "--out", str(book)).require_success()
     assert epub_messages(book) == []
 
 

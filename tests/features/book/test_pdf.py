@@ -23,8 +23,7 @@ def course(tmp_path: Path, stores: Path) -> Folder:
 
 
 def test_contents_name_the_page_on_which_each_lesson_begins(course: Folder) -> None:
-    result = course.main("export", "pdf")
-    assert result.status == 0, result.out + result.err
+    course.main("export", "pdf").require_success()
     first = course.read("course.pdf")
     reader = pypdf.PdfReader(course.root / "course.pdf")
     texts = [page.extract_text() for page in reader.pages]

@@ -20,8 +20,7 @@ MAP = "content/course.toml"
 
 
 def slides(folder: Folder, lesson: str = "1.1") -> str:
-    result = folder.main("export", "slides", lesson, "--quiet")
-    assert result.status == 0, result.out + result.err
+    folder.main("export", "slides", lesson, "--quiet").require_success()
     return folder.text(f"{lesson}-slides.html")
 
 

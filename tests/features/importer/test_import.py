@@ -64,16 +64,22 @@ def test_imported_course_builds_without_an_edit(
     assert files == texts(expected)
 
 
+@pytest.fixture
+def cwd(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder in which the tool is called."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
 def import_refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     assert main(["import", *arguments]) == 2
     return capsys.readouterr().err
 
 
 def test_folder_that_cannot_be_imported_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    cwd: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    course = tmp_path / "old"
+    course = cwd / "old"
     stderr = import_refused(capsys, "old")
     assert stderr == "coursebuild: there is no folder or file old\n"
     course.mkdir()
@@ -101,51 +107,41 @@ def test_folder_that_cannot_be_imported_is_refused(
         (course / name).unlink()
     (course / "one.md").write_bytes(b"\xff")
     assert import_refused(capsys, "old") == "coursebuild: one.md is not UTF-8\n"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["old"]
+    assert sorted(path.name for path in cwd.iterdir()) == ["old"]
 
 
-def test_nothing_is_written_over(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_nothing_is_written_over_nor_left_by_an_import_that_fails(
+    cwd: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "old").mkdir()
-    (tmp_path / "old" / "one.md").write_text("# One\n\nText.\n")
+    (cwd / "old").mkdir()
+    (cwd / "old" / "one.md").write_text("# One\n\nText.\n")
     message_inside = "is in the folder that is imported, which is only read"
     for out in ("old", "old/new"):
         assert f"{message_inside}\n" in import_refused(capsys, "old", "--out", out)
-    (tmp_path / "there" / "content").mkdir(parents=True)
-    (tmp_path / "there" / "content" / "course.toml").write_text("mine")
+    (cwd / "there" / "content").mkdir(parents=True)
+    (cwd / "there" / "content" / "course.toml").write_text("mine")
     message = import_refused(capsys, "old", "--out", "there")
     reason = "already has content/course.toml; name an empty folder with --out"
-    assert message == f"coursebuild: {tmp_path / 'there'} {reason}\n"
-    assert texts(tmp_path / "there") == {"content/course.toml": b"mine"}
-
-
-def test_import_that_fails_leaves_no_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "old").mkdir()
-    (tmp_path / "old" / "one.md").write_text("# One\n\nText.\n")
-    (tmp_path / "there").mkdir()
-    (tmp_path / "there" / "content").write_text("mine")
-    assert main(["import", "old", "--out", "there"]) == 1
+    assert message == f"coursebuild: {cwd / 'there'} {reason}\n"
+    assert texts(cwd / "there") == {"content/course.toml": b"mine"}
+    (cwd / "file").mkdir()
+    (cwd / "file" / "content").write_text("mine")
+    assert main(["import", "old", "--out", "file"]) == 1
     assert "content" in capsys.readouterr().err
-    assert texts(tmp_path / "there") == {"content": b"mine"}
+    assert texts(cwd / "file") == {"content": b"mine"}
 
 
 OUT = "a link leads out of the folder, and nothing behind it is read"
 
 
 def test_no_link_is_followed_out_of_the_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    cwd: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Each is named with its reason; those to what is imported itself are followed."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "secrets" / "models").mkdir(parents=True)
+    (cwd / "secrets" / "models").mkdir(parents=True)
     for name in ("a.md", "a.png", "a.xml", "models/b.xml"):
-        (tmp_path / "secrets" / name).write_text("# SECRET <mujoco/>")
-    old = tmp_path / "old"
+        (cwd / "secrets" / name).write_text("# SECRET <mujoco/>")
+    old = cwd / "old"
     for folder in ("part/inner", "models", "figures"):
         (old / folder).mkdir(parents=True)
     (old / "figures" / "in.png").write_bytes(b"\x89PNG")
@@ -155,7 +151,7 @@ def test_no_link_is_followed_out_of_the_folder(
     )
     links = {
         "_toc.yml": "../secrets/a.md",
-        "course.json": tmp_path / "secrets" / "a.md",
+        "course.json": cwd / "secrets" / "a.md",
         "far": "../secrets",
         "gone.md": "not-there.md",
         "loop.md": "pool.md",
@@ -179,7 +175,7 @@ def test_no_link_is_followed_out_of_the_folder(
         listener.bind(str(old / "socket.md"))
     (old / "part" / "pipe.md").symlink_to("../pipe.md")
     assert main(["import", "old", "--out", "new"]) == 0
-    files = texts(tmp_path / "new")
+    files = texts(cwd / "new")
     assert not [path for path, data in files.items() if b"SECRET" in data]
     assert [path for path in files if path.startswith(("content/files/", "models/"))] == [
         "content/files/figures/in.png"
@@ -211,11 +207,10 @@ def test_no_link_is_followed_out_of_the_folder(
 
 
 def test_folder_of_links_alone_says_why_nothing_is_imported(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    cwd: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "old").mkdir()
-    (tmp_path / "old" / "one.md").symlink_to("/etc/passwd")
+    (cwd / "old").mkdir()
+    (cwd / "old" / "one.md").symlink_to("/etc/passwd")
     assert import_refused(capsys, "old").endswith(f"Markdown file; one.md: {OUT}\n")
 
 
@@ -224,26 +219,25 @@ def notebook(*cells: dict[str, object]) -> str:
 
 
 def test_single_file_is_imported_with_what_it_names(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    cwd: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Nothing else in its folder is read, and no picture in it is written where its name says."""
-    monkeypatch.chdir(tmp_path)
     for name in ("other.md", "model.xml", "img/y.png", ".env", "README.md"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text("# Read me\n\nA `<mujoco/>`\n")
-    (tmp_path / "img" / "x.png").write_bytes(png())
-    (tmp_path / "img" / "out.png").symlink_to("/etc/passwd")
-    (tmp_path / "linked.ipynb").symlink_to("beats.ipynb")
+        (cwd / name).parent.mkdir(exist_ok=True)
+        (cwd / name).write_text("# Read me\n\nA `<mujoco/>`\n")
+    (cwd / "img" / "x.png").write_bytes(png())
+    (cwd / "img" / "out.png").symlink_to("/etc/passwd")
+    (cwd / "linked.ipynb").symlink_to("beats.ipynb")
     text = (
         "# Beats\n\n![x](img/x.png) ![o](img/out.png) [e](.env) ![a](attachment:../../../../a.png)"
         " ![b](data:image/png;base64,é)"
     )
     attachments = {"../../../../a.png": {"image/png": "iVBORw0KGgo="}}
     cell = {"cell_type": "markdown", "source": text, "attachments": attachments}
-    (tmp_path / "beats.ipynb").write_text(notebook(cell))
+    (cwd / "beats.ipynb").write_text(notebook(cell))
     assert main(["import", "linked.ipynb"]) == 0
     assert f"left: img/out.png: {OUT}\n" in capsys.readouterr().out
-    files = texts(tmp_path / "beats")
+    files = texts(cwd / "beats")
     assert sorted(files) == [
         ".gitignore",
         "IMPORT.md",
@@ -253,7 +247,7 @@ def test_single_file_is_imported_with_what_it_names(
         "content/lessons/1.1-beats.md",
     ]
     assert main(["import", "README.md"]) == 0
-    assert "content/lessons/1.1-readme.md" in texts(tmp_path / "README")
+    assert "content/lessons/1.1-readme.md" in texts(cwd / "README")
     extensions = ".md, .qmd, .ipynb, .mdx, .myst, .markdown or .Rmd"
     message = f"model.xml is neither a folder nor a file with the extension {extensions}; "
     assert message in import_refused(capsys, "model.xml")
@@ -279,45 +273,42 @@ def test_cells_of_strangers_run_in_the_sandbox_or_not_at_all(
     assert main(["-C", "trusted", "import", "--prove"]) == 0 and escape.exists()
 
 
+def imported(folder: Path, **files: str) -> str:
+    """The only lesson that comes of files, by their names, in which `_` stands for a dot."""
+    (folder / "source").mkdir()
+    for name, text in files.items():
+        (folder / "source" / name.replace("_", ".")).write_text(text)
+    main(["import", str(folder / "source"), "--out", str(folder / "new")])
+    (lesson,) = (folder / "new/content/lessons").iterdir()
+    return lesson.read_text()
+
+
 @pytest.mark.parametrize("opening", ["::: {.callout-tip}\n", "````{note}\n"])
 def test_blocks_that_nest_too_deep_are_shown_as_they_were_written(
     tmp_path: Path, opening: str
 ) -> None:
-    source = tmp_path / "deep"
-    source.mkdir()
-    (source / "1-a.md").write_text("# A\n\n" + opening * 1500 + "x\n")
-    main(["import", str(source), "--out", str(tmp_path / "new")])
-    (lesson,) = (tmp_path / "new/content/lessons").iterdir()
-    assert lesson.read_text().count(opening.split()[0]) > 1000
+    lesson = imported(tmp_path, a_md="# A\n\n" + opening * 1500 + "x\n")
+    assert lesson.count(opening.split()[0]) > 1000
 
 
 @pytest.mark.site
 @pytest.mark.parametrize(
     ("name", "again"),
-    [("book.toml", "{{#include 1-a.md}}\n"), ("refs.bib", "```{include} 1-a.md\n```\n\n")],
+    [("book.toml", "{{#include a.md}}\n"), ("refs.bib", "```{include} a.md\n```\n\n")],
 )
 def test_text_that_includes_itself_again_and_again_ends(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, again: str
 ) -> None:
-    source = tmp_path / "source"
-    source.mkdir()
-    (source / name).write_text("")
-    (source / "1-a.md").write_text("# A\n\nwords\n\n" + again * 10)
-    main(["import", str(source), "--out", str(tmp_path / "new")])
+    lesson = imported(tmp_path, **{name: "", "a_md": "# A\n\nwords\n\n" + again * 10})
     assert "the lesson would include too much text" in capsys.readouterr().out
-    (lesson,) = (tmp_path / "new/content/lessons").iterdir()
-    assert 100 < lesson.read_text().count("words") < 4000
+    assert 100 < lesson.count("words") < 4000
 
 
 def test_lines_that_are_included_again_and_again_end(tmp_path: Path) -> None:
-    source = tmp_path / "source"
-    source.mkdir()
     lines = ",".join(["1-"] * 5000)
-    (source / "1-a.md").write_text(f"# A\n\n```{{literalinclude}} b.py\n:lines: {lines}\n```\n")
-    (source / "b.py").write_text("x = 1\n" * 20_000)
-    main(["import", str(source), "--out", str(tmp_path / "new")])
-    (lesson,) = (tmp_path / "new/content/lessons").iterdir()
-    assert 100_000 <= lesson.read_text().count("x = 1") < 120_001
+    text = f"# A\n\n```{{literalinclude}} b.py\n:lines: {lines}\n```\n"
+    lesson = imported(tmp_path, a_md=text, b_py="x = 1\n" * 20_000)
+    assert 100_000 <= lesson.count("x = 1") < 120_001
 
 
 def test_folders_in_folders_are_left_with_a_word(

@@ -12,8 +12,9 @@ import pytest
 from coursebuild.core.features import Trial
 from coursebuild.core.run.dependencies import Inputs
 from coursebuild.core.run.script_environment import engine_version
-from coursebuild.features.lab.compile import LabCode, compile_lab, trial_inputs
+from coursebuild.features.lab.compile import compile_lab, trial_inputs
 from coursebuild.features.lab.engines.native import TRIAL, WASM, asset_digest
+from coursebuild.features.lab.model import LabCode
 from support.fixture_cases import check_lines, fixture_tables, fixture_text
 from support.lab_values import Bench, lab_of, make_lab
 

@@ -103,8 +103,7 @@ def test_other_mujoco_of_scripts_leaves_labs_to_an_environment_of_their_own(
     installed = folder.run("doctor", "--install-engine", env=variables)
     assert installed.out == f"MuJoCo {LAB_ENGINE}, for labs, is installed for {prefix}/bin/python\n"
     for option in ((), ("--sandbox",)):
-        result = folder.run("build", "--no-cache", *option, env=variables)
-        assert result.status == 0, result.out + result.err
+        folder.run("build", "--no-cache", *option, env=variables).require_success()
         (page,) = folder.root.glob("public/lessons/1.2-*.html")
         text = page.read_text()
         assert f"Tried with MuJoCo {LAB_ENGINE} in the browser" in text

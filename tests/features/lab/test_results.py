@@ -62,8 +62,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> BuiltSite:
     folder.write("models/a/still.xml", STILL_MODEL)
     folder.write("models/lost.xml", DIVERGING_MODEL)
     report = run_check(folder, status=0)
-    build = folder.main("build")
-    assert build.status == 0, build.out + build.err
+    folder.main("build").require_success()
     return BuiltSite(folder, report)
 
 
@@ -289,8 +288,7 @@ def test_a_path_shows_the_film_of_its_lab_where_motion_is_welcome(
     folder = course(tmp_path / "course", stores, "## A lab\n\n" + lab)
     path = '[[path]]\ntitle = "Falling"\nlessons = ["1.2"]\n\n'
     folder.replace("content/course.toml", "[[level]]", f"{path}[[level]]")
-    build = folder.main("build")
-    assert build.status == 0, build.out + build.err
+    folder.main("build").require_success()
     (file,) = (tmp_path / "course/public").glob("assets/labs/1.2-lab-1-film.*.png")
     home = (tmp_path / "course/public/index.html").read_text("utf-8")
     media = "(prefers-reduced-motion: no-preference)"

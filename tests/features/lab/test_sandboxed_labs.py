@@ -93,8 +93,7 @@ def test_trying_a_lab_imports_nothing_from_the_course(
     marks.mkdir()
     for module in ("ctypes", "mujoco", "numpy", "glfw", "sitecustomize", "mjcourse"):
         folder.write(f"{module}.py", f"open({str(marks / module)!r}, 'w')\n")
-    result = folder.run("build", *option)
-    assert result.status == 0, result.out + result.err
+    folder.run("build", *option).require_success()
     (offer,) = folder.root.glob("public/assets/labs/1.2-lab-1.*.json")
     assert "mujoco" in json.loads(offer.read_text())["exportPython"]["text"]
     assert list(marks.iterdir()) == []

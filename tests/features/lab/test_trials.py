@@ -23,9 +23,9 @@ from coursebuild.core.files.errors import EffectError
 from coursebuild.core.files.trust import seal, store_key, unseal
 from coursebuild.core.run.mjcf import compile_all
 from coursebuild.core.run.run_store import RunStore
-from coursebuild.features.lab.compile import LabCode, lab_trials
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import NativeEngine, NativeError
+from coursebuild.features.lab.model import LabCode, lab_trials
 from coursebuild.features.lab.reply import LabOutput
 from coursebuild.features.lab.trial import Engines, LabTrials
 from coursebuild.pipeline.load import load_course

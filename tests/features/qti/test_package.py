@@ -33,8 +33,7 @@ SPACES = {"q": QTI, "m": MATHML}
 
 
 def export(folder: Folder, *arguments: str) -> CommandResult:
-    command = folder.main("export", "qti", *arguments)
-    assert command.status == 0, command.out + command.err
+    command = folder.main("export", "qti", *arguments).require_success()
     return command
 
 

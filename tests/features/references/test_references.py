@@ -23,8 +23,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, stores: Path) -> dict[str, st
     folder = Folder(tmp_path_factory.mktemp("references") / "course")
     folder.fill([FIRST, "## Two\n\nBy [@one] and [@team].\n"], stores)
     folder.write("content/references.bib", LIST)
-    result = folder.main("build")
-    assert result.status == 0, result.out + result.err
+    folder.main("build").require_success()
     return {
         path: data.decode()
         for path, data in folder.tree("public").items()

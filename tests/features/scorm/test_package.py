@@ -24,8 +24,7 @@ KIND = "{http://www.adlnet.org/xsd/adlcp_rootv1p2}scormtype"
 
 
 def package(folder: Folder) -> dict[str, bytes]:
-    command = folder.main("export", "scorm")
-    assert command.status == 0, command.out + command.err
+    folder.main("export", "scorm").require_success()
     files = entries(folder.root / ZIP)
     check(files)
     return files

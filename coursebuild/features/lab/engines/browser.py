@@ -15,7 +15,7 @@ from typing import Any
 from coursebuild.api import EffectError, Source
 from coursebuild.core.run.child import LIMITS
 from coursebuild.core.run.v8 import Heartbeat, Isolate, LimitError, ScriptError, V8Engine
-from coursebuild.features.lab.compile import LabCode, compile_lab
+from coursebuild.features.lab.compile import compile_lab
 from coursebuild.features.lab.engines.native import (
     TRIAL,
     WASM,
@@ -23,7 +23,7 @@ from coursebuild.features.lab.engines.native import (
     NativeError,
     asset_path,
 )
-from coursebuild.features.lab.model import SIMLAB, Lab
+from coursebuild.features.lab.model import SIMLAB, Lab, LabCode
 from coursebuild.features.lab.schema import SimLab
 
 _START_SECONDS = 60.0
