@@ -122,14 +122,16 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
     parser.add_argument("site", type=Path)
-    parser.add_argument("--python")
+    parser.add_argument("--python", type=Path)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--without", nargs="*", default=[], help="kinds to leave out")
     arguments = parser.parse_args()
+    # A file is run in a folder of its own, where a path from here leads nowhere.
+    python = arguments.python and str(arguments.python.absolute())
     things = [t for t in collect(arguments.site) if t.kind not in arguments.without]
     total, failure_counts = Counter[str](), Counter[str]()
     with ThreadPoolExecutor(arguments.jobs) as threads:
-        results = threads.map(lambda thing: run(thing, arguments.python), things)
+        results = threads.map(lambda thing: run(thing, python), things)
         for thing, failures in zip(things, results, strict=True):
             total[thing.kind] += 1
             failure_counts[thing.kind] += bool(failures)

@@ -383,10 +383,22 @@ def tape_cost(browser: Any, url: str, rounds: int) -> str:
     return f"  first moving frame {taped:.0f} ms with the tape, {plain:.0f} ms without (medians)"
 
 
+COUNT_PICTURES = """
+  const { fenceSync } = WebGL2RenderingContext.prototype
+  window.pictures_ = 0
+  WebGL2RenderingContext.prototype.fenceSync = function (...all) {
+    window.pictures_ += 1
+    return fenceSync.apply(this, all)
+  }"""
+"""Without a graphics processor the stage of a page waits for a fence behind each picture."""
+SETTLED = 10_000  # ms, after which a page has found how coarsely to draw
+
+
 def robot_cost(browser: Any, url: str, path: Path) -> str:
     """How the model of a zip is drawn that a reader opens in the editor of a lab."""
     context = browser.new_context(viewport={"width": 1440, "height": 900})
     page = context.new_page()
+    page.add_init_script(COUNT_PICTURES)
     page.goto(url)
     lab = page.locator(".lab").first
     lab.scroll_into_view_if_needed()
@@ -394,9 +406,16 @@ def robot_cost(browser: Any, url: str, path: Path) -> str:
     lab.locator("input[type=file]").set_input_files(path)
     page.wait_for_selector('.lab[data-state="playing"]', timeout=120_000)
     page.evaluate(WATCH)
+    page.wait_for_timeout(SETTLED)
+    count = "() => [window.pictures_, performance.now() / 1000]"
+    first, start = page.evaluate(count)
     cost = frame_cost(context, page)
+    last, end = page.evaluate(count)
+    rate = (last - first) / (end - start)
+    width = lab.locator("canvas.lab-canvas").get_attribute("width")
+    text = lab.locator(".lab-late").last.inner_text() or "nothing"
     context.close()
-    return f"  {path.stem}: {cost}"
+    return f"  {path.stem}: {rate:.0f} pictures a second, {width} pixels wide; said: {text}; {cost}"
 
 
 def frame_cost(context: Any, page: Any) -> str:

@@ -238,3 +238,41 @@ test('shadows are made once for each picture: for its reflection where it has on
   for (const mirrors of [true, true, false, true]) stage.draw(view(mirrors))
   assert.deepEqual(made, [true, false, true, false, true, true, false])
 })
+
+test('pictures that come too seldom are drawn coarser, and are counted if that does not help', () => {
+  let now = 0
+  globalThis.requestAnimationFrame = () => 1
+  const canvas = { remove() {} }
+  const sizes = []
+  const stage = new Stage()
+  stage.renderer = { domElement: canvas, shadowMap: {}, setPixelRatio: (ratio) => sizes.push(ratio), setSize() {}, render() {} }
+  const view = { width: 4, height: 3, scene: {}, prepare: () => true, reflect: () => false, takeCanvas() {}, copyCanvas() {} }
+  stage.add(view)
+  stage.setMoving(view, true)
+  const play = (span, pictures) => {
+    for (let i = 0; i < pictures; i++) {
+      stage.invalidate(view)
+      stage.paint((now += span))
+    }
+  }
+  const idle = () => stage.paint((now += 16))
+  play(17, 60)
+  assert.deepEqual([sizes, view.rate], [[1], Infinity])
+  for (let i = 0; i < 60; i++) {
+    play(16, 1)
+    idle() // the next one has not come: the drawing is not what takes long
+    now += 100
+  }
+  assert.deepEqual([sizes, view.rate], [[1], Infinity])
+  play(50, 1)
+  play(50, 20)
+  assert.ok(sizes.length === 2 && view.rate === Infinity)
+  play(50, 40)
+  assert.ok(sizes.length === 3 && sizes[2] < 0.5 && sizes[2] > 0.4)
+  assert.equal(view.rate, 20)
+  play(20, 20)
+  assert.equal(view.rate, Infinity)
+  stage.setMoving(view, false)
+  stage.paint(now)
+  assert.equal(sizes.at(-1), 1)
+})

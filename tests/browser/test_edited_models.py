@@ -289,7 +289,11 @@ def test_listing_opens_in_the_editor_of_the_course(page: Page, base: str) -> Non
     part = (listing.locator("code").text_content() or "").strip()
     press(listing, "Open in the editor")
     text = editor_of(second_page)[1]
-    expect(text).to_have_value(f"<mujoco><worldbody>\n{part}\n</worldbody></mujoco>")
+    model = f"<mujoco><worldbody>\n{part}\n</worldbody></mujoco>"
+    expect(text).to_have_value(model)
+    text.fill("<mujoco/>")
+    press(listing, "Open in the editor")  # once more, by the same address
+    expect(text).to_have_value(model)
     second_page.close()
 
 

@@ -28,6 +28,15 @@ HURRY = """() => {
   return () => { window.setTimeout = set }
 }"""
 """Shortens the patience with a trial; gives what makes it long again."""
+COUNT_BLOBS = """
+  const { createObjectURL: create, revokeObjectURL: revoke } = URL
+  window.blobs = new Set()
+  URL.createObjectURL = (blob) => {
+    const address = create(blob)
+    window.blobs.add(address)
+    return address
+  }
+  URL.revokeObjectURL = (address) => window.blobs.delete(address) && revoke(address)"""
 REACH = fixture_text("scripts/reach.js")
 HOLDS = "document.documentElement.scrollWidth <= window.innerWidth"
 
@@ -38,6 +47,7 @@ def page(browsers: Mapping[str, Browser], sites: Mapping[str, Site]) -> Iterator
     size = {"width": 390, "height": 800}
     with browsers["webgl"].new_context(viewport=size, color_scheme="dark") as context:  # type: ignore[arg-type]
         page, console = watch_page(context)
+        page.add_init_script(COUNT_BLOBS)
         page.goto(sites["exercises"].url(ADDRESS))
         yield page
         assert [line for line in console if "/x.js" not in line] == []
@@ -73,6 +83,7 @@ def test_attempts_are_judged_watched_and_kept(page: Page) -> None:
     text.fill(start.replace("-0.3 0 0", "-0.15 0 0"))
     text.press("Control+Enter")
     expect(bar.get_by_text("Solved: all trials are passed.")).to_be_visible()
+    until(page, "window.blobs.size === 0")
     press(bar, "Back to the start")
     expect(text).to_have_value(start)
     press(bar, "Back to mine")

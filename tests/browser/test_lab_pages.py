@@ -71,7 +71,7 @@ def test_button_and_values_have_their_room_before_the_lab_plays(
         swing = lab(page, SWING, None)
         expect(swing.locator(".lab-play")).to_have_text("Push it from the left")
         room = swing.evaluate(widths)
-        swing.locator(".lab-play").click()
+        swing.locator(".lab-view").press("Space")
         expect(swing.locator(".lab-live dd").first).to_contain_text(re.compile(r"\d"))
         expect(swing.locator(".lab-play")).to_have_text("Pause")
         assert swing.evaluate(widths) == room
@@ -93,8 +93,23 @@ def test_one_quantity_is_plotted_against_another(context: BrowserContext, base: 
     with page.expect_download() as download:
         press(itself, "Curves as CSV")
     rows = download.value.path().read_text().splitlines()
-    assert rows[0] == "time (s),rate: rate (rad/s),angle (rad)"
+    assert rows[0] == "time (s),rate: rate (rad/s),angle (rad),height: height (m)"
     assert len(rows) > 2
+    curves = itself.locator(".lab-live")
+    height = curves.get_by_role("img", name="height (m) against")
+    path = height.locator(".lab-trace").get_attribute("d")
+    menu = itself.get_by_label("Curves over")
+    menu.select_option("rate: rate (rad/s)")
+    for name in ("height (m)", "rate (rad/s)"):
+        drawing = curves.get_by_role("img", name=f"{name} against rate: rate (rad/s)")
+        expect(drawing.locator(".lab-trace")).to_have_attribute("d", re.compile(r"^M.*L"))
+    expect(height.locator(".lab-trace")).not_to_have_attribute("d", path or "")
+    press(itself, "Keep this run")
+    expect(height.locator(".lab-ghost")).to_have_attribute("d", re.compile("L"))
+    menu.select_option("time (s)")
+    expect(height).to_have_accessible_name("height (m) against time (s): height")
+    expect(height.locator(".lab-trace")).to_have_attribute("d", path or "")
+    expect(plot).to_be_visible()
     assert violations(page, ".lab") == []
     assert console == []
 

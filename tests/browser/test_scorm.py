@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import BrowserContext, FrameLocator, Locator, Page, expect
+from playwright.sync_api import Browser, BrowserContext, FrameLocator, Locator, Page, expect
 
 from support.axe import violations
 from support.fixture_cases import fixture_text
-from support.lab_page import becomes, until
+from support.lab_page import becomes, until, watch_page
 from support.scratch_course import ROOT
 from support.static_host import Host
 
@@ -145,6 +145,25 @@ def test_lesson_is_there_without_a_platform_and_says_so(
     page.frame_locator("iframe").locator("[data-question]").first.wait_for()
     until(page, "document.documentElement.scrollWidth <= innerWidth")
     assert violations(page, "body > :not(iframe)") == []
+
+
+def test_page_of_the_package_asks_for_no_service_worker(
+    browsers: Mapping[str, Browser], platform: str
+) -> None:
+    with browsers["plain"].new_context() as context:
+        page, console = watch_page(context)
+        page.clock.install()
+        page.goto(f"{platform}lessons/1.1-one.html")
+        page.locator("[data-question]").first.wait_for()
+        page.clock.run_for(60_000)  # a page of a site has long asked
+        page.goto(f"{platform}offline/index.html")
+        page.clock.run_for(60_000)
+        expect(page.locator("[data-keep]")).to_be_visible()
+        assert (
+            page.evaluate("async () => (await navigator.serviceWorker.getRegistrations()).length")
+            == 0
+        )
+        assert console == []
 
 
 def test_platform_in_a_window_of_its_own(calm: BrowserContext, platform: str) -> None:

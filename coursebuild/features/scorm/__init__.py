@@ -1,9 +1,10 @@
 """The site as a package of ADL SCORM 1.2, for learning platforms.
 
 A platform opens `sco/LESSON.html`, which shows the page of the lesson in a frame and speaks to the
-platform for it (`site/js/scorm.js`). So one visit lasts while the learner follows links, and the
-pages are those of the site, byte for byte. Each written lesson is a SCO; the files that belong to
-no single lesson are one asset on which the SCOs depend (Content Aggregation Model, section 2.3).
+platform for it (`site/js/scorm.js`). So one visit lasts while the learner follows links. The pages
+are those of the site but for their manifest, without which a page asks for no service worker. Each
+written lesson is a SCO; the files that belong to no single lesson are one asset on which the SCOs
+depend (Content Aggregation Model, section 2.3).
 """
 
 from __future__ import annotations
@@ -11,22 +12,32 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from coursebuild.api import ExportContext, Exporter, Feature, Lesson, OutputFile, SiteFile, urls
+from coursebuild.api import (
+    ExportContext,
+    Exporter,
+    Feature,
+    Lesson,
+    OutputFile,
+    SiteFile,
+    regex,
+    urls,
+)
 from coursebuild.core.pages.assets import page_script
 from coursebuild.core.pages.frame import policy
 from coursebuild.core.pages.html_xml import identifier, render_xml
 from coursebuild.core.pages.renderer import direction
 
 _COPIES = (".br", ".gz")
-_MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.NOT_FOUND, urls.WORKER, urls.FILES)
+_MACHINES = (urls.ROBOTS, urls.SITEMAP, urls.NOT_FOUND, urls.WORKER, urls.FILES, urls.MANIFEST)
 """Files for servers and crawlers, and the service worker's, which could not cache a platform's
 pages."""
+_MANIFEST = regex(rb'<link rel="manifest" [^>]*>\n')
 
 
 def package_files(context: ExportContext) -> Iterator[SiteFile]:
     """Yield the files of the site, a page that opens each lesson, and the manifest."""
     files: list[SiteFile] = [
-        file
+        OutputFile(path, _MANIFEST.sub(b"", file.make(), 1)) if path.endswith(".html") else file
         for path, file in context.site().items()
         if path not in _MACHINES and not (path.startswith("assets/") and path.endswith(_COPIES))
     ]

@@ -38,7 +38,10 @@ export function addEditButtons(part, words) {
       const text = lines.filter(Boolean).join('\n')
       const state = { values: [], steps: 0, time: 0, physics: new Float64Array(), text, isOther: true }
       const { link } = await writeLink(decodeURIComponent(address.hash.slice(1)), state)
-      location.assign(new URL(link, address))
+      const { href } = new URL(link, address)
+      const isHere = href === location.href
+      location.assign(href)
+      if (isHere) window.dispatchEvent(new Event('hashchange')) // which an address that stays does not bring
     }
     tools.prepend(h('button', { type: 'button', class: 'copy', onclick: open }, words('lab.live.edit')))
   }

@@ -26,11 +26,12 @@ export const storeChoice = (document, choice) => writeChoice(choiceKey(document)
 
 /** The address of the site's root if a service worker may serve it, else `null`. */
 export function workingRoot({ document, location, navigator, isSecureContext, self, top }) {
-  const root = document.documentElement.dataset.root
+  const { root = '' } = document.documentElement.dataset
   if (!isSecureContext || !navigator.serviceWorker || !/^https?:$/.test(location.protocol)) return null
   if (top !== self) return null // in the frame of a learning platform, which decides itself what to store
+  if (!document.querySelector('link[rel=manifest]')) return null // in the package of such a platform, which has no worker
   // The page for missing addresses names the root by the course's base address, at which this copy of the site may not be.
-  if (root === undefined || root.startsWith('/') || document.querySelector('script[src^="/.coursebuild/"]')) return null
+  if (root.startsWith('/') || document.querySelector('script[src^="/.coursebuild/"]')) return null
   return new URL(root || './', document.baseURI)
 }
 

@@ -40,11 +40,12 @@ export class Chart {
    *   axis is, if its label does not say; `seek`: the reader points at a time
    */
   constructor(plot, { words, across, height, format, seek, direction }) {
-    this.plot = plot
+    this.words = words
+    this.across = across
     this.format = format
     this.direction = direction
-    this.caption = words('lab.plot', { ylabel: plot.ylabel || words('lab.value'), xlabel: plot.xlabel || across })
-    this.svg = draw('svg', { role: 'img', 'aria-label': `${this.caption}: ${plot.traces.map(({ label }) => label).join(', ')}` })
+    this.svg = draw('svg', { role: 'img' })
+    this.name(plot)
     const clip = freshId('plot')
     this.edge = draw('rect')
     this.frame = draw('g')
@@ -65,7 +66,6 @@ export class Chart {
     this.element = h('figure', { class: 'lab-chart' }, this.svg)
     this.element.style.setProperty('--height', `${(plot.height ?? height) / 16}rem`)
     this.width = this.height = 0
-    this.layout = '' // of the axes, as they are drawn
     /** @type {Shown | null} */
     this.shown = null
     /** @type {number | null} the time at which the reader points */
@@ -73,6 +73,15 @@ export class Chart {
     this.resizer = new ResizeObserver(([{ contentRect }]) => this.resize(contentRect.width, contentRect.height))
     this.resizer.observe(this.element)
     if (seek !== null) this.watchPointer(seek)
+  }
+
+  /** Take the names and ranges of the axes from a plot of the lab's JSON. */
+  name(plot) {
+    const { words, across } = this
+    this.plot = plot
+    this.layout = '' // of the axes, as they are drawn
+    this.caption = words('lab.plot', { ylabel: plot.ylabel || words('lab.value'), xlabel: plot.xlabel || across })
+    this.svg.setAttribute('aria-label', `${this.caption}: ${plot.traces.map(({ label }) => label).join(', ')}`)
   }
 
   watchPointer(seek) {

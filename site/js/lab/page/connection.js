@@ -27,8 +27,11 @@ const startWorker = (url) => new Worker(url, { type: 'module', name: 'labs' })
  * @param {string} url of the worker's script
  */
 export function startConfined(url) {
+  if (url.startsWith('data:')) return startWorker(url)
   const script = URL.createObjectURL(new Blob([`import ${JSON.stringify(url)}`], { type: 'text/javascript' }))
-  return startWorker(url.startsWith('data:') ? url : script)
+  const worker = startWorker(script)
+  for (const type of ['message', 'error']) worker.addEventListener(type, () => URL.revokeObjectURL(script), { once: true })
+  return worker
 }
 
 export class Connection {

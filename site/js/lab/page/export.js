@@ -19,11 +19,13 @@ export function fillScript(text, values) {
  * @returns {string} a header, then one row for each time
  */
 export function curvesText(curves) {
-  const full = (label, ylabel) => (ylabel && ylabel !== label ? `${label}: ${ylabel}` : label)
-  const names = curves.flatMap(({ ylabel, labels, across = [] }) => [...labels.map((label) => full(label, ylabel)), ...across])
+  const names = curves.flatMap(({ ylabel, labels, across = [] }) => [...labels.map((label) => nameOf(label, ylabel)), ...across])
   const columns = [curves[0].columns[0], ...curves.flatMap((curve) => curve.columns.slice(1))]
   const rows = Array.from(columns[0], (_, i) => columns.map((column) => (Number.isFinite(column[i]) ? String(column[i]) : '')))
   return [['time (s)', ...names].map(quoted), ...rows].map((row) => `${row.join(',')}\r\n`).join('')
 }
+
+/** The name of a line away from its plot. */
+export const nameOf = (label, ylabel) => (ylabel && ylabel !== label ? `${label}: ${ylabel}` : label)
 
 const quoted = (text) => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text)

@@ -10,7 +10,7 @@
 import { copyText } from '../../page/copy.js'
 import { buildControls, buildOverlays, buildReadouts, switchButton } from './controls.js'
 import { download, h, icon, textButton } from './dom.js'
-import { curvesText, fillScript } from './export.js'
+import { curvesText, fillScript, nameOf } from './export.js'
 import { History } from './history.js'
 import { digitsOfStep, formatTime } from './numbers.js'
 import { followLegend } from './legend.js'
@@ -127,7 +127,7 @@ export class Instrument extends Shell {
       'div',
       { class: 'lab-foot' },
       act(...this.shareAction()),
-      ...(this.plots.length > 0 ? [this.makeKeepButton(), act('csv', () => this.exportCurves())] : []),
+      ...(this.plots.length > 0 ? [this.makeKeepButton(), act('csv', () => this.exportCurves()), this.makeAxisMenu()] : []),
       script ? act('export', () => download(script.name, fillScript(script.text, this.values), 'text/x-python')) : null,
       document.querySelector('script[data-state]') && !config.kind ? this.makeLogButton() : null,
       config.source && this.openEditor ? act('edit', () => this.edit()) : null,
@@ -145,12 +145,27 @@ export class Instrument extends Shell {
       this.keptPoses = isKept && (this.poses?.length ?? 0) > 0 ? this.makePoses() : null
       this.keptPoses?.refill(this.poses, -Infinity)
       this.haunt()
-      this.plots.forEach((plot) => {
-        plot.keep(isKept)
-        plot.draw(plot.now)
-      })
+      this.redraw((plot) => plot.keep(isKept))
     })
     return button
+  }
+
+  /** A menu of what the curves are drawn against: the time, or one of them; null for a single one. */
+  makeAxisMenu() {
+    const { plots, words } = this
+    const axes = plots.flatMap((plot) => plot.config.traces.map(({ label }, i) => ({ plot, column: 1 + i, label: nameOf(label, plot.config.ylabel) })))
+    if (axes.length === 1) return null
+    const options = [[words('lab.time'), null], ...axes.map((axis) => [axis.label, axis])]
+    const set = (_, axis) => this.redraw((plot) => plot.over(axis))
+    return buildControls([{ type: 'select', label: words('lab.live.over'), options }], { set }).element
+  }
+
+  /** Change each plot, and draw it anew. */
+  redraw(change) {
+    for (const plot of this.plots) {
+      change(plot)
+      plot.draw(plot.now)
+    }
   }
 
   // --- events of the simulation
@@ -255,7 +270,7 @@ export class Instrument extends Shell {
       const touches = tape.touches.map((at) => ({ time: at, label: this.words('lab.live.touch') }))
       this.tape.show(tape, time, [...marks, ...touches])
       this.showPlay(!resting)
-      this.transport.setRatio(resting ? 1 : realtime)
+      this.transport.setRatio(resting ? 1 : realtime, resting ? Infinity : this.view.rate)
     }
     if (resting || now - this.plotAt >= PLOT_EVERY) {
       this.plotAt = now

@@ -24,6 +24,8 @@ export class Plot {
     this.whole = window === null ? this.recent : new History(this.count, null)
     /** @type {{time: number, resting: boolean, marks: {time: number, label: string}[]}} */
     this.now = PLAYING
+    /** @type {{plot: Plot, column: number, label: string} | null} the curve against which the reader wants this drawn */
+    this.axis = null
     /** @type {number[][] | null} the samples of an earlier run */
     this.kept = null
     this.dirty = true
@@ -60,6 +62,13 @@ export class Plot {
     this.dirty = true
   }
 
+  /** Draw against a curve of this plot or of one with the same times, or null: as the config says. @param {Plot['axis']} axis */
+  over(axis) {
+    this.axis = axis
+    this.chart.name(axis === null ? this.config : { ...this.config, xlabel: axis.label, xmin: null, xmax: null, points: null })
+    this.dirty = true
+  }
+
   /**
    * Draw what is new.
    *
@@ -72,16 +81,17 @@ export class Plot {
     const { time, resting, marks } = now
     if (!this.dirty && resting === before.resting && (!resting || time === before.time)) return
     this.dirty = false
-    const { config, kept } = this
-    const history = resting ? this.whole : this.recent
-    const curves = (columns) => {
+    const { config, kept, axis } = this
+    const history = resting || axis ? this.whole : this.recent
+    const curves = (columns, others) => {
       const [times, ...traces] = columns
-      return { times, x: config.x ? traces.pop() : times, traces }
+      const x = config.x ? traces.pop() : times
+      return { times, x: axis ? others[axis.column] : x, traces }
     }
     this.chart.draw({
-      ...curves(history.columns),
-      ghost: kept && curves(kept),
-      across: config.x ? null : this.timeRange(history.last),
+      ...curves(history.columns, axis?.plot.whole.columns),
+      ghost: kept && curves(kept, axis?.plot.kept),
+      across: config.x || axis ? null : this.timeRange(history.last),
       at: resting ? time : Infinity,
       from: resting ? time - (config.window ?? Infinity) : undefined,
       pale: resting,

@@ -162,8 +162,9 @@ export class Hands {
 
   onKey(event) {
     const { camera } = this.view
-    if (camera === null || event.altKey || event.ctrlKey || event.metaKey) return
-    const action = this.cameraKey(event.key, event.shiftKey, camera) ?? this.actions.keys[event.key.toLowerCase()]
+    if (event.altKey || event.ctrlKey || event.metaKey) return
+    const turn = camera && this.cameraKey(event.key, event.shiftKey, camera) // there is none before the model is loaded
+    const action = turn ?? this.actions.keys[event.key.toLowerCase()]
     if (action === undefined) return
     event.preventDefault()
     action()

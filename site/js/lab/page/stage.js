@@ -7,7 +7,8 @@
  * views move at once the canvas stands in none of them and each picture is copied. Without a graphics processor a picture that
  * moves is deferred, so that nobody waits for it there either.
  *
- * Pictures are drawn from requestAnimationFrame, and only where something changed.
+ * Pictures are drawn from requestAnimationFrame, and only where something changed. Those of a view that moves are drawn coarser if they
+ * are fewer than 30 a second by the median, twice; are they still fewer, the view's `rate` says how many.
  */
 
 import {
@@ -18,6 +19,10 @@ import { h } from './dom.js'
 
 const SHARPEST = 3 // device pixels per CSS pixel
 const STILL = 2 // device pixels per CSS pixel, at least, of a picture at rest without a graphics processor
+const SLOWEST = 34.5 // ms from one picture to the next, at 30 a second by a clock that is not exact
+const LOOKS = 20 // pictures of which the median counts
+const COARSER = 0.7 // times as many pixels across
+const COARSEST = 0.5
 const SOFTWARE = /swiftshader|llvmpipe|software|basic render/i
 
 // MuJoCo computes with colours as they are written: no conversion to light intensities and back.
@@ -33,6 +38,15 @@ export class Stage {
     this.holder = null
     this.request = 0
     this.tick = (now) => this.paint(now)
+    this.setPace()
+  }
+
+  /** Forget how fast pictures were drawn, and how coarsely. */
+  setPace() {
+    this.scale = 1
+    this.began = NaN // when the last picture was begun, unless nothing waited for its end
+    this.spans = []
+    if (this.holder) this.holder.rate = Infinity
   }
 
   /** Start WebGL; throws if there is none. */
@@ -52,13 +66,15 @@ export class Stage {
   /** Device pixels per CSS pixel. Without a graphics processor moving pictures are coarse, and pictures at rest fine. */
   get sharpness() {
     const real = globalThis.devicePixelRatio || 1
-    if (!this.software) return Math.min(SHARPEST, real)
-    return this.movingViews.size > 0 ? 1 : Math.max(STILL, real)
+    const isMoving = this.movingViews.size > 0
+    if (this.software) return isMoving ? this.scale : Math.max(STILL, real)
+    return Math.min(SHARPEST, real) * (isMoving ? this.scale : 1)
   }
 
   add(view) {
     this.start()
     this.views.add(view)
+    this.setPace()
   }
 
   remove(view) {
@@ -92,6 +108,7 @@ export class Stage {
 
   giveCanvas(view) {
     const previous = this.holder
+    this.setPace()
     this.holder = view
     const canvas = this.renderer.domElement
     if (previous !== null && this.views.has(previous)) {
@@ -116,12 +133,23 @@ export class Stage {
     const isHolderDue = holder !== null && (others.length > 0 || dirty.has(holder)) && holder.prepare(now)
     dirty.clear()
     for (const view of others) this.show(view)
-    if (!isHolderDue) return
-    if (this.deferred === null || others.length > 0 || this.movingViews.size === 0) this.show(holder)
-    else {
-      this.deferred.begin(holder, this.sharpness, () => this.render(holder))
-      this.plan()
-    }
+    const isAlone = isHolderDue && others.length === 0 && this.movingViews.size > 0
+    this.keepPace(isAlone ? now : NaN)
+    if (isAlone) this.plan() // to see whether the next one waits for it
+    if (isAlone && this.deferred !== null) this.deferred.begin(holder, this.sharpness, () => this.render(holder))
+    else if (isHolderDue) this.show(holder)
+  }
+
+  /** Note that a picture is begun as soon as the one before allows, at a time (ms); NaN: that none is. */
+  keepPace(now) {
+    const span = now - this.began
+    this.began = now
+    if (Number.isNaN(span) || this.spans.push(span) < LOOKS) return
+    const median = this.spans.sort((a, b) => a - b)[LOOKS / 2]
+    this.spans = []
+    const isSlow = median > SLOWEST
+    this.holder.rate = isSlow && this.scale <= COARSEST ? 1000 / median : Infinity
+    if (isSlow && this.scale > COARSEST) this.scale *= COARSER
   }
 
   finishDeferred() {

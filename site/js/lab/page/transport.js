@@ -55,8 +55,10 @@ export function buildTransport(words, actions) {
     setText(text) {
       if (time.textContent !== text) time.textContent = text
     },
-    setRatio(ratio) {
-      const text = ratio < ON_TIME ? words('lab.live.ratio', { ratio: formatRough(ratio) }) : ''
+    /** @param {number} ratio of simulated to real time @param {number} [rate] pictures a second, if they are too few */
+    setRatio(ratio, rate = Infinity) {
+      const said = rate < Infinity ? words('lab.live.rate', { n: Math.round(rate) }) : ''
+      const text = ratio < ON_TIME ? words('lab.live.ratio', { ratio: formatRough(ratio) }) : said
       if (late.textContent !== text) late.textContent = text
     },
     setEnabled(isEnabled) {

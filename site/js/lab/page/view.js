@@ -43,6 +43,7 @@ export class View {
     this.world = null
     this.camera = null
     this.frame = null
+    this.rate = Infinity // pictures a second, if they are too few (stage.js)
     this.ghost = null // another pose that is shown, see `World.pose`
     this.width = 0
     this.height = 0
