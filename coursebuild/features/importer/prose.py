@@ -21,7 +21,7 @@ from coursebuild.features.importer.anchors import (
     write_target,
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
-from coursebuild.features.importer.displays import WORDS, normalize_formulas, read_escapes
+from coursebuild.features.importer.displays import WORDS, read_formulas
 from coursebuild.features.importer.pandoc_tables import (
     MEANING,
     cut_rows,
@@ -59,6 +59,7 @@ _KEY = r"\w(?:[\w.:/+-]*\w)?"
 _PLACE = r"(?:<[^<>\n]+>|(?:[^()\s<]|\([^()\s]*\))(?:[^()\s]|\([^()\s]*\))*)"
 _ALT = regex(r"\balt=(['\"])(.*?)\1")
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
+_DOLLAR = r"(?<!(?<!\\)\\)\$"
 # A formula holds no beginning of another, so that each character is looked at a few times only.
 _LINE = regex(
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
@@ -67,8 +68,8 @@ _LINE = regex(
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`|(?<!!)\[[^\[\]\n`]*\](?!\())*)\]"
     rf"\((?P<address>(?:@ref[ ]+)?{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
-    r"|(?P<digits>\$(?P<tex>(?!\\\$)[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
-    rf"|(?P<math>\$\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
+    rf"|(?P<digits>{_DOLLAR}(?P<tex>(?!\\\$)[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
+    rf"|(?P<math>{_DOLLAR}\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
     r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
     r"|(?P<anchor>(?<!!)\[(?P<bare>(?:[^\[\]\n`]|!\[[^\[\]\n]*\]\([^()\n]*\))*)\]\(\)(?:\{[^{}\n]*\})?)"
@@ -80,7 +81,8 @@ _LINE = regex(
     r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
     r"|(?<!\^)\^(?:[^\s\^\[\]]|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
-    r"|(?P<wiki>!?\[\[(?!@)(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
+    r"|(?P<wiki>!?\[\[(?!@)(?P<page>[^\[\]|#\n\\]*)(?P<part>#[^\[\]|\n\\]*)?"
+    r"(?:\\?\|(?P<shown>[^\[\]\n]+))?\]\])"  # in a table, Obsidian escapes the bar
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
     r"|(?P<latex>\\(?:newline|newpage|pagebreak|clearpage|noindent|(?:small|med|big)skip|[hv]fill|pause"
     r"|(?:footnote|script|normal)size)"
@@ -204,11 +206,8 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = account.replace(text, *rule)
     if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
         text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
-    if context.path.endswith(".md"):
-        text = read_escapes(text)
-    if context.files.dollars != "\n":
-        text = normalize_formulas(text)
-    text = join_broken_lines(text)
+    opening, is_markdown = context.files.dollars, context.path.endswith(".md")
+    text = join_broken_lines(read_formulas(text, opening, escapes=is_markdown))
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
     text = rewrite_html_links(text, context)
     for abbreviation in _ABBREVIATION.finditer(text):
@@ -333,8 +332,6 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if match["path"] is not None:
                 return write_link(words, context.resolve_anchor(to_anchor(match["path"])))
             return words if re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called) else whole
-        case "math" | "digits" if not whole.startswith(context.files.dollars):
-            return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "digits" if _WORD.search(match["tex"]):  # two prices
             return "$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if context.files.dollars != "$":

@@ -248,11 +248,12 @@ class SourceFiles:
         """What begins a formula: two dollars in GitBook, none where settings name no extension."""
         if (self.folder / ".gitbook.yaml").is_file():
             return "$$"
-        names = map(self.find_settings, ("mkdocs.yml", "book.toml", self.docusaurus))
-        path = next(filter(None, names), "")
+        names = ("mkdocs.yml", "book.toml", self.docusaurus, "book.json")
+        path = next(filter(None, map(self.find_settings, names)), "")
         pattern = "[Mm]ath|arithmatex|[Kk]a[Tt]e[Xx]|INHERIT"
-        is_math = re.search(pattern, path and self.read_text(path))
-        return "$" if is_math or not path else "\n"  # no formula begins with the end of a line
+        if path and not re.search(pattern, self.read_text(path)):
+            return "\n"  # no formula begins with the end of a line
+        return "$$" if path == "book.json" else "$"
 
     @cached_property
     def docusaurus(self) -> str:

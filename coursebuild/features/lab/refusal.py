@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from coursebuild.api import Diagnostic, Excerpt, Source, Span, diagnose
@@ -11,32 +11,26 @@ from coursebuild.core.run.mjcf import existing_files, read_tags
 from coursebuild.features.lab.model import Lab
 
 _NO_PLUGIN = "invalid plugin slot"
-_NO_MEMORY = "ould not allocate memory"
-"""Parts of what MuJoCo says."""
+"""Part of what MuJoCo says."""
 _PART_OF_MODEL = 20
 """Engine, model and states together take up to 16 times the memory of a large compiled model."""
 
 
 def diagnose_refusal(lab: Lab, root: Path, model: Source, message: str) -> list[Diagnostic]:
-    """The diagnostics of an engine's message about what a model asks for; none of another one."""
-    texts = list(_model_texts(lab, root, model))
-    if _NO_PLUGIN in message:
-        places = _first_places(texts, "plugin", "plugin")
-        help = "leave the lab out, or write what the plugin does as the lab's controller"
-        return [
-            diagnose("lab-engine", place, f"the browser's engine has no plugin `{name}`", help=help)
-            for name, place in places.items()
-        ] or [
-            diagnose("lab-engine", lab.place(()), "the browser's engine has no plugins", help=help)
-        ]
-    if _NO_MEMORY in message:
-        places = _first_places(texts, "size", "memory")
-        help = "give it less `memory`, or leave that out: MuJoCo finds by itself what most need"
-        return [
-            diagnose("lab-engine", place, f"an engine of labs cannot reserve {size}B", help=help)
-            for size, place in places.items()
-        ]
-    return []
+    """The diagnostics of an engine's message about plugins of a model; none of another one."""
+    if _NO_PLUGIN not in message:
+        return []
+    places: dict[str, Span] = {}
+    for text in _model_texts(lab, root, model):
+        for element in read_tags(text.text):
+            for name, value, place in element.attributes:
+                if (element.name, name) == ("plugin", "plugin"):
+                    places.setdefault(value, text.span(*place))
+    help = "leave the lab out, or write what the plugin does as the lab's controller"
+    return [
+        diagnose("lab-engine", place, f"the browser's engine has no plugin `{name}`", help=help)
+        for name, place in places.items()
+    ] or [diagnose("lab-engine", lab.place(()), "the browser's engine has no plugins", help=help)]
 
 
 def diagnose_size(lab: Lab, mjb: bytes, memory: int) -> list[Diagnostic]:
@@ -58,14 +52,3 @@ def _model_texts(lab: Lab, root: Path, model: Source) -> Iterator[Excerpt | Sour
     for path in existing_files(root, model.path, model.text):
         if path.endswith(".xml") and not Path(path).is_absolute():
             yield Source(path, read_bytes(root, path).decode("utf-8", "replace"))
-
-
-def _first_places(texts: Iterable[Excerpt | Source], tag: str, attribute: str) -> dict[str, Span]:
-    """The values of an attribute, each with the place where it first stands."""
-    places: dict[str, Span] = {}
-    for text in texts:
-        for element in read_tags(text.text):
-            for name, value, place in element.attributes:
-                if (element.name, name) == (tag, attribute):
-                    places.setdefault(value, text.span(*place))
-    return places

@@ -18,7 +18,7 @@ from coursebuild.core.run.v8 import StoppedError
 from coursebuild.features.lab.engines import browser, native
 from coursebuild.features.lab.engines.browser import LabEngine
 from coursebuild.features.lab.engines.native import LAB_ENGINE
-from support.lab_values import BALL, Bench, make_lab, request
+from support.lab_values import BALL, Bench, lab_of, make_lab, request
 from support.runners import processor_time
 from support.waiting import wait_until
 
@@ -73,6 +73,16 @@ def test_memory_that_runs_out_takes_no_other_lab_along(tmp_path: Path) -> None:
         reply = bench.trial(make_lab(setup=eat))
         assert failures_of(reply) == [(("setup",), "timeout", "took more than 160 MiB")]
         assert failures_of(bench.trial(make_lab())) == []
+
+
+def test_what_a_model_reserves_is_no_reason_to_refuse_it(bench: Bench) -> None:
+    """Of a simulation as large as three of MuJoCo's examples, it uses a few hundredths."""
+    for size in ("1G", "20G"):
+        xml = BALL.replace("<mujoco>", f'<mujoco><size memory="{size}"/>')
+        lab = make_lab(xml=xml, verify={"seconds": 0.1})
+        assert bench.parity(lab)["first"] is None
+        reply = bench.trial(lab_of(f"Text.\n\n```lab mjcf\n{xml}\n```\n"))
+        assert (failures_of(reply), reply["main"]["diverged"]) == ([], False)
 
 
 @pytest.mark.long

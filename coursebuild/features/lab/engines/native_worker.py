@@ -8,6 +8,7 @@ takes more processor time than its limit ends this process by SIGPROF.
 from __future__ import annotations
 
 import base64
+import contextlib
 import json
 import os
 import re
@@ -19,6 +20,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
+
+_NO_MEMORY = "ould not allocate memory"
+"""Part of what MuJoCo says."""
 
 
 def main() -> None:
@@ -76,11 +80,26 @@ def _computes(name: str) -> bool:
 
 
 def _save(request: Any) -> dict[str, Any]:
-    path = request["path"]
-    model = mujoco.MjModel.from_xml_path(path, assets={path: request["text"].encode()})
+    model = _compile(request["path"], {request["path"]: request["text"].encode()})
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
     return {"mjb": base64.b64encode(buffer.tobytes()).decode()}
+
+
+def _compile(path: str, assets: dict[str, bytes]) -> Any:
+    """Compile a model; where there is no room for what it reserves, it reserves less."""
+    try:
+        return mujoco.MjModel.from_xml_path(path, assets=assets)
+    except ValueError as error:
+        if _NO_MEMORY not in str(error):
+            raise
+    spec = mujoco.MjSpec.from_file(path, include=assets, assets=assets)
+    for power in range(29, 20, -1):
+        spec.memory = 1 << power
+        with contextlib.suppress(ValueError):
+            return spec.compile()
+    spec.memory = 1 << 20  # as much as any model reserves
+    return spec.compile()
 
 
 def _array(packed: Any) -> Any:

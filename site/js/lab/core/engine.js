@@ -100,17 +100,25 @@ export class Engine {
   }
 }
 
+const LEAST = 1 << 20 // bytes that any model reserves
+
 /** A model, its data, and a second data that is only looked at (see `lab.js`). */
 export class Handles {
   constructor(mj, model, own) {
     this.model = typeof model === 'string' ? compileModel(mj, model, own) : readModel(mj, model)
     this.objects = [this.model]
-    try {
-      this.data = this.adopt(new mj.MjData(this.model))
-      this.displayData = this.adopt(new mj.MjData(this.model))
-    } catch (error) {
-      this.dispose()
-      throw new EngineError(`the model has no room: ${error.message}`)
+    while (true) {
+      try {
+        this.data = this.adopt(new mj.MjData(this.model))
+        this.displayData = this.adopt(new mj.MjData(this.model))
+        return
+      } catch (error) {
+        // What a model reserves for contacts and constraints it hardly ever uses; the engine warns if it is full.
+        const half = this.model.narena >> 1
+        this.dispose(half < LEAST ? 0 : 1)
+        if (half < LEAST) throw new EngineError(`the model has no room: ${error.message}`)
+        this.model.narena = half
+      }
     }
   }
 
@@ -120,9 +128,9 @@ export class Handles {
     return object
   }
 
-  /** Delete everything, last made first; a second call does nothing. */
-  dispose() {
-    for (const object of this.objects.splice(0).reverse()) object.delete()
+  /** Delete everything but the first so many, last made first; a second call does nothing. */
+  dispose(kept = 0) {
+    for (const object of this.objects.splice(kept).reverse()) object.delete()
   }
 }
 
@@ -150,14 +158,27 @@ function readModel(mj, bytes) {
 /** The largest model that a page draws without becoming slow, and what a browser has room for; meshes and textures are drawn coarser (core/detail.js). */
 const MOST = { ngeom: 2000, nsite: 2000, nlight: 100, nmeshface: 4_000_000, nhfielddata: 500_000, ntexdata: 512 << 20 }
 
+const RESERVE = /(<size\b[^<>]*?)\bmemory\s*=\s*(["'])[^"'<>]*\2/g
+
 /** Compile MJCF that a reader may have written, and refuse a model that is too large to draw. Of files it finds its own only. */
 function compileModel(mj, text, own) {
-  const model = compileXml(mj, text, own)
+  const model = compileReserving(mj, text, own)
   const field = Object.keys(MOST).find((name) => model[name] > MOST[name])
   if (field === undefined) return model
   const size = model[field]
   model.delete()
   throw new EngineError(`${field} is ${size}, and a page shows models up to ${MOST[field]}`)
+}
+
+/** Compile a model; where there is no room for what its text reserves, it reserves what MuJoCo thinks best. */
+function compileReserving(mj, text, own) {
+  try {
+    return compileXml(mj, text, own)
+  } catch (error) {
+    const less = text.replace(RESERVE, '$1')
+    if (error.fatal || less === text || !/no room|allocate memory|is too big/.test(error.message)) throw error
+    return compileXml(mj, less, own)
+  }
 }
 
 const FOLDER = '/own'
