@@ -23,7 +23,11 @@ from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.bookdown import read_bookdown
 from coursebuild.features.importer.context import LessonContext
-from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
+from coursebuild.features.importer.includes import (
+    append_texts,
+    expand_includes,
+    without_hidden_lines,
+)
 from coursebuild.features.importer.pandoc_tables import number_examples
 from coursebuild.features.importer.segments import RST, read_segments
 from coursebuild.features.importer.source_files import (
@@ -254,7 +258,7 @@ def _read_file(
     try:
         source = files.read_text(text.file)
         if not text.file.endswith(".ipynb"):
-            source = expand_includes(source, text.file, files)
+            source = append_texts(expand_includes(source, text.file, files), text.file, files)
         if text.file.endswith(".Rmd"):
             source = read_bookdown(source)
         if text.file.endswith((".qmd", ".Rmd")):

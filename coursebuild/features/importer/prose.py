@@ -40,6 +40,7 @@ from coursebuild.features.importer.roles import (
     convert_wiki_link,
     draw_emoji,
     join_broken_lines,
+    name_of_picture,
     rewrite_html_links,
     words_of_link,
     write_icon,
@@ -77,8 +78,8 @@ _LINE = regex(
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\](?!\())"
     rf"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst|{'|'.join(PROOF_LABELS)})"
     r"-(?P<label>\w+(?:-\w+)*)\]?)"
-    r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
-    r"|(?<!\^)\^(?:[^\s\^\[\]]|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
+    r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~(?:[^~\s\\]|\\.)+~(?!~)"
+    r"|(?<!\^)\^(?:[^\s\\\^\[\]]|\\.|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?!@)(?P<page>[^\[\]|#\n]*)(?P<part>#[^\[\]|\n]*)?(?:\|(?P<shown>[^\[\]\n]+))?\]\])"
     r"|(?P<auto><(?:project|path|inv|xref):[^<>\s]+>)"
@@ -91,6 +92,7 @@ _LINE = regex(
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
     r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
     r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
+    r"|(?P<blank>(?<!\\)\\[ ])"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-(?P<sign>[\w-]+?)(?:-\d+)?:"
@@ -171,6 +173,7 @@ _KINDS = {
     "marked": ("marked words", "a tag of HTML"),
     "change": ("suggested change", "as if it had been accepted"),
     "latex": ("command of LaTeX", "dropped: it changes no word"),
+    "blank": ("escaped blank", "one at which no line breaks"),
     "mention": ("mention of a lesson", "its new number"),
     "icon": ("icon", "its sign, or its name where it is alone; else dropped"),
     "emoji": ("emoji", "its sign"),
@@ -208,8 +211,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = read_escapes(text)
     if context.files.dollars != "\n":
         text = normalize_formulas(text)
-    text = join_broken_lines(text)
-    text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
+    text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), join_broken_lines(text))
     text = rewrite_html_links(text, context)
     for abbreviation in _ABBREVIATION.finditer(text):
         message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
@@ -302,9 +304,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if re.match("[a-z]+://|//", source):
                 message = f"a picture from another host, `{source}`; it is a link now"
                 context.leave("picture", message)
-                text, end = match.string, match.end()
-                is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
-                alt = alt or source.partition("?")[0].rpartition("/")[2] or source
+                is_in_link = f"[{whole}](" in match.string
+                alt = alt or name_of_picture(source)
                 return alt if is_in_link else f"[{alt}]({source})"
             hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             label = dressing if dressing.startswith("{#fig-") else ""
@@ -337,10 +338,10 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "digits" if _WORD.search(match["tex"]):  # two prices
             return "$".join(_rewrite_line(part, context) for part in whole.split("$"))
-        case "paren" if context.files.dollars != "$":
-            return rf"\({_rewrite_line(match['inner'], context)}\)"
-        case "paren":
+        case "paren" if context.files.dollars == "$":
             return f"${match['inner'].strip()}$"
+        case "paren":
+            return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "square":
             return f"$${match['shown_tex'].strip()}$$"
         case "note" if not context.files.mkdocs:
@@ -378,9 +379,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "told":
             if match["work"] in context.sources:
                 return context.cite_in_words(match["work"], match["cited"] or "")
-            is_label = "myst.yml" in context.files and not match["cited"]
-            address = address_of_label(match["work"], context) if is_label else ""
-            return write_link("", address) or whole
+            label = match["work"] if "myst.yml" in context.files and not match["cited"] else ""
+            return write_link("", label and address_of_label(label, context)) or whole
         case "pair":
             return _rewrite_line(match["held"], context)
         case "substitution":
@@ -389,8 +389,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             mark = whole[:2] if whole[:2] in _MARKS else whole[0]
             if mark != "==" and not context.has_marks:
                 return whole
-            words = _rewrite_line(whole.removeprefix(mark).removesuffix(mark), context)
-            return f"<{_MARKS[mark]}>{words}</{_MARKS[mark]}>"
+            words = whole.removeprefix(mark).removesuffix(mark).replace(r"\ ", "&nbsp;")
+            return f"<{_MARKS[mark]}>{_rewrite_line(words, context)}</{_MARKS[mark]}>"
         case "change":
             words, mark = whole[3:-3], whole[1:3]
             if not context.has_marks:
@@ -400,14 +400,16 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             page, part = match["page"].strip(), match["part"] or ""
             return convert_wiki_link(whole, page, part, match["shown"] or "", context)
         case "auto":
-            address = context.resolve_link(whole[1:-1])
-            return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
+            words = title_of_file(whole[1:-1].partition(":")[2])
+            return write_link(words, context.resolve_link(whole[1:-1]))
         case "latex":
             if not context.has_marks and match.string.strip() != whole.strip():
                 return whole
             if "{" in whole:
                 context.leave("command of LaTeX", f"`{whole}`, which no page here shows")
             return ""
+        case "blank" if context.is_pandoc or "escapeall" in context.files.mkdocs:
+            return "&nbsp;"
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
@@ -422,8 +424,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":
             address = match["named"]
-            label = whole.removesuffix(address)
-            label = label.replace("@", r"\@") if _CITED_KEY.search(label) else label
+            label = _CITED_KEY.sub(r"\@\1", whole.removesuffix(address))
             return label + (context.resolve_link(address) or GONE)
         case "tag":
             return convert_tag(whole, context)
