@@ -101,7 +101,8 @@ _LINE = regex(
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
     r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source|iframe)>)?)"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
-    r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z\d])-{2,3}(?=[A-Za-z\d]))"
+    r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])"
+    r"|(?<=[a-z\d])--(?=[A-Za-z\d])|(?<=[\w,.;:!?)\"'*_`])---(?=[\w(\"'*_`]))"
     rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
 GONE = "gone:"
@@ -178,7 +179,7 @@ _KINDS = {
     "icon": ("icon", "its sign, or its name where it is alone; else dropped"),
     "emoji": ("emoji", "its sign"),
     "block": ("block of Obsidian", "an anchor"),
-    "keys": ("keys", "their names"),
+    "keys": ("keys", "tags of HTML"),
     "definition": ("link by reference", "its new address"),
     "tag": ("tag of HTML", "its new address; without classes, and without `markdown`"),
     "attributes": ("attributes", "an anchor, or dropped: a page has its own look"),
@@ -308,9 +309,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
                 alt = alt or name_of_picture(source)
                 return alt if is_in_link else f"[{alt}]({source})"
             hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
-            label = dressing if dressing.startswith("{#fig-") else ""
             if address := context.resolve_picture(source):
-                return f"![{alt}]({address}{hover}){label}"
+                return f"![{alt}]({address}{hover}){dressing * dressing.startswith('{#fig-')}"
             name = shorten_value(source)
             context.leave("picture", f"the picture `{name}`, which is not in the folder")
             return alt
@@ -418,14 +418,13 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "block" if (context.files.folder / ".obsidian").is_dir():
             return f'<a id="{to_anchor(match["id"])}"></a>'
         case "keys":
-            keys = re.findall(r"[^+\"]+", match["stroke"])
-            return "+".join(key.capitalize() if key.islower() else key for key in keys)
+            stroke = match["stroke"].replace("<", "&lt;")
+            return _STROKE.sub(lambda key: f"<kbd>{key[1] or key[2].capitalize()}</kbd>", stroke)
         case "tail":
             return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":
-            address = match["named"]
-            label = _CITED_KEY.sub(r"\@\1", whole.removesuffix(address))
-            return label + (context.resolve_link(address) or GONE)
+            label = _CITED_KEY.sub(r"\@\1", whole.removesuffix(match["named"]))
+            return label + (context.resolve_link(match["named"]) or GONE)
         case "tag":
             return convert_tag(whole, context)
         case "dashes":
@@ -444,6 +443,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
 _STATEMENTS = regex(r"\s*(?:\{%[^%\n]*%\}\s*)+")
 """A line of nothing but statements of Jinja or Liquid."""
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
+_STROKE = regex(r"\"([^\"]+)\"|([^+]+)")
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = regex(rf"(?<![\w@`])@({_KEY})")
 _WORD = regex(r"(?s)\A(?!.*\\[A-Za-z]).*(?<![A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")
