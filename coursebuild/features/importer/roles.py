@@ -305,6 +305,7 @@ _ATTRIBUTE = regex(
 _WITH_FILE = regex(r"<(?:a|audio|(?P<frame>iframe)|img|source|track|video)\b", re.IGNORECASE)
 LOOK = regex(
     r"(?<=<table)(?:(?!\sid=)[^<>])*?\salign=[\"'\w]+"  # by which words would stand beside it
+    r"|(?<=<t[dh])[ \t]+width=[\"']?\d+%?[\"']?(?=[\s>])"
     r"|[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
 )
 
