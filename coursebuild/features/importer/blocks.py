@@ -34,7 +34,7 @@ _MAX_DEPTH = 20
 """Blocks that may be around another."""
 _DIRECTIVE = regex(r"\{(?P<name>[A-Za-z][\w:.-]*)\}[ \t]*(?P<argument>.*)")
 _TITLE = regex(
-    r"\b(?:title|tab|filename|lst-cap|name)(?:=|:[ ])(?:\"((?:\\.|[^\"\\])*)\"|'([^']*)')"
+    r"\b(?:title|tab|filename|package|lst-cap|name)(?:=|:[ ])(?:\"((?:\\.|[^\"\\])*)\"|'([^']*)')"
 )
 _TAB = "tab", "a title in bold, and what it holds: pages show one tab below the other"
 _CAMERA = regex(r'"camera"\s*:\s*\{(?:[^{}])*\}')

@@ -11,6 +11,7 @@ import json
 import posixpath
 import re
 from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -23,7 +24,11 @@ from coursebuild.core.syntax.toml_text import toml_string
 from coursebuild.features.importer.account import shorten_value
 from coursebuild.features.importer.bookdown import read_bookdown
 from coursebuild.features.importer.context import LessonContext
-from coursebuild.features.importer.includes import expand_includes, without_hidden_lines
+from coursebuild.features.importer.includes import (
+    append_texts,
+    expand_includes,
+    without_hidden_lines,
+)
 from coursebuild.features.importer.pandoc_tables import number_examples
 from coursebuild.features.importer.segments import RST, read_segments
 from coursebuild.features.importer.source_files import (
@@ -31,7 +36,9 @@ from coursebuild.features.importer.source_files import (
     ImportedCourse,
     ImportedLevel,
     ImportedText,
+    Segment,
     SourceFiles,
+    read_yaml,
     stem_of,
     title_of_file,
 )
@@ -254,7 +261,7 @@ def _read_file(
     try:
         source = files.read_text(text.file)
         if not text.file.endswith(".ipynb"):
-            source = expand_includes(source, text.file, files)
+            source = append_texts(expand_includes(source, text.file, files), text.file, files)
         if text.file.endswith(".Rmd"):
             source = read_bookdown(source)
         if text.file.endswith((".qmd", ".Rmd")):
@@ -272,6 +279,14 @@ def _read_file(
             source = visible_text
         raw_formats = RST | {""} if "conf.py" in files else RST  # as Sphinx reads them
         read, lost = read_segments(source, text, raw_formats)
+        listing = lost.get("listing", [])
+        listing = {"contents": "*"} if isinstance(listing, str) else listing  # its type alone
+        lines = "\n".join(_listing_lines(listing, text.file, files))
+        if lines:
+            files.change("list of other texts", "its entries, as links")
+            last = Segment(kind="prose", place=f"line {source.count(chr(10)) + 1}", text=lines)
+            read = replace(read, segments=(*read.segments, last))
+            lost = {key: value for key, value in lost.items() if key != "listing"}
     except RecursionError:
         raise UsageError(f"{text.file} is nested too deeply") from None
     if read.summary and not id:
@@ -304,6 +319,45 @@ def _read_file(
     )
 
 
+def _listing_lines(value: object, path: str, files: SourceFiles) -> Iterator[str]:
+    """Yield what Quarto lists in a text as Markdown: entries with an address, below their titles.
+
+    They stand in the settings of the text, in files of YAML, or are the texts of a pattern.
+    """
+    parts = value if isinstance(value, list) else [value]
+    for part in parts:
+        if isinstance(part, str):
+            pattern = posixpath.normpath(posixpath.join(posixpath.dirname(path), part))
+            if part.endswith((".yml", ".yaml")):
+                entries = read_yaml(files.read_text(pattern)) if pattern in files else None
+                yield from _entry_lines(entries, path, files)
+            for name in files:
+                if name != path and name.endswith(TEXTS) and fnmatchcase(name, pattern):
+                    yield f"- [](</{name}>)"
+        else:
+            yield from _entry_lines(part, path, files)
+
+
+def _entry_lines(value: object, path: str, files: SourceFiles) -> Iterator[str]:
+    if isinstance(value, list):
+        for part in value:
+            yield from _entry_lines(part, path, files)
+    elif isinstance(value, Mapping):
+        title, words, address = (
+            next((" ".join(str(value[name]).split()) for name in names if value.get(name)), "")
+            for names in _ENTRY_KEYS
+        )
+        if address or title:
+            start = f"- [{title}](<{address}>)" if address else f"\n**{title}**\n"
+            yield f"{start}: {words}" if address and words else f"{start}{words}"
+        yield from _listing_lines(value.get("contents") or [], path, files)
+        for key, part in value.items():
+            if key != "contents":
+                yield from _entry_lines(part, path, files)
+
+
+_ENTRY_KEYS = (("title", "category"), ("subtitle", "description"), ("path", "href"))
+"""Of an entry in a list of texts: what it is called, what it is about, its address."""
 _COLOURING = (
     r"^[ \t]*(?:#|//|--|%|/\*|<!--|\{{/\*)[ \t]*{}-(?:next-line|start|end)\b[^\w\n]*(?:\n|\Z)"
 )

@@ -114,12 +114,45 @@ def expand_includes(
         indent = mark["indent"] or re.split(r"[^ \t]|\n", text[: mark.start()])[-1]
         return (mark["indent"] or "") + included.replace("\n", f"\n{indent}")
 
-    return _MARK.sub(expand, _place_imports(text))
+    return _MARK.sub(expand, _SNIPPETS.sub(_name_each, _place_imports(text)))
+
+
+_SNIPPETS = regex(
+    r"^(?P<mark>[ \t]*-{1,}8<-{1,})[ \t]*\n(?P<names>(?:(?![ \t]*-+8<)[^\n]*\n)*)(?P=mark)[ \t]*$",
+    re.MULTILINE,
+)
+"""Files that MkDocs includes one below the other: a name a line, none behind a semicolon."""
+
+
+def _name_each(block: re.Match[str]) -> str:
+    names = (line.strip() for line in block["names"].splitlines())
+    return "\n".join(f'{block["mark"]} "{n}"' if n and n[0] != ";" else "" for n in names)
+
+
+_DEFINITION = regex(
+    r"^(?:\*(?P<short>)|[ ]{0,3})\[(?P<label>[^\[\]\n]+)\]:.*(?:\n|\Z)", re.MULTILINE
+)
+
+
+def append_texts(text: str, path: str, files: SourceFiles) -> str:
+    """Return a text with those that MkDocs appends to each, but for what these define unused."""
+    marks = (f'--8<-- "{name}"\n\n' for name in files.mkdocs_values("auto_append"))
+    appended = expand_includes("".join(marks), path, files)
+    folded = text.casefold()
+
+    def keep(definition: re.Match[str]) -> str:
+        name = definition["label"].casefold()
+        return (
+            definition[0] if (name if definition[1] is not None else f"[{name}]") in folded else ""
+        )
+
+    return f"{text}\n\n{_DEFINITION.sub(keep, appended)}" if appended else text
 
 
 def _find(name: str, path: str, files: SourceFiles) -> str:
     """Return the path of a file that a text names, from its own folder or another that may be."""
-    for folder in (*map(str, PurePosixPath(path).parents), *files.included_folders):
+    folders = files.mkdocs_values("base_path", "include_dir")
+    for folder in (*map(str, PurePosixPath(path).parents), *folders):
         path = posixpath.normpath(posixpath.join(folder, name.lstrip("/")))
         if place := files.find(path, is_hidden=path.endswith(TEXTS)):
             return place

@@ -40,6 +40,7 @@ from coursebuild.features.importer.roles import (
     convert_wiki_link,
     draw_emoji,
     join_broken_lines,
+    name_of_picture,
     rewrite_html_links,
     words_of_link,
     write_icon,
@@ -78,8 +79,8 @@ _LINE = regex(
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\](?!\())"
     rf"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst|{'|'.join(PROOF_LABELS)})"
     r"-(?P<label>\w+(?:-\w+)*)\]?)"
-    r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~[^~\s]+~(?!~)"
-    r"|(?<!\^)\^(?:[^\s\^\[\]]|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
+    r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~(?:[^~\s\\]|\\.)+~(?!~)"
+    r"|(?<!\^)\^(?:[^\s\\\^\[\]]|\\.|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?!@)(?P<page>[^\[\]|#\n\\]*)(?P<part>#[^\[\]|\n\\]*)?"
     r"(?:\\?\|(?P<shown>[^\[\]\n]+))?\]\])"  # in a table, Obsidian escapes the bar
@@ -93,6 +94,7 @@ _LINE = regex(
     r"|(?P<pair>\{%[ ]*(?P<opened>[a-z]\w*)\b[^{}%\n]*%\}"
     r"(?P<held>(?:(?!\{%)[^\n])*)\{%[ ]*end(?P=opened)[ ]*%\})"
     r"|(?P<substitution>\{\{[^{}\n]*\}\}|\{%[^%\n]*%\})"
+    r"|(?P<blank>(?<!\\)\\[ ])"
     r"|(?P<mention>\bLevel[ \u00a0](?P<level>\d+\.\d+)\b)"
     rf"|(?P<tail>\]\((?P<rest>{_PLACE})(?=(?:{_LINK_TITLE})?[ \t]*\)))"  # its text is above
     r"|(?P<icon>:(?:material|octicons|fontawesome|simple)-(?P<sign>[\w-]+?)(?:-\d+)?:"
@@ -101,7 +103,8 @@ _LINE = regex(
     r"|(?P<keys>(?<![\w+])\+\+(?P<stroke>(?:[a-z0-9-]+|\"[^\"\n]+\")(?:\+(?:[a-z0-9-]+|\"[^\"\n]+\"))*)\+\+(?![\w+]))"
     r"|(?P<tag><[A-Za-z][\w-]*[ \t][^<>\n]*>(?:</(?i:img|source|iframe)>)?)"
     rf"|(?P<attributes>(?:(?<=[^\s$])|(?<=[^$]\$)|^(?::[ ])?)(?:[ ]+#+)?[ ]?{_ATTRIBUTES})"
-    r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])|(?<=[a-z\d])-{2,3}(?=[A-Za-z\d]))"
+    r"|(?P<dashes>(?<=[\w,.;:!?)\"'*_`][ ])-{2,3}(?=[ ])"
+    r"|(?<=[a-z\d])--(?=[A-Za-z\d])|(?<=[\w,.;:!?)\"'*_`])---(?=[\w(\"'*_`]))"
     rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
 GONE = "gone:"
@@ -173,11 +176,12 @@ _KINDS = {
     "marked": ("marked words", "a tag of HTML"),
     "change": ("suggested change", "as if it had been accepted"),
     "latex": ("command of LaTeX", "dropped: it changes no word"),
+    "blank": ("escaped blank", "one at which no line breaks"),
     "mention": ("mention of a lesson", "its new number"),
     "icon": ("icon", "its sign, or its name where it is alone; else dropped"),
     "emoji": ("emoji", "its sign"),
     "block": ("block of Obsidian", "an anchor"),
-    "keys": ("keys", "their names"),
+    "keys": ("keys", "tags of HTML"),
     "definition": ("link by reference", "its new address"),
     "tag": ("tag of HTML", "its new address; without classes, and without `markdown`"),
     "attributes": ("attributes", "an anchor, or dropped: a page has its own look"),
@@ -301,14 +305,12 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if re.match("[a-z]+://|//", source):
                 message = f"a picture from another host, `{source}`; it is a link now"
                 context.leave("picture", message)
-                text, end = match.string, match.end()
-                is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
-                alt = alt or source.partition("?")[0].rpartition("/")[2] or source
+                is_in_link = f"[{whole}](" in match.string
+                alt = alt or name_of_picture(source)
                 return alt if is_in_link else f"[{alt}]({source})"
             hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
-            label = dressing if dressing.startswith("{#fig-") else ""
             if address := context.resolve_picture(source):
-                return f"![{alt}]({address}{hover}){label}"
+                return f"![{alt}]({address}{hover}){dressing * dressing.startswith('{#fig-')}"
             name = shorten_value(source)
             context.leave("picture", f"the picture `{name}`, which is not in the folder")
             return alt
@@ -334,10 +336,10 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             return words if re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called) else whole
         case "digits" if _WORD.search(match["tex"]):  # two prices
             return "$".join(_rewrite_line(part, context) for part in whole.split("$"))
-        case "paren" if context.files.dollars != "$":
-            return rf"\({_rewrite_line(match['inner'], context)}\)"
-        case "paren":
+        case "paren" if context.files.dollars == "$":
             return f"${match['inner'].strip()}$"
+        case "paren":
+            return rf"\({_rewrite_line(match['inner'], context)}\)"
         case "square":
             return f"$${match['shown_tex'].strip()}$$"
         case "note" if not context.files.mkdocs:
@@ -375,9 +377,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "told":
             if match["work"] in context.sources:
                 return context.cite_in_words(match["work"], match["cited"] or "")
-            is_label = "myst.yml" in context.files and not match["cited"]
-            address = address_of_label(match["work"], context) if is_label else ""
-            return write_link("", address) or whole
+            label = match["work"] if "myst.yml" in context.files and not match["cited"] else ""
+            return write_link("", label and address_of_label(label, context)) or whole
         case "pair":
             return _rewrite_line(match["held"], context)
         case "substitution":
@@ -386,8 +387,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             mark = whole[:2] if whole[:2] in _MARKS else whole[0]
             if mark != "==" and not context.has_marks:
                 return whole
-            words = _rewrite_line(whole.removeprefix(mark).removesuffix(mark), context)
-            return f"<{_MARKS[mark]}>{words}</{_MARKS[mark]}>"
+            words = whole.removeprefix(mark).removesuffix(mark).replace(r"\ ", "&nbsp;")
+            return f"<{_MARKS[mark]}>{_rewrite_line(words, context)}</{_MARKS[mark]}>"
         case "change":
             words, mark = whole[3:-3], whole[1:3]
             if not context.has_marks:
@@ -397,14 +398,16 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             page, part = match["page"].strip(), match["part"] or ""
             return convert_wiki_link(whole, page, part, match["shown"] or "", context)
         case "auto":
-            address = context.resolve_link(whole[1:-1])
-            return write_link(title_of_file(whole[1:-1].partition(":")[2]), address)
+            words = title_of_file(whole[1:-1].partition(":")[2])
+            return write_link(words, context.resolve_link(whole[1:-1]))
         case "latex":
             if not context.has_marks and match.string.strip() != whole.strip():
                 return whole
             if "{" in whole:
                 context.leave("command of LaTeX", f"`{whole}`, which no page here shows")
             return ""
+        case "blank" if context.is_pandoc or "escapeall" in context.files.mkdocs:
+            return "&nbsp;"
         case "mention":
             lesson_id = context.ids.get(match["level"])
             return whole if lesson_id is None else f"Lesson {lesson_id}"
@@ -413,15 +416,13 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "block" if (context.files.folder / ".obsidian").is_dir():
             return f'<a id="{to_anchor(match["id"])}"></a>'
         case "keys":
-            keys = re.findall(r"[^+\"]+", match["stroke"])
-            return "+".join(key.capitalize() if key.islower() else key for key in keys)
+            stroke = match["stroke"].replace("<", "&lt;")
+            return _STROKE.sub(lambda key: f"<kbd>{key[1] or key[2].capitalize()}</kbd>", stroke)
         case "tail":
             return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":
-            address = match["named"]
-            label = whole.removesuffix(address)
-            label = label.replace("@", r"\@") if _CITED_KEY.search(label) else label
-            return label + (context.resolve_link(address) or GONE)
+            label = _CITED_KEY.sub(r"\@\1", whole.removesuffix(match["named"]))
+            return label + (context.resolve_link(match["named"]) or GONE)
         case "tag":
             return convert_tag(whole, context)
         case "dashes":
@@ -440,6 +441,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
 _STATEMENTS = regex(r"\s*(?:\{%[^%\n]*%\}\s*)+")
 """A line of nothing but statements of Jinja or Liquid."""
 _MARKS = {"==": "mark", "^^": "ins", "~": "sub", "^": "sup"}
+_STROKE = regex(r"\"([^\"]+)\"|([^+]+)")
 _CROSS_KINDS = ("eq", "sec", "fig", "tbl", "lst", *PROOF_LABELS)
 _CITED_KEY = regex(rf"(?<![\w@`])@({_KEY})")
 _WORD = regex(r"(?s)\A(?!.*\\[A-Za-z]).*(?<![A-Za-z{])[A-Za-z]{2,}(?![A-Za-z]*\})")

@@ -13,7 +13,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from textwrap import shorten
 from unicodedata import normalize
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
 from msgspec import Struct
 
@@ -24,6 +24,7 @@ from coursebuild.core.scripts.edit import apply_edits
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.features.importer.displays import DEFINITION
 from coursebuild.features.importer.prose import GONE
+from coursebuild.features.importer.roles import name_of_picture
 from coursebuild.features.importer.source_files import find_group, title_of_file
 
 _GONE = regex(rf"^[ ]{{0,3}}\[[^\[\]\n]+\]:[ \t]*{GONE}.*\n?", re.MULTILINE)
@@ -120,7 +121,7 @@ def _read(
         links = [link_node.span for link_node in model.find_inlines(document, model.Link)]
         for image in model.find_inlines(document, model.Image):
             if _ELSEWHERE.match(image.url):
-                place, name = image.span, image.url.rpartition("/")[2]
+                place, name = image.span, name_of_picture(image.url)
                 is_in_link = any(at.start < place.start and place.end < at.end for at in links)
                 new = f"[{'' if image.alt else name}{place.text.removeprefix('![')}"
                 edits[place.start] = Edit(place, (image.alt or name) if is_in_link else new)
@@ -155,7 +156,7 @@ def _link_to_picture(
     before = source.text[:start].lower()
     is_in_link = before.rfind("<a ") > before.rfind("</a")
     is_named = is_in_link and re.match(r"[^<]*\w", source.text[end:])  # by the words behind it
-    words = alt or ("" if is_named else urlsplit(address.text).path.rpartition("/")[2])
+    words = alt or ("" if is_named else name_of_picture(address.text))
     new = words if is_in_link else f'<a href="{address.text}">{words}</a>'
     span = Span(source, start, end)
     return {start: Edit(_with_line(span), "") if tag.startswith("<source") else Edit(span, new)}

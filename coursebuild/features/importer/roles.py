@@ -62,6 +62,11 @@ def write_link(text: str, address: str, title: str = "") -> str:
     return f"[{text}]({address}{title})" if address else text
 
 
+def name_of_picture(address: str) -> str:
+    """Return what a picture from another host is called where nothing says a word of it."""
+    return address.partition("?")[0].rpartition("/")[2].replace("%20", " ") or address
+
+
 def words_of_link(address: str, old: str) -> str:
     """Return what a link without words is called; nothing where the page knows the title."""
     if re.match("#|lesson:|page:", address):
@@ -180,6 +185,8 @@ def convert_code(whole: str, context: LessonContext) -> str:
             return raw[2]
         context.leave("code in a line", f"{whole}, which is for other forms than a site")
         return ""
+    if formula := re.fullmatch(r"`#!math (.+)`", whole):
+        return convert_role("math", formula[1], context)
     run = _INLINE_RUN.fullmatch(whole)
     if context.is_pandoc:  # the name of an object, as filters mark it
         whole = re.sub(r"\A(`+)~~(?=[A-Za-z][\w.]*(?:\(\))?\1\Z)", r"\1", whole)
@@ -298,6 +305,7 @@ _ATTRIBUTE = regex(
 _WITH_FILE = regex(r"<(?:a|audio|(?P<frame>iframe)|img|source|track|video)\b", re.IGNORECASE)
 LOOK = regex(
     r"(?<=<table)(?:(?!\sid=)[^<>])*?\salign=[\"'\w]+"  # by which words would stand beside it
+    r"|(?<=<t[dh])[ \t]+width=[\"']?\d+%?[\"']?(?=[\s>])"
     r"|[ \t]+(?:class=(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>]+)|markdown(?:=[\"'\w]+)?(?=[ \t>]))"
 )
 

@@ -19,6 +19,12 @@ _INLINE = regex(
     r"(?P<code>``.+?``)|(?<![\w:]):(?P<role>[A-Za-z][\w:+.-]*):`(?P<body>[^`]+)`"
     r"|`(?P<words>[^`<>]*\S)\s*<(?P<address>[^`<>]+)>`__?"
 )
+_LITERAL = regex(
+    r"^(?P<line>[ ]*(?:(?:[-*+]|\w+[.)])[ ]+)?)(?P<words>[^\n]*?)(?P<end>[ ]*)::[ ]*\n(?:[ ]*\n)+"
+    r"(?P<body>(?P<margin>[ ]+)\S.*(?:\n(?P=margin).*|\n[ ]*(?=\n))*)",
+    re.MULTILINE,
+)
+"""Two colons, which may be alone, and what stands further right below them."""
 _TERM = regex(r"^(?![-*+|#]|\d+[.)])(\S.*\n)[ ]+(?=\S)(.*(?:\n[ ]+\S.*)*)", re.MULTILINE)
 """A term, and what it means, further right on the next lines."""
 
@@ -33,6 +39,19 @@ def read_rst(text: str) -> str:
 
 
 def _read_prose(text: str) -> str:
+    parts, at = [], 0
+    for literal in _LITERAL.finditer(text):
+        words = f"{literal['line']}{literal['words']}{'' if literal['end'] else ':'}"
+        words = words if literal["words"] else ""
+        code = marks.fence("text", textwrap.dedent(literal["body"]).strip("\n"))
+        margin = " " * min(len(literal["line"]), 3)  # further right it would be code in Markdown
+        parts += [_read_words(f"{text[at : literal.start()]}{words}"), "\n\n"]
+        parts += [textwrap.indent(code, margin), "\n"]
+        at = literal.end()
+    return "".join((*parts, _read_words(text[at:])))
+
+
+def _read_words(text: str) -> str:
     return _TERM.sub(r"\1: \2\n", _INLINE.sub(_write_inline, text))
 
 

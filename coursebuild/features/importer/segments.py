@@ -397,8 +397,12 @@ def _read_cells(cells: list[dict[str, Any]], language: str, raw_formats: Set[str
                 lost=tuple(
                     kind
                     for output in outputs
-                    for kind in ({output.get("name"): 1} | (output.get("data") or {}))
-                    if kind in _LOST_KINDS
+                    for kind in (
+                        output.get("name"),
+                        output.get("output_type"),
+                        *(output.get("data") or ()),
+                    )
+                    if kind in _LOST_KINDS and (kind != "error" or "raises-exception" not in tags)
                 ),
             )
             segments.append(cell_segment)
@@ -411,7 +415,7 @@ def _read_cells(cells: list[dict[str, Any]], language: str, raw_formats: Set[str
 
 
 _LOST_KINDS = frozenset(
-    "stderr text/markdown text/latex image/jpeg image/gif application/javascript "
+    "error stderr text/markdown text/latex image/jpeg image/gif application/javascript "
     "application/vnd.jupyter.widget-view+json".split()
 )
 

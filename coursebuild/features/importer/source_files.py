@@ -167,6 +167,15 @@ def value_at(settings: object, *path: str) -> object:
     return settings
 
 
+def _texts_below(settings: object, names: Sequence[str]) -> Iterator[str]:
+    values = enumerate(settings) if isinstance(settings, list) else ()
+    for name, part in settings.items() if isinstance(settings, Mapping) else values:
+        if name in names:
+            yield from filter(str.__instancecheck__, part if isinstance(part, list) else [part])
+        else:
+            yield from _texts_below(part, names)
+
+
 def find_group(pattern: str | re.Pattern[str], text: str) -> str:
     """Return the last group of the first match of a pattern; empty where there is none."""
     match = re.search(pattern, text) if isinstance(pattern, str) else pattern.search(text)
@@ -263,7 +272,8 @@ class SourceFiles:
 
     def find_settings(self, name: str) -> str:
         """Return the path of settings, whose extension or tool has two names; empty for none."""
-        names = (name, name.replace(".yml", ".yaml"), name.replace("mkdocs", "properdocs"))
+        tools = (name.replace("mkdocs", tool) for tool in ("properdocs", "zensical"))
+        names = (name, name.replace(".yml", ".yaml"), *tools)
         return next((path for path in names if path in self), "")
 
     def settings(self, name: str) -> Mapping[str, Any]:
@@ -282,10 +292,12 @@ class SourceFiles:
         return path and (self.read_text(path) or "\n")
 
     @cached_property
-    def included_folders(self) -> Sequence[str]:
-        """The folders in which MkDocs finds what texts include, besides their own."""
-        pattern = r"\b(?:base_path|include_dir):[ \t]*(?:\[|\n[ \t]*-[ \t]*)?[\"']?([\w./-]+)"
-        return re.findall(pattern, self.mkdocs)
+    def _mkdocs_settings(self) -> Mapping[str, Any]:
+        return self.settings("mkdocs.yml") or self.settings("zensical.toml")
+
+    def mkdocs_values(self, *names: str) -> Sequence[str]:
+        """The texts that the settings of MkDocs have below any of these names, one or a list."""
+        return tuple(_texts_below(self._mkdocs_settings, names))
 
     @cached_property
     def hidden_marks(self) -> Mapping[str, str]:
