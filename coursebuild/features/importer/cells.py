@@ -83,7 +83,7 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     names = ("lst-cap", "tbl-cap", *(() if figure else ("fig-cap",)))
     title = caption_of_code(options, context, names, "" if figure else label)
     label = options.get("lst-label", "").removeprefix("lst-")
-    word += how_shown(options, cell.head, begins=not word)
+    word += how_shown(options, cell.head)
     word += f" {{#lst:{to_anchor(label)}}}" if label else ""
     head, end = f"python file={context.script_path}{word}", f"\n{_END} {len(context.parts)}"
     blocks = [*title, marks.fence(head, code + end)]
@@ -338,15 +338,12 @@ def caption_of_code(
     return [*anchor, f"**{rewrite_prose(words, context)}**"] if words else anchor
 
 
-def how_shown(options: Mapping[str, str], tags: str, *, begins: bool) -> str:
-    """Return the word for a cell whose code its tool folds or hides, after a blank.
-
-    The frame in which a script begins is shown anyway: code that is hidden there is folded.
-    """
+def how_shown(options: Mapping[str, str], tags: str) -> str:
+    """Return the word for a cell whose code its tool folds or hides, after a blank."""
     tags += options.get("tags", "")
     is_hidden = "false" in (options.get("echo"), options.get("include"))
     if is_hidden or re.search("remove-(?:input|cell)", tags):
-        return " folded" if begins else " hidden"
+        return " hidden"
     is_folded = re.search("hide-(?:input|cell)", tags) or options.get("code-fold") == "true"
     return " folded" if is_folded else ""
 

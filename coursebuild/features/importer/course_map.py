@@ -254,7 +254,8 @@ def _read_file(
     try:
         source = files.read_text(text.file)
         if not text.file.endswith(".ipynb"):
-            source = expand_includes(source, text.file, files)
+            ends = (f'\n\n--8<-- "{name}"' for name in files.appended_files)
+            source = expand_includes("".join((source, *ends)), text.file, files)
         if text.file.endswith(".Rmd"):
             source = read_bookdown(source)
         if text.file.endswith((".qmd", ".Rmd")):

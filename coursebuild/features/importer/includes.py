@@ -121,7 +121,7 @@ def _find(name: str, path: str, files: SourceFiles) -> str:
     """Return the path of a file that a text names, from its own folder or another that may be."""
     for folder in (*map(str, PurePosixPath(path).parents), *files.included_folders):
         path = posixpath.normpath(posixpath.join(folder, name.lstrip("/")))
-        if place := files.find(path, is_hidden=path.endswith(TEXTS)):
+        if place := files.find(path, is_hidden=path.endswith((*TEXTS, ".txt"))):
             return place
     return ""
 

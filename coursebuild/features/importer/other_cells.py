@@ -108,7 +108,7 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
         context.leave(kind, f"a {kind}, which its tool does not run, is shown")
         return "\n\n".join((*head, marks.fence(language, code), *write_outputs(cell, context)))
     is_script = language in _SHELLS or language in context.single_languages
-    word = how_shown(options, cell.head, begins=is_script)
+    word = how_shown(options, cell.head)
     if not is_script:
         context.change(kind, "lines of one script, which ends the text")
         cells = context.joined.setdefault(language, JoinedCells(_new_path(language, context)))

@@ -133,7 +133,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             tag = {"underline": "u", "strike": "del"}.get(name, name)
             return f"<{tag}>{body}</{tag}>"
         case _ if name.rpartition(":")[2] in CODE_ROLES:
-            name_of_part = re.sub(r"^(?:!|~(?:.*\.)?)", "", target)  # as Sphinx shows it
+            name_of_part = re.sub(r"^(?:!|~(?:.*\.)?|\.+)", "", target)  # as Sphinx shows it
             return f"`{words or name_of_part}`"
         case _ if name.startswith("bdg-link"):  # a badge
             return write_link(words or target, context.resolve_link(target))

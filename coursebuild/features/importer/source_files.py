@@ -7,6 +7,7 @@ folder downwards, one part of its real path after the other, and none may be a l
 
 from __future__ import annotations
 
+import itertools
 import os
 import posixpath
 import re
@@ -285,6 +286,15 @@ class SourceFiles:
         """The folders in which MkDocs finds what texts include, besides their own."""
         pattern = r"\b(?:base_path|include_dir):[ \t]*(?:\[|\n[ \t]*-[ \t]*)?[\"']?([\w./-]+)"
         return re.findall(pattern, self.mkdocs)
+
+    @cached_property
+    def appended_files(self) -> Sequence[str]:
+        """What MkDocs includes at the end of each text."""
+        extensions = self.settings("mkdocs.yml").get("markdown_extensions")
+        items = extensions if isinstance(extensions, list) else [extensions]
+        names = (value_at(item, "pymdownx.snippets", "auto_append") for item in items)
+        lists = (value for value in names if isinstance(value, list))
+        return [name for name in itertools.chain(*lists) if isinstance(name, str)]
 
     @cached_property
     def hidden_marks(self) -> Mapping[str, str]:
