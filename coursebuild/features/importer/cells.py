@@ -61,8 +61,7 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
             is_of_shell = re.search(r"^[ \t]*(?:!|%[pc])", cell.text, re.MULTILINE)
             language = "sh" if is_of_shell else "python"
             shown_code = COMMENT.sub("", shown_code)
-        blocks = [marks.fence(language, shown_code)] if shown_code else []
-        return "\n\n".join((*blocks, *write_outputs(cell, context)))
+        return show_cell(cell, read_options(cell.text)[0], language, shown_code, context)
     code, figure = _show_columns(_with_new_paths(code, context), context), ""
     options = read_options(cell.text)[0]
     label = find_group(r"\A(fig-.*)", options.get("label", ""))
@@ -209,6 +208,17 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
     return code, _write_figures(cell, [name], code, context)
 
 
+def show_cell(
+    cell: Segment, options: Mapping[str, str], language: str, code: str, context: LessonContext
+) -> str:
+    """Return a cell that is not run: its code, unless readers did not see it, and its outputs."""
+    blocks = [marks.fence(language, code)] if code else []
+    if blocks and how_shown(options, cell.head) == " hidden":
+        blocks = []
+        context.leave("cell", "the code of a cell that is not run here: readers did not see it")
+    return "\n\n".join((*blocks, *write_outputs(cell, context)))
+
+
 def write_outputs(cell: Segment, context: LessonContext) -> Iterator[str]:
     """Yield what is recorded below code that is only shown: its text, its picture."""
     if text := plain_output(f"{cell.printed}{cell.value}"):
@@ -342,9 +352,9 @@ def how_shown(options: Mapping[str, str], tags: str) -> str:
     """Return the word for a cell whose code its tool folds or hides, after a blank."""
     tags += options.get("tags", "")
     is_hidden = "false" in (options.get("echo"), options.get("include"))
-    if is_hidden or re.search("remove-(?:input|cell)", tags):
+    if is_hidden or re.search("remove[-_](?:input|cell)", tags):
         return " hidden"
-    is_folded = re.search("hide-(?:input|cell)", tags) or options.get("code-fold") == "true"
+    is_folded = re.search("hide[-_](?:input|cell)", tags) or options.get("code-fold") == "true"
     return " folded" if is_folded else ""
 
 
@@ -367,7 +377,7 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
         context.leave("cell", "a cell that is meant to fail is shown, not run")
         return ""
     if options.get("eval", "").lower() == "false":
-        context.leave("cell", "a cell that its tool does not run is shown, not run")
+        context.leave("cell", "a cell that its tool does not run")
         return ""
     first, _, rest = text.lstrip("\n").partition("\n")
     if _TIMING.fullmatch(first):
