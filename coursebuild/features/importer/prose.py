@@ -1,12 +1,12 @@
 """Convert lines of prose: links, pictures, mentions, formulas, roles.
 
-Code is left alone, in lines and in blocks within quotations and lists, and so is whatever else is
-not recognized here.
+Code is left alone wherever it stands, and so is whatever else is not recognized here.
 """
 
 from __future__ import annotations
 
 import re
+from urllib.parse import unquote
 
 from coursebuild.api import regex
 from coursebuild.features.importer.account import Rules, shorten_value
@@ -302,16 +302,17 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if re.match("[a-z]+://|//", source):
                 message = f"a picture from another host, `{source}`; it is a link now"
                 context.leave("picture", message)
-                text, end = match.string, match.end()
-                is_in_link = text[: match.start()].endswith("[") and text.startswith("](", end)
-                alt = alt or source.partition("?")[0].rpartition("/")[2] or source
+                text, (start, end) = match.string, match.span()
+                name = unquote(source.partition("?")[0].rpartition("/")[2])
+                alt = alt or re.sub(r"[][<>`*\s]+", " ", name) or source
+                is_in_link = text.endswith("[", 0, start) and text.startswith("](", end)
                 return alt if is_in_link else f"[{alt}]({source})"
             hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             label = dressing if dressing.startswith("{#fig-") else ""
             if address := context.resolve_picture(source):
                 return f"![{alt}]({address}{hover}){label}"
-            name = shorten_value(source)
-            context.leave("picture", f"the picture `{name}`, which is not in the folder")
+            message = f"the picture `{shorten_value(source)}`, which is not in the folder"
+            context.leave("picture", message)
             return alt
         case "link":
             address = context.resolve_link(match["address"].strip("<>"))
