@@ -182,7 +182,7 @@ def convert_code(whole: str, context: LessonContext) -> str:
         return ""
     run = _INLINE_RUN.fullmatch(whole)
     if context.is_pandoc:  # the name of an object, as filters mark it
-        whole = re.sub(r"\A(`+)~~(?=[A-Za-z][\w.]*(?:\(\))?\1\Z)", r"\1", whole)
+        whole = re.sub(r"\A(`+)~~\.?(?=[A-Za-z][\w.]*(?:\(\))?\1\Z)", r"\1", whole)
     if run is None or not (run[1] or context.is_pandoc):
         return _LANGUAGE.sub(r"\1", fill_shortcodes(whole, context))
     if run[1] is None and re.match(r"[\w.]+[ ]*(?:<-|=(?!=))", run[2]):
