@@ -17,7 +17,7 @@ _YAML_HEAD = regex(r"---[ \t]*\n(.*?)\n---[ \t]*(?:\n|\Z)", re.DOTALL)
 MAGIC = regex(r"^([ \t]*)(?:[%!?]|\w+\?{1,2}[ \t]*$).*$", re.MULTILINE)
 _COMMAND = regex(r"!|%(?=pip|conda|time)")
 """What begins a line that says something to readers, too."""
-COMMENT = regex(r"^# (?:!|%(?=pip|conda)|(?=%))", re.MULTILINE)
+COMMENT = regex(r"^# (?:![ \t]*|%(?=pip|conda)|(?=%))", re.MULTILINE)
 """What stands before such a line where it is a comment, and no part of it for a shell."""
 
 

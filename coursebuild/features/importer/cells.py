@@ -61,8 +61,7 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
             is_of_shell = re.search(r"^[ \t]*(?:!|%[pc])", cell.text, re.MULTILINE)
             language = "sh" if is_of_shell else "python"
             shown_code = COMMENT.sub("", shown_code)
-        blocks = [marks.fence(language, shown_code)] if shown_code else []
-        return "\n\n".join((*blocks, *write_outputs(cell, context)))
+        return show_cell(cell, read_options(cell.text)[0], language, shown_code, context)
     code, figure = _show_columns(_with_new_paths(code, context), context), ""
     options = read_options(cell.text)[0]
     label = find_group(r"\A(fig-.*)", options.get("label", ""))
@@ -83,7 +82,7 @@ def write_cell(cell: Segment, context: LessonContext) -> str:
     names = ("lst-cap", "tbl-cap", *(() if figure else ("fig-cap",)))
     title = caption_of_code(options, context, names, "" if figure else label)
     label = options.get("lst-label", "").removeprefix("lst-")
-    word += how_shown(options, cell.head, begins=not word)
+    word += how_shown(options, cell.head)
     word += f" {{#lst:{to_anchor(label)}}}" if label else ""
     head, end = f"python file={context.script_path}{word}", f"\n{_END} {len(context.parts)}"
     blocks = [*title, marks.fence(head, code + end)]
@@ -207,6 +206,17 @@ def _save_figure(cell: Segment, code: str, pyplot: str, context: LessonContext) 
     context.change("figure of a cell", "saved by the script, and recorded")
     code = f'{_without_window(code)}\n{pyplot}.savefig("{name}")\n{pyplot}.close("all")'.lstrip()
     return code, _write_figures(cell, [name], code, context)
+
+
+def show_cell(
+    cell: Segment, options: Mapping[str, str], language: str, code: str, context: LessonContext
+) -> str:
+    """Return a cell that is not run: its code, unless readers did not see it, and its outputs."""
+    blocks = [marks.fence(language, code)] if code else []
+    if blocks and how_shown(options, cell.head) == " hidden":
+        blocks = []
+        context.leave("cell", "the code of a cell that is not run here: readers did not see it")
+    return "\n\n".join((*blocks, *write_outputs(cell, context)))
 
 
 def write_outputs(cell: Segment, context: LessonContext) -> Iterator[str]:
@@ -338,16 +348,13 @@ def caption_of_code(
     return [*anchor, f"**{rewrite_prose(words, context)}**"] if words else anchor
 
 
-def how_shown(options: Mapping[str, str], tags: str, *, begins: bool) -> str:
-    """Return the word for a cell whose code its tool folds or hides, after a blank.
-
-    The frame in which a script begins is shown anyway: code that is hidden there is folded.
-    """
+def how_shown(options: Mapping[str, str], tags: str) -> str:
+    """Return the word for a cell whose code its tool folds or hides, after a blank."""
     tags += options.get("tags", "")
     is_hidden = "false" in (options.get("echo"), options.get("include"))
-    if is_hidden or re.search("remove-(?:input|cell)", tags):
-        return " folded" if begins else " hidden"
-    is_folded = re.search("hide-(?:input|cell)", tags) or options.get("code-fold") == "true"
+    if is_hidden or re.search("remove[-_](?:input|cell)", tags):
+        return " hidden"
+    is_folded = re.search("hide[-_](?:input|cell)", tags) or options.get("code-fold") == "true"
     return " folded" if is_folded else ""
 
 
@@ -370,7 +377,7 @@ def runnable_code(cell: Segment, context: LessonContext) -> str:
         context.leave("cell", "a cell that is meant to fail is shown, not run")
         return ""
     if options.get("eval", "").lower() == "false":
-        context.leave("cell", "a cell that its tool does not run is shown, not run")
+        context.leave("cell", "a cell that its tool does not run")
         return ""
     first, _, rest = text.lstrip("\n").partition("\n")
     if _TIMING.fullmatch(first):

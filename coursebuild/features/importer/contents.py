@@ -230,7 +230,8 @@ def _group_by_folder(files: SourceFiles) -> Iterator[ImportedText | ImportedLeve
         """Whether a text is a notebook once more, as Jupytext has it."""
         if path.endswith(".ipynb") or f"{stem_of(path)}.ipynb" not in files:
             return False
-        is_same = "jupytext" in read_front_matter(files.read_text(path))[0]
+        metadata, _ = read_front_matter(files.read_text(path))
+        is_same = "jupytext" in metadata or value_at(metadata, "jupyter", "jupytext") is not None
         if is_same:
             files.leave(path, PAIR, "text")
         return is_same

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from msgspec import Struct
 from msgspec.structs import replace
 
-from coursebuild.api import marks, model
+from coursebuild.api import marks, model, regex
 from coursebuild.core.registry import missing_package
 from coursebuild.features.importer.context import NUMBERED, LessonContext, label_anchor, to_anchor
 from coursebuild.features.importer.displays import normalize_formulas
@@ -235,27 +235,42 @@ def _write(directive: Directive, context: LessonContext) -> str:
 
 def _write_figure(directive: Directive, context: LessonContext) -> str:
     caption = directive.nested(directive.text).strip() if directive.text.strip() else ""
+    anchor, label = _write_label("fig", directive, context)
     if not directive.argument.strip():  # what it shows is in it
-        anchor = f'<a id="fig-{label_anchor(directive.label)}"></a>\n\n' if directive.label else ""
         return anchor + caption
     first, _, rest = caption.partition("\n\n")
     first = " ".join(first.split())
     alt = directive.options.get("alt") or first
     alt = re.sub(r"\]\([^()]*\)|[\[\]`*_$]", "", alt)
     picture = rewrite_prose(f"![{alt}]({directive.argument.strip()})", context)
-    is_label = bool(directive.label) and directive.name == "figure"
-    label = f" {{#fig:{label_anchor(directive.label)}}}" if is_label else ""
     if not picture.startswith("!["):  # it is on another host, or nowhere
-        anchor = f'<a id="fig-{to_anchor(directive.label)}"></a>\n\n' if label else ""
         return anchor + (caption if picture == first else f"{picture}\n\n{caption}")
     target = directive.options.get("target", "")
     if target and label:
         context.leave("figure", f"the link of a figure to `{target}`, which has a number here")
     elif target:
         picture = write_link(picture, context.resolve_link(target))
+    anchor = "" if label else anchor
     if not first.strip() and not label:
-        return picture
-    return f"Figure: {picture} {first}{label}\n\n{rest}".strip()
+        return anchor + picture
+    return f"{anchor}Figure: {picture} {first}{label}\n\n{rest}".strip()
+
+
+def _write_label(kind: str, directive: Directive, context: LessonContext) -> tuple[str, str]:
+    """Return the anchor that a label sets where there is no number, and what gives a number.
+
+    That of a single picture is set already. Sphinx alone gives numbers only where it is told so.
+    """
+    if not directive.label or directive.name == "image":
+        return "", ""
+    name, files = label_anchor(directive.label), context.files
+    is_sphinx = "conf.py" in files and "_config.yml" not in files
+    has_number = not is_sphinx or _NUMBERS.search(files.read_text("conf.py"))
+    anchor, number = f'<a id="{kind}-{name}"></a>\n\n', f" {{#{kind}:{name}}}"
+    return anchor, number if has_number else ""
+
+
+_NUMBERS = regex(r"^numfig[ \t]*=[ \t]*True\b", re.MULTILINE)
 
 
 def _write_file(directive: Directive, context: LessonContext, kind: str) -> str:
@@ -310,8 +325,9 @@ def _write_list(directive: Directive, context: LessonContext) -> str:
 
 def _write_table(directive: Directive, context: LessonContext) -> str:
     title = rewrite_prose(directive.argument, context)
-    label = f" {{#tab:{label_anchor(directive.label)}}}" if directive.label else ""
+    anchor, label = _write_label("tab", directive, context)
     caption = f"Table: {title}{label}\n\n" if title else ""
+    caption = caption if title and label else anchor + caption
     if directive.name == "table":
         return caption + directive.nested(directive.text)
     if directive.name == "csv-table":

@@ -154,7 +154,7 @@ def _find(name: str, path: str, files: SourceFiles) -> str:
     folders = files.mkdocs_values("base_path", "include_dir")
     for folder in (*map(str, PurePosixPath(path).parents), *folders):
         path = posixpath.normpath(posixpath.join(folder, name.lstrip("/")))
-        if place := files.find(path, is_hidden=path.endswith(TEXTS)):
+        if place := files.find(path, is_hidden=path.endswith((*TEXTS, ".txt"))):
             return place
     return ""
 

@@ -18,6 +18,7 @@ from coursebuild.features.importer.cell_texts import code_for_readers, read_opti
 from coursebuild.features.importer.cells import (
     caption_of_code,
     how_shown,
+    show_cell,
     write_outputs,
     write_recorded,
 )
@@ -105,10 +106,10 @@ def write_other_cell(cell: Segment, language: str, context: LessonContext) -> st
     if not code:
         return "\n\n".join(head)
     if _is_shown_only(cell):
-        context.leave(kind, f"a {kind}, which its tool does not run, is shown")
-        return "\n\n".join((*head, marks.fence(language, code), *write_outputs(cell, context)))
+        context.leave(kind, f"a {kind}, which its tool does not run")
+        return "\n\n".join((*head, show_cell(cell, options, language, code, context)))
     is_script = language in _SHELLS or language in context.single_languages
-    word = how_shown(options, cell.head, begins=is_script)
+    word = how_shown(options, cell.head)
     if not is_script:
         context.change(kind, "lines of one script, which ends the text")
         cells = context.joined.setdefault(language, JoinedCells(_new_path(language, context)))

@@ -1,7 +1,6 @@
 """Convert lines of prose: links, pictures, mentions, formulas, roles.
 
-Code is left alone, in lines and in blocks within quotations and lists, and so is whatever else is
-not recognized here.
+Code is left alone wherever it stands, and so is whatever else is not recognized here.
 """
 
 from __future__ import annotations
@@ -305,8 +304,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if re.match("[a-z]+://|//", source):
                 message = f"a picture from another host, `{source}`; it is a link now"
                 context.leave("picture", message)
-                is_in_link = f"[{whole}](" in match.string
+                text, (start, end) = match.string, match.span()
                 alt = alt or name_of_picture(source)
+                is_in_link = text.endswith("[", 0, start) and text.startswith("](", end)
                 return alt if is_in_link else f"[{alt}]({source})"
             hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             if address := context.resolve_picture(source):

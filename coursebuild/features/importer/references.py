@@ -230,7 +230,7 @@ def _edit_links(
                 continue
             yield Edit(span, address)
         if inline.span.text.startswith("[]("):
-            names = {"fig": "the figure", "tbl": "the table"}
+            names = {"fig": "the figure", "tab": "the table", "tbl": "the table"}
             name = names.get(target_anchor.partition("-")[0], "")
             words = text.headings.get(target_anchor) or name
             words = words if words and "](" not in words else text.title

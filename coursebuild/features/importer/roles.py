@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import re
 import unicodedata
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 from coursebuild.api import regex
 from coursebuild.features.importer.account import shorten_value
@@ -64,7 +64,8 @@ def write_link(text: str, address: str, title: str = "") -> str:
 
 def name_of_picture(address: str) -> str:
     """Return what a picture from another host is called where nothing says a word of it."""
-    return address.partition("?")[0].rpartition("/")[2].replace("%20", " ") or address
+    name = unquote(address.partition("?")[0].rpartition("/")[2])
+    return re.sub(r"[][<>`*\s]+", " ", name) or address
 
 
 def words_of_link(address: str, old: str) -> str:
@@ -138,7 +139,7 @@ def convert_role(name: str, body: str, context: LessonContext) -> str:
             tag = {"underline": "u", "strike": "del"}.get(name, name)
             return f"<{tag}>{body}</{tag}>"
         case _ if name.rpartition(":")[2] in CODE_ROLES:
-            name_of_part = re.sub(r"^(?:!|~(?:.*\.)?)", "", target)  # as Sphinx shows it
+            name_of_part = re.sub(r"^(?:!|~(?:.*\.)?|\.+)", "", target)  # as Sphinx shows it
             return f"`{words or name_of_part}`"
         case _ if name.startswith("bdg-link"):  # a badge
             return write_link(words or target, context.resolve_link(target))
@@ -189,7 +190,7 @@ def convert_code(whole: str, context: LessonContext) -> str:
         return convert_role("math", formula[1], context)
     run = _INLINE_RUN.fullmatch(whole)
     if context.is_pandoc:  # the name of an object, as filters mark it
-        whole = re.sub(r"\A(`+)~~(?=[A-Za-z][\w.]*(?:\(\))?\1\Z)", r"\1", whole)
+        whole = re.sub(r"\A(`+)~~\.?(?=[A-Za-z][\w.]*(?:\(\))?\1\Z)", r"\1", whole)
     if run is None or not (run[1] or context.is_pandoc):
         return _LANGUAGE.sub(r"\1", fill_shortcodes(whole, context))
     if run[1] is None and re.match(r"[\w.]+[ ]*(?:<-|=(?!=))", run[2]):

@@ -26,7 +26,7 @@ ROBOT = """<mujoco>
 PICTURE = {"p.png": "\x89PNG"}
 FOLDERS = {
     "plain": PICTURE,
-    "sphinx": {"conf.py": ""},
+    "sphinx": {"conf.py": "numfig = True\n"},
     "mkdocs": {
         **PICTURE,
         "mkdocs.yml": "site_name: A\nmarkdown_extensions: [pymdownx.emoji]",
