@@ -10,13 +10,14 @@ lesson has a mistake of form, which has to be mended.
 import argparse
 import random
 import re
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import mujoco
 import numpy as np
+
+from coursebuild.core.run import gate
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXTS = ROOT / "tests/fixtures/right_texts/cases.txt"
@@ -67,8 +68,8 @@ def main() -> None:
             course += f'[[level.lesson]]\nid = "1.{n}"\nslug = "seeds-{n}"\ntitle = "Seeds {n}"\n'
             course += 'status = "complete"\n'
         Path(folder, "content/course.toml").write_text(course, encoding="utf-8")
-        command = [sys.executable, "-m", "coursebuild", "-C", folder, "check", "--fix"]
-        subprocess.run(command, cwd=ROOT, capture_output=True, check=False)
+        command = gate.module_command("coursebuild", "-C", folder, "check", "--fix")
+        gate.finish(command, gate.environment(*gate.TOOL))
         changed = [n for n in range(LESSONS) if paths[n].read_text("utf-8") != texts[n]]
         is_mended = paths[-1].read_text("utf-8") == MISTAKE.replace("\0", "")
     print(f"{len(seeds)} seeds; lessons changed: {changed or 'none'}; mistake mended: {is_mended}")

@@ -435,8 +435,6 @@ class Document(Struct, frozen=True, dict=True):
     """The anchor of the title that a page opens with; empty where a heading has the same."""
     unclaimed: tuple[CodeBlock, ...] = ()
     """Texts below a script that may show its output, and that are not marked as such."""
-    lost_names: tuple[tuple[str, Span], ...] = ()
-    """Names that nothing defines in a script, with its path, each where it stands first."""
     numbered_items: tuple[NumberedItem, ...] = ()
     """Set in a summary only, which lacks formulas and tables themselves."""
     comma: bool = False

@@ -325,14 +325,7 @@ def without_prose(document: Document) -> Document:
                 pass
     if is_blank(blocks) and not is_blank(document_blocks(document)):
         blocks.append(ThematicBreak(document.blocks[0].span))
-    return Document(
-        document.source,
-        tuple(blocks),
-        (),
-        document.title_anchor,
-        document.unclaimed,
-        document.lost_names,
-    )
+    return Document(document.source, tuple(blocks), (), document.title_anchor, document.unclaimed)
 
 
 def _paragraph_of(span: Span, inlines: tuple[Inline, ...]) -> Iterator[Paragraph]:

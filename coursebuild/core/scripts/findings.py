@@ -121,12 +121,6 @@ def output_findings(
                 yield drift_diagnostic(verdict, id, dependents, change)
         yield from bindings.check_bindings(document, outputs, addresses)
         yield from _find_unmarked(course, document, outputs.runs)
-        for path, name in document.lost_names:
-            run = outputs.runs.get(path)
-            if run is not None and run.outcome is Outcome.OK:
-                message = f"nothing in `{path}` defines `{name.text}`"
-                help = "define or import it: it is a `NameError` where it is reached"
-                yield diagnose("python-name", name, message, help=help)
 
 
 _RESIDUE = Decimal("1e-9")

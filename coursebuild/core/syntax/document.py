@@ -14,7 +14,7 @@ from coursebuild.core.model.course import ENGLISH, Words
 from coursebuild.core.model.walk import DisplayFormula, feature_block_ids
 from coursebuild.core.syntax.attributes import slug
 from coursebuild.core.syntax.parsing_state import ParsingState
-from coursebuild.core.syntax.python_syntax import check_syntax, find_undefined_names, find_windows
+from coursebuild.core.syntax.python_syntax import check_syntax, find_windows
 from coursebuild.core.syntax.recording import ILLUSTRATION
 from coursebuild.core.syntax.spans import read_markdown
 from coursebuild.core.syntax.tree import TextReader
@@ -87,15 +87,12 @@ def parse_document(
         return Parsed(document, (conflict,))
     state.diagnostics += (*_check_placement(document), *_check_ids(document))
     syntax_errors = [d.span for d in state.diagnostics if d.rule == "python-syntax"]
-    lost_names: list[tuple[str, Span]] = []
     for script in model.document_scripts(document):  # that their parts parse is known
         parts = script.parts
         if parts and not any(part.span.contains(span) for part in parts for span in syntax_errors):
             state.diagnostics += check_syntax(script.code)
-        if script.is_python and not script.norun:
-            lost_names += ((script.path, name) for name in find_undefined_names(script.code))
-            state.diagnostics += () if script.figures else find_windows(script.code)
-    document = replace(document, lost_names=tuple(lost_names))
+        if script.is_python and not (script.figures or script.norun):
+            state.diagnostics += find_windows(script.code)
     if (at := source.text.find("\0")) >= 0:
         message = "the text contains a NUL character"
         places = [match.start() for match in re.finditer("\0", source.text)]

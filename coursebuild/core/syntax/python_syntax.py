@@ -1,16 +1,15 @@
-"""What is wrong with Python before it runs: its syntax, windows that it opens, lost names."""
+"""What is wrong with Python before it runs: its syntax, and windows that it opens."""
 
 from __future__ import annotations
 
 import ast
-import builtins
 import re
 from collections.abc import Iterator
 
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
-from coursebuild.core.text.python_code import bound_name, compile_error, python_nodes
+from coursebuild.core.text.python_code import compile_error, python_nodes
 from coursebuild.core.text.regex import regex
-from coursebuild.core.text.source import Excerpt, Span
+from coursebuild.core.text.source import Excerpt
 
 _LINE_REFERENCE = regex(r"\b(on|at) line ([0-9]+)")
 _SHOWS = regex(r"(?:matplotlib\.pyplot|plotly\.io)\.show")
@@ -42,50 +41,6 @@ def find_windows(code: Excerpt) -> Iterator[Diagnostic]:
             )
             yield diagnose("figure-window", row.span(at, at + len(name)), message, help=help)
             return
-
-
-_BUILTINS = {*dir(builtins), "WindowsError"}
-_UNSEEN = regex(
-    r"\b(?:exec|globals|locals|vars|modules|builtins|__builtins__|__dict__|f_globals"
-    r"|NameError|version_info)\b"
-)
-"""What may give names a meaning that is not written, or says that some have none."""
-
-
-def find_undefined_names(code: Excerpt) -> Iterator[Span]:
-    """The first place of each name that nothing in a script defines: there it would fail.
-
-    Not where an exception may be caught, nor in annotations, which Python may not read.
-    """
-    nodes = python_nodes(code.text)
-    names = {bound_name(node) for node in nodes} | _BUILTINS
-    # `__file__` and the like are Python's own, and `_` may be that of `gettext`.
-    uses = [
-        node
-        for node in nodes
-        if isinstance(node, ast.Name)
-        and node.id not in names
-        and not node.id[0] == node.id[-1] == "_"
-    ]
-    if not uses or "*" in names or _UNSEEN.search(code.text):
-        return
-    free_nodes: set[int] = set()
-    for node in nodes:
-        is_tried = isinstance(node, ast.Try | ast.TryStar)
-        fields = ("body",) if is_tried else ("annotation", "returns")
-        for part in (getattr(node, field, None) for field in fields):
-            for root in part if isinstance(part, list) else [part]:
-                free_nodes |= {id(inner) for inner in ast.walk(root)} if root is not None else set()
-    rows = code.lines()
-    for node in uses:
-        if id(node) not in free_nodes and node.id not in names:
-            names.add(node.id)
-            row = rows[min(node.lineno, len(rows)) - 1]
-            data = row.text.encode()  # in which Python counts
-            start = len(data[: node.col_offset].decode(errors="replace"))
-            end = start + len(node.id)
-            if row.text[start:end] == node.id:  # not so behind a CR alone, which ends a line, too
-                yield row.span(start, end)
 
 
 def check_syntax(code: Excerpt) -> Iterator[Diagnostic]:

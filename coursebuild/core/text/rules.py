@@ -159,7 +159,6 @@ GROUPS: dict[str, dict[str, str]] = {
         "script-repeated": "Two blocks have the same path.",
         "script-part": "A part of a script has no beginning above it.",
         "python-syntax": "A script cannot be parsed.",
-        "python-name": "A script that ends well holds a name that nothing in it defines.",
         "example-edited": "An extracted file was changed by hand.",
         "script-failed": "A script exited with an error.",
         "script-timeout": "A script ran past its time limit.",
@@ -250,7 +249,7 @@ _MILD |= dict.fromkeys(
     """
     draft-empty unit-unproven file-unlisted no-scripts theme-contrast template-outdated heading-skip
     markup-foreign math-brackets math-command symbol-repeated footnote-unused image-alt
-    recording-loose python-name script-unrepeatable script-penetration script-writes script-connects
+    recording-loose script-unrepeatable script-penetration script-writes script-connects
     output-noise report-stale bench-unrecorded lab-penetration lab-reset exercise-name
     package-reduced
     """.split(),

@@ -190,7 +190,7 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
     sides = left.get_expression(), right.get_expression()
     if _says_how_many(*sides):
         return "it says how many one of them is"
-    if _are_one_direction(*sides):
+    if relation in ("=", "≈") and _are_one_direction(*sides):
         return "both angles are of one direction"
     if _may_hold(sides, relation):
         return "its unit may be that of another part"

@@ -327,12 +327,14 @@ def _listing_lines(value: object, path: str, files: SourceFiles) -> Iterator[str
     parts = value if isinstance(value, list) else [value]
     for part in parts:
         if isinstance(part, str):
-            pattern = posixpath.normpath(posixpath.join(posixpath.dirname(path), part))
+            folder = "" if part.startswith("/") else posixpath.dirname(path)
+            pattern = posixpath.normpath(posixpath.join(folder, part.lstrip("/")))
             if part.endswith((".yml", ".yaml")):
                 entries = read_yaml(files.read_text(pattern)) if pattern in files else None
                 yield from _entry_lines(entries, path, files)
             for name in files:
-                if name != path and name.endswith(TEXTS) and fnmatchcase(name, pattern):
+                is_listed = fnmatchcase(name, pattern) or name.startswith(f"{pattern}/")
+                if name != path and name.endswith(TEXTS) and is_listed:
                     yield f"- [](</{name}>)"
         else:
             yield from _entry_lines(part, path, files)
@@ -344,7 +346,7 @@ def _entry_lines(value: object, path: str, files: SourceFiles) -> Iterator[str]:
             yield from _entry_lines(part, path, files)
     elif isinstance(value, Mapping):
         title, words, address = (
-            next((" ".join(str(value[name]).split()) for name in names if value.get(name)), "")
+            next((" ".join(t.split()) for t in map(value.get, names) if isinstance(t, str)), "")
             for names in _ENTRY_KEYS
         )
         if address or title:
@@ -352,7 +354,7 @@ def _entry_lines(value: object, path: str, files: SourceFiles) -> Iterator[str]:
             yield f"{start}: {words}" if address and words else f"{start}{words}"
         yield from _listing_lines(value.get("contents") or [], path, files)
         for key, part in value.items():
-            if key != "contents":
+            if key != "contents" and isinstance(part, list):
                 yield from _entry_lines(part, path, files)
 
 

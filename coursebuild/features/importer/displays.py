@@ -1,6 +1,6 @@
 """Formulas of other dialects: LaTeX's environments and brackets, dollars, labels, macros.
 
-Entry points: `read_formulas`, `normalize_formulas`, `read_macros`, `find_macros`.
+Entry points: `normalize_formulas`, `read_macros`, `find_macros`.
 """
 
 from __future__ import annotations
@@ -25,15 +25,6 @@ _DISPLAY = regex(
     re.DOTALL,
 )
 """A formula between two dollar signs each, or code, in which there is none."""
-_DOLLARS = regex(
-    r"^[ \t>]*(?:(?:[-+*]|\d+[.)])[ \t]+)?(?P<fence>`{3,}|~{3,}).*?(?:^[ \t>]*(?P=fence)|\Z)"
-    rf"|<(?:!--.*?(?:-->|\Z)|pre\b.*?(?:</pre>|\Z))|{_CODE}|\\."
-    r"|^(?P<margin>(?:[ ]{4}|\t)[ \t]*+)(?P<rest>[^\n]*)$"
-    r"|(?P<display>\$\$(?:(?!\n[ \t>]*\n|\$\$|`[^`\n]+`).)*\$\$)"
-    r"|(?P<alone>(?<!\$)\$\$(?!\$))|(?P<dollar>\$)",
-    re.DOTALL | re.MULTILINE,
-)
-"""A formula, or dollar signs that begin none; or code, a comment, what may be code in a list."""
 _ENVIRONMENT = regex(
     rf"{_CODE}|\$\$(?>(?:{WORDS}|[^$])+)\$\$|(?:^[ \t]*|(?P<words>[\w,.:;)][ ]))"
     r"(?P<tex>\\begin\{(?P<env>align|aligned|alignat|cases|eqnarray|equation|flalign|gather|multline|split)(?P<star>\*?)\}"
@@ -92,17 +83,7 @@ _PREAMBLE = regex(rf"\bimgmath_latex_preamble\s*=\s*{_STRING}", re.DOTALL)
 _WHOLE_ENVIRONMENT = regex(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", re.DOTALL)
 
 
-def read_formulas(text: str, opening: str, *, escapes: bool) -> str:
-    """Return a text with its formulas between dollar signs, and other dollar signs escaped.
-
-    `opening`: what begins one in its tool; `escapes`: that reads Markdown's in formulas.
-    """
-    if escapes:
-        text = _read_escapes(text)
-    return _read_signs(text if opening == "\n" else normalize_formulas(text), opening)
-
-
-def _read_escapes(text: str) -> str:
+def read_escapes(text: str) -> str:
     """Read Markdown's escapes in formulas, as where MathJax is given what Markdown has read."""
 
     def read(match: re.Match[str]) -> str:
@@ -119,22 +100,6 @@ def normalize_formulas(text: str) -> str:
     text = _BRACKETS.sub(lambda m: f"{m['lead']}$${m['tex'] or m['lines']}$$", text)
     text = _DOXYGEN.sub(_write_doxygen, _DISPLAY.sub(_drop_empty, text))
     return _DISPLAY.sub(_label_formula, _ENVIRONMENT.sub(_write_environment, text))
-
-
-def _read_signs(text: str, opening: str) -> str:
-    """Escape dollar signs that begin no formula.
-
-    Where no two others follow in their paragraph, any tool shows two of them.
-    """
-
-    def escape(match: re.Match[str]) -> str:
-        if opening == "\n" and match["margin"]:
-            return match["margin"] + _read_signs(match["rest"], opening)
-        is_sign = opening == "\n" and match["display"]
-        is_sign = is_sign or match["alone"] or (opening != "$" and match["dollar"])
-        return match[0].replace("$", r"\$") if is_sign else match[0]
-
-    return _DOLLARS.sub(escape, text)
 
 
 def _rewrite_for_temml(match: re.Match[str]) -> str:

@@ -88,7 +88,7 @@ def expand_includes(
         name = mark["mdbook"] or mark["quarto"] or mark["mkdocs"] or mark["inclusion"]
         name = name or mark["markdown"] or mark["listing"]
         line = f"line {text.count(chr(10), 0, mark.start()) + 1}"
-        file, _, part = name.split()[0].partition(":")
+        file, _, part = name.strip().partition(" ")[0].partition(":")
         target = _find(file, path, files)
         part_text, problem = None, "which is not in the folder: its name stands in its place"
         if target and depth < _MAX_DEPTH:
@@ -130,13 +130,15 @@ def _name_each(block: re.Match[str]) -> str:
 
 
 _DEFINITION = regex(
-    r"^(?:\*(?P<short>)|[ ]{0,3})\[(?P<label>[^\[\]\n]+)\]:.*(?:\n|\Z)", re.MULTILINE
+    r"^(?:\*(?P<short>)|[ ]{0,3})\[(?P<label>[^\[\]\n]+)\]:.*(?:\n|\Z)(?:[ \t]+\S.*(?:\n|\Z))*",
+    re.MULTILINE,
 )
 
 
 def append_texts(text: str, path: str, files: SourceFiles) -> str:
     """Return a text with those that MkDocs appends to each, but for what these define unused."""
-    marks = (f'--8<-- "{name}"\n\n' for name in files.mkdocs_values("auto_append"))
+    names = (n for n in files.mkdocs_values("auto_append") if n.strip() and "\n" not in n)
+    marks = (f'--8<-- "{name}"\n\n' for name in names if _find(name, path, files) != path)
     appended = expand_includes("".join(marks), path, files)
     folded = text.casefold()
 
@@ -146,7 +148,9 @@ def append_texts(text: str, path: str, files: SourceFiles) -> str:
             definition[0] if (name if definition[1] is not None else f"[{name}]") in folded else ""
         )
 
-    return f"{text}\n\n{_DEFINITION.sub(keep, appended)}" if appended else text
+    if "```" not in appended:  # in code, what looks like a definition is none
+        appended = _DEFINITION.sub(keep, appended)
+    return f"{text}\n\n{appended}" if appended else text
 
 
 def _find(name: str, path: str, files: SourceFiles) -> str:

@@ -20,7 +20,7 @@ from coursebuild.features.importer.anchors import (
     write_target,
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
-from coursebuild.features.importer.displays import WORDS, read_formulas
+from coursebuild.features.importer.displays import WORDS, normalize_formulas, read_escapes
 from coursebuild.features.importer.pandoc_tables import (
     MEANING,
     cut_rows,
@@ -43,6 +43,7 @@ from coursebuild.features.importer.roles import (
     rewrite_html_links,
     words_of_link,
     write_icon,
+    write_key,
     write_link,
 )
 from coursebuild.features.importer.source_files import title_of_file
@@ -78,8 +79,8 @@ _LINE = regex(
     r"|(?P<note>\^\[(?P<remark>(?:[^\[\]\n]|\[[^\[\]\n]*\])+)\](?!\())"
     rf"|(?P<cross>(?<![\w@.])\[?-?@(?P<kind>eq|sec|fig|tbl|lst|{'|'.join(PROOF_LABELS)})"
     r"-(?P<label>\w+(?:-\w+)*)\]?)"
-    r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<!~)~(?:[^~\s\\]|\\.)+~(?!~)"
-    r"|(?<!\^)\^(?:[^\s\\\^\[\]]|\\.|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
+    r"|(?P<marked>==(?=\S)[^=\n]+==|\^\^(?=\S)[^\^\n]+\^\^|(?<![~\\])~(?:[^~\s\\]|\\.)+~(?!~)"
+    r"|(?<![\\^])\^(?:[^\s\\\^\[\]]|\\.|\[[^\s\^\[\]]+\]\([^()\s]*\))+\^(?!\^))"
     r"|(?P<change>^(?:\{==|==\})[ \t]*$|\{(?:\+\+|--|~~|==|>>)[^{}\n]*?(?:\+\+|--|~~|==|<<)\})"
     r"|(?P<wiki>!?\[\[(?!@)(?P<page>[^\[\]|#\n\\]*)(?P<part>#[^\[\]|\n\\]*)?"
     r"(?:\\?\|(?P<shown>[^\[\]\n]+))?\]\])"  # in a table, Obsidian escapes the bar
@@ -209,9 +210,10 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
         text = account.replace(text, *rule)
     if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
         text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
-    opening, is_markdown = context.files.dollars, context.path.endswith(".md")
-    text = join_broken_lines(read_formulas(text, opening, escapes=is_markdown))
-    text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), text)
+    text = read_escapes(text) if context.path.endswith(".md") else text
+    if context.files.dollars != "\n":
+        text = normalize_formulas(text)
+    text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), join_broken_lines(text))
     text = rewrite_html_links(text, context)
     for abbreviation in _ABBREVIATION.finditer(text):
         message = f"`{abbreviation['short']}` for “{abbreviation['long']}”: say so where it is used"
@@ -304,15 +306,13 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if re.match("[a-z]+://|//", source):
                 message = f"a picture from another host, `{source}`; it is a link now"
                 context.leave("picture", message)
-                text, (start, end) = match.string, match.span()
                 alt = alt or name_of_picture(source)
-                is_in_link = text.endswith("[", 0, start) and text.startswith("](", end)
+                is_in_link = f"[{whole}](" in match.string
                 return alt if is_in_link else f"[{alt}]({source})"
             hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             if address := context.resolve_picture(source):
                 return f"![{alt}]({address}{hover}){dressing * dressing.startswith('{#fig-')}"
-            name = shorten_value(source)
-            context.leave("picture", f"the picture `{name}`, which is not in the folder")
+            context.leave("picture", f"`{shorten_value(source)}`, which is not in the folder")
             return alt
         case "link":
             address = context.resolve_link(match["address"].strip("<>"))
@@ -334,6 +334,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if match["path"] is not None:
                 return write_link(words, context.resolve_anchor(to_anchor(match["path"])))
             return words if re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called) else whole
+        case "math" | "digits" if not whole.startswith(context.files.dollars):
+            return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "digits" if _WORD.search(match["tex"]):  # two prices
             return "$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if context.files.dollars == "$":
@@ -416,8 +418,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
         case "block" if (context.files.folder / ".obsidian").is_dir():
             return f'<a id="{to_anchor(match["id"])}"></a>'
         case "keys":
-            stroke = match["stroke"].replace("<", "&lt;")
-            return _STROKE.sub(lambda key: f"<kbd>{key[1] or key[2].capitalize()}</kbd>", stroke)
+            strokes = _STROKE.findall(match["stroke"])
+            return "+".join(write_key(sign or name.capitalize()) for sign, name in strokes)
         case "tail":
             return f"]({context.resolve_link(match['rest'].strip('<>')) or GONE}"
         case "definition":

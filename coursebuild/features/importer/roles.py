@@ -65,7 +65,12 @@ def write_link(text: str, address: str, title: str = "") -> str:
 def name_of_picture(address: str) -> str:
     """Return what a picture from another host is called where nothing says a word of it."""
     name = unquote(address.partition("?")[0].rpartition("/")[2])
-    return re.sub(r"[][<>`*\s]+", " ", name) or address
+    return re.sub(r"[][<>`*|$\\\s]+", " ", name) or address
+
+
+def write_key(name: str) -> str:
+    """Write what stands on a key."""
+    return f"<kbd>{re.sub('[^a-zA-Z0-9 ]', lambda sign: f'&#{ord(sign[0])};', name)}</kbd>"
 
 
 def words_of_link(address: str, old: str) -> str:

@@ -20,7 +20,8 @@ _INLINE = regex(
     r"|`(?P<words>[^`<>]*\S)\s*<(?P<address>[^`<>]+)>`__?"
 )
 _LITERAL = regex(
-    r"^(?P<line>[ ]*(?:(?:[-*+]|\w+[.)])[ ]+)?)(?P<words>[^\n]*?)(?P<end>[ ]*)::[ ]*\n(?:[ ]*\n)+"
+    r"^(?P<line>[ ]*+(?:(?:[-*+]|\w+[.)])[ ]+)?)(?!\.\.[ ])"
+    r"(?P<words>[^\n]*?)(?P<end>(?:(?<![ ])[ ]*+)?)::[ ]*\n(?:[ ]*\n)+"
     r"(?P<body>(?P<margin>[ ]+)\S.*(?:\n(?P=margin).*|\n[ ]*(?=\n))*)",
     re.MULTILINE,
 )

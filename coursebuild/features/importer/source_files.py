@@ -257,7 +257,7 @@ class SourceFiles:
         """What begins a formula: two dollars in GitBook, none where settings name no extension."""
         if (self.folder / ".gitbook.yaml").is_file():
             return "$$"
-        names = ("mkdocs.yml", "book.toml", self.docusaurus, "book.json")
+        names = ("mkdocs.yml", "book.toml", self.docusaurus, "book.json" * ("SUMMARY.md" in self))
         path = next(filter(None, map(self.find_settings, names)), "")
         pattern = "[Mm]ath|arithmatex|[Kk]a[Tt]e[Xx]|INHERIT"
         if path and not re.search(pattern, self.read_text(path)):
@@ -273,8 +273,7 @@ class SourceFiles:
     def find_settings(self, name: str) -> str:
         """Return the path of settings, whose extension or tool has two names; empty for none."""
         tools = (name.replace("mkdocs", tool) for tool in ("properdocs", "zensical"))
-        names = (name, name.replace(".yml", ".yaml"), *tools)
-        return next((path for path in names if path in self), "")
+        return next((p for p in (name, name.replace(".yml", ".yaml"), *tools) if p in self), "")
 
     def settings(self, name: str) -> Mapping[str, Any]:
         """Return the settings in a file; none where it is not there, or cannot be read."""
@@ -288,7 +287,7 @@ class SourceFiles:
     @cached_property
     def mkdocs(self) -> str:
         """The settings of MkDocs; empty where it is no project of it."""
-        path = self.find_settings("mkdocs.yml") or "zensical.toml" * ("zensical.toml" in self)
+        path = self.find_settings("mkdocs.yml") or self.find_settings("zensical.toml")
         return path and (self.read_text(path) or "\n")
 
     @cached_property

@@ -389,7 +389,7 @@ _CHANGES = ("assignment_expression", "augmented_assignment_expression", "update_
 def _declared_names(nodes: Sequence[Node]) -> frozenset[str]:
     names: set[str] = set()
     for node in nodes:
-        if node.type in ("formal_parameters", "array_pattern", "object_pattern"):
+        if node.type == "formal_parameters" or node.type.endswith("_pattern"):
             names.update(map(text_of, node.named_children))
         for field in ("name", "parameter", "left"):
             child = node.child_by_field_name(field)

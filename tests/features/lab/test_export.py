@@ -228,7 +228,7 @@ def test_names_of_files() -> None:
 def test_the_page_fills_a_script_as_the_build_does() -> None:
     source = (ROOT / "site" / "js" / "lab" / "page" / "export.js").read_text()
     isolate = Isolate(
-        source.replace("export function", "function")
+        source.replace("\nexport ", "\n")
         + "globalThis.fill = (json) => fillScript(...JSON.parse(json))"
     )
     values: dict[int, float | str] = {0: 1.0, 1: -0.25, 2: 1e-7, 3: 1e21, 4: 'a "b" \\', 5: 1.5e300}

@@ -114,7 +114,7 @@ export class Handles {
         return
       } catch (error) {
         // What a model reserves for contacts and constraints it hardly ever uses; the engine warns if it is full.
-        const half = this.model.narena >> 1
+        const half = Math.floor(this.model.narena / 2)
         this.dispose(half < LEAST ? 0 : 1)
         if (half < LEAST) throw new EngineError(`the model has no room: ${error.message}`)
         this.model.narena = half
@@ -175,11 +175,13 @@ function compileReserving(mj, text, own) {
   try {
     return compileXml(mj, text, own)
   } catch (error) {
-    const less = text.replace(RESERVE, '$1')
-    if (error.fatal || less === text || !/no room|allocate memory|is too big/.test(error.message)) throw error
-    return compileXml(mj, less, own)
+    if (error.fatal || !/no room|allocate memory|is too big/.test(error.message)) throw error
+    const files = own && new Map([...own.files].map(([path, bytes]) => [path, /\.xml$/i.test(path) ? withoutReserve(bytes) : bytes]))
+    return compileXml(mj, text.replace(RESERVE, '$1'), own && { ...own, files })
   }
 }
+
+const withoutReserve = (bytes) => new TextEncoder().encode(new TextDecoder().decode(bytes).replace(RESERVE, '$1'))
 
 const FOLDER = '/own'
 

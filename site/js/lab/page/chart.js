@@ -142,6 +142,11 @@ export class Chart {
   }
 
   /** Find the scales, and draw what does not move, unless it stands there. */
+  /** Whether the ends of lines have names; the axes alone name what one line shows over another quantity. */
+  get isNamed() {
+    return this.shown.across !== null || this.shown.traces.length > 1
+  }
+
   layOut() {
     const { plot, width, height, shown } = this
     const all = shown.ghost === null ? [shown] : [shown, shown.ghost]
@@ -157,7 +162,7 @@ export class Chart {
     const ticksY = (plot.log ? powersOf : ticksOf)(low, high, Math.max(2, Math.round((bottom - TOP) / (30 * PIXEL))))
     const left = 12 + LETTER * Math.max(...ticksY.map(({ text }) => text.length))
     const room = Math.min(14 + LETTER * Math.max(...plot.traces.map(({ label }) => label.length)), 0.3 * width)
-    const right = width - (shown.across === null ? 12 : room)
+    const right = width - (this.isNamed ? room : 12)
     this.scaleX = scale(start, end, left, right)
     this.scaleY = scale(low, high, bottom, TOP, plot.log)
     for (const [name, value] of Object.entries({ x: left, y: TOP, width: right - left, height: bottom - TOP })) {
@@ -195,7 +200,7 @@ export class Chart {
 
   drawLines() {
     const { shown, plot, scaleX, scaleY } = this
-    const { times, x, traces, ghost, at, from = -Infinity, to = at, pale = false, across } = shown
+    const { times, x, traces, ghost, at, from = -Infinity, to = at, pale = false } = shown
     const count = times.length
     let [first, end] = [0, count]
     while (first < count && times[first] < from) first += 1
@@ -213,7 +218,7 @@ export class Chart {
     })
     const places = spread(ends, GAP, TOP + 4, this.height - BOTTOM)
     this.names.forEach((text, i) => {
-      text.classList.toggle('lab-hidden', across === null || places[i] === null)
+      text.classList.toggle('lab-hidden', !this.isNamed || places[i] === null)
       if (places[i] !== null) put(text, scaleX(x[last]) + ROOM, places[i] + 4)
     })
   }

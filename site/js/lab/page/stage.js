@@ -85,6 +85,7 @@ export class Stage {
   }
 
   setMoving(view, isMoving) {
+    if (isMoving && this.movingViews.size === 0) this.setPace() // what was slow may be fast by now
     if (isMoving) this.movingViews.add(view)
     else if (this.movingViews.delete(view)) this.invalidate(view) // to draw it finer
     this.chooseHolder()
