@@ -190,8 +190,6 @@ def _other_reading(left: FormulaSide, right: FormulaSide, relation: str) -> str:
     sides = left.get_expression(), right.get_expression()
     if _says_how_many(*sides):
         return "it says how many one of them is"
-    if relation in ("=", "≈") and _are_one_direction(*sides):
-        return "both angles are of one direction"
     if _may_hold(sides, relation):
         return "its unit may be that of another part"
     if _holds_in_base_units(*sides, relation) or _holds_in_base_units(*sides[::-1], relation):
@@ -223,17 +221,6 @@ def _says_how_many(left: Expression, right: Expression) -> bool:
     if right.ends_in_unit() and not left.has("unit"):
         return left.kind == "number" and not find_units(right.parts[1].text)
     return False
-
-
-def _are_one_direction(left: Expression, right: Expression) -> bool:
-    r"""Whether two angles in degrees differ by whole turns: `270^\circ = -90^\circ`."""
-    bare = [_strip_unit(side, ()) for side in (left, right)]
-    if any(side.has("unit") for side in bare) or not (left.has("unit") and right.has("unit")):
-        return False
-    if {p.text for side in (left, right) for p in side.walk() if p.kind == "unit"} != {"deg"}:
-        return False
-    first, second = (evaluate(side).value for side in bare)
-    return ((first - second) / Real.of(360)).whole is not None
 
 
 def _is_of_numbers(side: FormulaSide, symbols: Mapping[str, SymbolQuantity]) -> bool:
