@@ -87,8 +87,8 @@ def test_one_quantity_is_plotted_against_another(context: BrowserContext, base: 
     press(itself, "Pause")
     end = time_of(itself)
     path = plot.locator(".lab-trace").get_attribute("d") or ""
-    places = [float(number) for number in re.findall(r"[\d.]+", path)]
-    x, y = places[len(places) // 4 * 2 :][:2]
+    places = re.findall(r"([\d.]+) ([\d.]+)", path)
+    x, y = map(float, places[len(places) // 2])
     plot.click(position={"x": x, "y": y})
     wait_for_condition(page, lambda: time_of(itself) < end)
     with page.expect_download() as download:

@@ -159,10 +159,7 @@ def test_page_of_the_package_asks_for_no_service_worker(
         page.goto(f"{platform}offline/index.html")
         page.clock.run_for(60_000)
         expect(page.locator("[data-keep]")).to_be_visible()
-        assert (
-            page.evaluate("async () => (await navigator.serviceWorker.getRegistrations()).length")
-            == 0
-        )
+        assert page.evaluate("navigator.serviceWorker.getRegistrations()") == []
         assert console == []
 
 
