@@ -11,13 +11,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from mjbench.integrate import (
-    NoConvergenceError,
-    State,
-    bulirsch_stoer,
-    cumulative_integral,
-    dop853,
-)
+from mjbench.integrate import NoConvergenceError, State, bulirsch_stoer, cumulative_integral, dop853
 from mjbench.known_motion import KnownMotion, find_reference, self_reference
 from mjbench.measured_setting import find_references
 from mjbench.pilot import run_pilot

@@ -12,13 +12,7 @@ import pytest
 from msgspec.structs import astuple, replace
 
 from mjbench.cases import measure, orders
-from mjbench.measure import (
-    errors,
-    find_sticks,
-    fit_order,
-    friction_holds,
-    measure_slip,
-)
+from mjbench.measure import errors, find_sticks, fit_order, friction_holds, measure_slip
 from mjbench.problem import STANDARD, Integrator, Motion, Setup, Sizes
 from mjbench.problems import all_problems, extremes
 from mjbench.reports.model_report import ErrorLine

@@ -10,12 +10,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from mjbench.cases import (
-    DisagreementError,
-    check_limits,
-    floor,
-    measure_figures,
-)
+from mjbench.cases import DisagreementError, check_limits, floor, measure_figures
 from mjbench.problem import STANDARD, Array, Integrator, Limit, Motion, Problem
 from mjbench.problems import all_problems
 from mjbench.problems.impact import Bounce

@@ -8,14 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.corpus import (
-    JUDGED,
-    evaluate,
-    hash_of,
-    read_bodies,
-    read_judgements,
-    sample,
-)
+from benchmarks.corpus import JUDGED, evaluate, hash_of, read_bodies, read_judgements, sample
 from benchmarks.foreign.courses import examine, import_course, write_plain_course
 from benchmarks.foreign.packages import PackageError, texts_of
 from support.fixture_cases import fixture_text

@@ -13,11 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from markupsafe import Markup
 
-from coursebuild.core.model import (
-    Heading,
-    Mode,
-    Text,
-)
+from coursebuild.core.model import Heading, Mode, Text
 from coursebuild.core.model.results import Outcome
 from coursebuild.core.model.walk import DisplayFormula
 from coursebuild.core.text.diagnostics import diagnose

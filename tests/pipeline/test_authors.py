@@ -9,14 +9,7 @@ from html import unescape
 
 from lxml import etree
 
-from support.archives import (
-    LOM,
-    NAMESPACES,
-    entries,
-    mistakes,
-    packaging_schema,
-    scorm_schema,
-)
+from support.archives import LOM, NAMESPACES, entries, mistakes, packaging_schema, scorm_schema
 from support.fixture_cases import fixture_text
 from support.scratch_course import GOOD, Make
 

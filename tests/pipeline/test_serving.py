@@ -15,17 +15,8 @@ import pytest
 
 from support.fixture_cases import fixture_tables
 from support.preview_process import Preview, serve_preview
-from support.scratch_course import (
-    GOOD,
-    WAIT_FOR_GO,
-    Folder,
-    Make,
-    block,
-    kill_at_end,
-)
-from support.scratch_course import (
-    SECOND as SECOND_LESSON,
-)
+from support.scratch_course import GOOD, WAIT_FOR_GO, Folder, Make, block, kill_at_end
+from support.scratch_course import SECOND as SECOND_LESSON
 from support.waiting import wait_for_file
 
 pytestmark = pytest.mark.site

@@ -15,14 +15,7 @@ from coursebuild.core.model.results import Outcome, TrialLine
 from coursebuild.core.text.characters import printable
 from coursebuild.core.text.diagnostics import Diagnostic, Fix, Note, diagnose
 from coursebuild.core.text.source import Source
-from coursebuild.report import (
-    FORMATS,
-    Report,
-    ScriptLine,
-    Style,
-    diagnostic_text,
-    render_report,
-)
+from coursebuild.report import FORMATS, Report, ScriptLine, Style, diagnostic_text, render_report
 from coursebuild.report.text import clip
 from support.fixture_cases import check_text
 

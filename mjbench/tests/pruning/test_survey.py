@@ -8,15 +8,7 @@ import struct
 import pytest
 
 from mjbench.reports.diet_report import INTERFACE_LABEL, PROVED_LABEL
-from samples.surveys import (
-    PATH,
-    PENDULUM,
-    findings_by_kind,
-    fixed_text,
-    names,
-    run_survey,
-    scene,
-)
+from samples.surveys import PATH, PENDULUM, findings_by_kind, fixed_text, names, run_survey, scene
 
 pytestmark = pytest.mark.long
 

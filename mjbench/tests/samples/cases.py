@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 from mjbench.reports import Interval
-from mjbench.reports.model_report import (
-    CaseReport,
-    ErrorLine,
-    ReferenceLine,
-    StepCost,
-)
+from mjbench.reports.model_report import CaseReport, ErrorLine, ReferenceLine, StepCost
 from mjbench.reports.scene_report import FigureLine, OrderRow, StableRow
 from samples.reports import FIRST, MACHINE
 

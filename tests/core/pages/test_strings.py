@@ -21,12 +21,7 @@ from coursebuild.core.model import (
 from coursebuild.core.model.course import ENGLISH
 from coursebuild.core.pages.assets import Assets
 from coursebuild.core.pages.materials import strings_for, words_for
-from coursebuild.core.pages.renderer import (
-    CATEGORIES,
-    DEFAULT_LANGUAGE,
-    category,
-    parse_strings,
-)
+from coursebuild.core.pages.renderer import CATEGORIES, DEFAULT_LANGUAGE, category, parse_strings
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.source import Source
 

@@ -11,12 +11,7 @@ from msgspec.structs import replace
 from coursebuild.core.model import Comparison, Filter, Recording
 from coursebuild.core.model.results import Outcome, ScriptRun, Trace
 from coursebuild.core.scripts.noise_warnings import noise_warnings
-from coursebuild.core.scripts.sensitivity import (
-    Sensitivity,
-    Standing,
-    is_worth_moving,
-    sensitivity,
-)
+from coursebuild.core.scripts.sensitivity import Sensitivity, Standing, is_worth_moving, sensitivity
 from support.fixture_cases import fixture_tables
 from support.sample_lessons import DIGITS, EXACT, course, describe, document, recording, tolerance
 

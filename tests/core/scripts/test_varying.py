@@ -7,13 +7,7 @@ from coursebuild.core.model.results import Outcome, ScriptRun
 from coursebuild.core.scripts.compare import compare
 from coursebuild.core.scripts.findings import find_instability
 from coursebuild.core.text.diagnostics import Diagnostic
-from support.sample_lessons import (
-    DIGITS,
-    ELLIPSIS,
-    EXACT,
-    describe,
-    recording,
-)
+from support.sample_lessons import DIGITS, ELLIPSIS, EXACT, describe, recording
 
 SECONDS = Comparison(volatile="[0-9.]+ s")
 

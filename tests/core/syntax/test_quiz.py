@@ -9,12 +9,7 @@ from coursebuild.core import model
 from coursebuild.core.syntax.document import parse_document
 from coursebuild.core.text.diagnostics import Diagnostic
 from coursebuild.core.text.source import Source
-from coursebuild.features.quiz.model import (
-    ChoiceQuestion,
-    OpenQuestion,
-    OrderQuestion,
-    Quiz,
-)
+from coursebuild.features.quiz.model import ChoiceQuestion, OpenQuestion, OrderQuestion, Quiz
 from support.text_cases import MCQ
 from support.text_cases import parse_quiz as parse
 

@@ -7,11 +7,7 @@ from msgspec.structs import replace
 from coursebuild.core.files.resources import template_texts
 from coursebuild.core.model.measurements import StableRow
 from coursebuild.core.pages.materials import strings_for
-from coursebuild.features.bench.scenario_view import (
-    stable_again,
-    stable_cells,
-    stable_title,
-)
+from coursebuild.features.bench.scenario_view import stable_again, stable_cells, stable_title
 
 WORDS = strings_for(template_texts(), "en")
 ROW = StableRow("RK4", 25.44, (1.0, 1000.0), None, 5.0, None, shown="25.4 s")
