@@ -31,8 +31,8 @@ from coursebuild.core.text.quantities import (
 )
 from coursebuild.core.text.regex import regex
 
-_STRAY = regex(r"[-+*/.,:;=_]+|-?[eE][-+]+\d*|[-+][eE]\d*")
-"""What beside a number is neither a unit nor a word: `-9.81-` has a slip."""
+_STRAY = regex(r"[-+*/.,:;=_]+\d*|-?[eE][-+]+\d*|[-+][eE]\d*")
+"""What beside a number is neither a unit nor a word: `-9.81-` and `0..981` have a slip."""
 
 
 _DECIMALS = regex(r"\.?[0-9]{1,3}")
