@@ -36,6 +36,14 @@ def test_a_value_that_is_bound_no_longer_is_told(
     assert_told(make, LESSON, old, new, remark)
 
 
+def test_another_number_behind_the_words_that_chose_one_is_told(make: Make) -> None:
+    code = "print('Euler: limit 10.65 ms')\nprint('RK4: limit 12.65 ms')"
+    output = "Euler: limit 10.65 ms\nRK4: limit 12.65 ms"
+    text = 'They are `10.65 ms`{out="limit"} and `12.65 ms`{out="limit"}.\n'
+    lesson = f"## Limits\n\n{block('limits.py', code, output)}{text}"
+    assert_told(make, lesson, "`10.65 ms`", "`12.65 ms`", "`10.65 ms` gave way to `12.65 ms`")
+
+
 @pytest.mark.parametrize(("old", "new", "remark"), fixture_tables("proofs")["formulas"])
 def test_a_formula_that_is_not_decided_any_more_is_told(
     make: Make, old: str, new: str, remark: str

@@ -113,7 +113,7 @@ def moved_values(
     """What is to be told of bound numbers that show another printed number than before.
 
     What they showed stands in the document no more; the words before them are as they were. Where
-    an author has chosen the number by its words, it is not printed elsewhere by mistake.
+    the words of an author choose the new number, and not the old one, it is no mistake.
     """
     pairs = bound_values(document, outputs)
     lost = before.keys() - {value for _, value in pairs}
@@ -131,7 +131,7 @@ def moved_values(
         lead = f"`{old.text}` gave way to `{binding.text}` in line {binding.span.line}, which"
         if any(n.place < p.place for n, p in zip(bound.text.numbers, place.numbers, strict=True)):
             yield f"{lead} has more digits than are printed: {place.text}"
-        elif was and not binding.words and not {*before[old]} & {*now[value]}:
+        elif was and not {*before[old]} & {*now[value]}:
             yield f"{lead} is printed elsewhere: {place_note(binding, place, was).message}"
 
 
