@@ -312,7 +312,7 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             hover = "" if hover.lstrip()[1:2] == ":" else hover  # a size of Docsify
             if address := context.resolve_picture(source):
                 return f"![{alt}]({address}{hover}){dressing * dressing.startswith('{#fig-')}"
-            context.leave("picture", f"`{shorten_value(source)}`, which is not in the folder")
+            context.leave("picture", f"the picture `{shorten_value(source)}`, not in the folder")
             return alt
         case "link":
             address = context.resolve_link(match["address"].strip("<>"))

@@ -388,7 +388,7 @@ def test_a_cell_of_a_shell_runs_when_the_map_says_how(
     assert "`[runners]` of the map says how" in capsys.readouterr().out
     assert "```bash file=examples/l1_1_a.sh\necho 6\n```" in lesson(folder / "new", "1.1-a")
     text = lesson(folder / "new", "1.2-b")
-    assert "```sh file=examples/l1_2_b.sh folded\necho one\n```" in text
+    assert "```sh file=examples/l1_2_b.sh hidden\necho one\n```" in text
     assert "```sh file=examples/l1_2_b_2.sh\necho two\n```" in text
     course_map = folder / "new/content/course.toml"
     runners = '\n[runners]\nbash = [["bash", "{file}"]]\nsh = [["sh", "{file}"]]\n'
