@@ -280,7 +280,7 @@ def _mismatch(bound: BoundNumber) -> Diagnostic:
         help = "write it as it is printed, or remove `{out}`"
     elif bound.addresses or binding.words:
         return _address_mismatch(bound, message)
-    elif stray and bare.is_in(outputs):
+    elif stray and not stray[-1].isdigit() and bare.is_in(outputs):  # a digit is no sign to remove
         message = f"`{path}` printed no `{stray}` beside the number in `{binding.text}`"
         help = Fix(f"remove the `{stray}`", "", stray)
     elif mismatch := _wrong_unit(bound, bare, bare.shown_places(outputs)):

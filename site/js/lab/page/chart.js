@@ -141,12 +141,12 @@ export class Chart {
     if (this.shown !== null) this.draw(this.shown)
   }
 
-  /** Find the scales, and draw what does not move, unless it stands there. */
   /** Whether the ends of lines have names; the axes alone name what one line shows over another quantity. */
   get isNamed() {
     return this.shown.across !== null || this.shown.traces.length > 1
   }
 
+  /** Find the scales, and draw what does not move, unless it stands there. */
   layOut() {
     const { plot, width, height, shown } = this
     const all = shown.ghost === null ? [shown] : [shown, shown.ghost]
