@@ -46,6 +46,7 @@ from coursebuild.pipeline.options import Options, select
 from coursebuild.pipeline.recordings import (
     check_recorded_runs,
     find_figures,
+    keep_prepared,
     read_recorded,
     record_runs,
     write_figures,
@@ -250,7 +251,12 @@ class _Updater:
                 self.addresses,
                 find_module=functools.partial(find_module, self.options.root),
             ),
-            *figure_findings(new_course, runs, functools.partial(read_recorded, self.options.root)),
+            *figure_findings(
+                new_course,
+                runs,
+                functools.partial(read_recorded, self.options.root),
+                functools.partial(keep_prepared, self.options.store),
+            ),
         ]
 
 

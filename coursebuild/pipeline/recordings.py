@@ -19,6 +19,7 @@ from msgspec import Struct
 from msgspec.structs import replace
 
 from coursebuild.core.drawing.safe_svg import read_svg
+from coursebuild.core.engine.store import Store
 from coursebuild.core.engine.tool import step_key
 from coursebuild.core.files.course_root import read_regular
 from coursebuild.core.files.errors import EffectError
@@ -75,6 +76,18 @@ def recorded_runs(scripts: Iterable[Extraction], options: Options) -> dict[str, 
         else recorded_run.run()
         for path, recorded_run in stored_runs.items()
     }
+
+
+def keep_prepared(store: Store, name: str, data: bytes) -> bytes | str:
+    """`prepare_figure`, once for each drawing."""
+    key = step_key("figure", name.rpartition(".")[2], data)
+    earlier = store.get("figures", key, bytes)
+    if earlier is not None:
+        return earlier
+    prepared = prepare_figure(name, data)
+    if isinstance(prepared, bytes):
+        store.put("figures", key, prepared)
+    return prepared
 
 
 def check_recorded_runs(scripts: Iterable[Extraction], options: Options) -> Iterator[Diagnostic]:

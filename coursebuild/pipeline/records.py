@@ -27,7 +27,7 @@ from coursebuild.core.model.lesson_record import (
     recording_digest,
 )
 from coursebuild.core.model.results import Outcome, ScriptRun
-from coursebuild.core.run.script_environment import conditions, distributions
+from coursebuild.core.run.script_environment import InstalledPackages, conditions
 from coursebuild.core.scripts.bound_places import document_values
 from coursebuild.core.scripts.extract import Extraction
 from coursebuild.core.scripts.figures import ReadFile, compare_figure
@@ -60,7 +60,7 @@ def with_provenance(
     modules = frozenset[str]().union(*modules_by_path.values())
     interpreter = options.interpreter
     folders = None if interpreter is None else interpreter.packages
-    rows = distributions(options.store, modules, folders)
+    rows = InstalledPackages(options.store, folders).distributions(modules)
     packages = {module: (name, version) for module, name, version in rows}
     surroundings = dict(conditions({}, interpreter))
     python = surroundings["Python"].removeprefix("C")

@@ -34,7 +34,7 @@ from coursebuild.core.pages import urls
 from coursebuild.core.pages.library import Library, models_named
 from coursebuild.core.pages.zips import Archive
 from coursebuild.core.run.alone import AloneJob, AloneRun, Runner
-from coursebuild.core.run.script_environment import distributions, module_files
+from coursebuild.core.run.script_environment import InstalledPackages, module_files
 from coursebuild.core.scripts.compare import verify
 from coursebuild.core.scripts.extract import Extraction, extract
 from coursebuild.core.scripts.module_code import CourseModule, NotOneFileError
@@ -66,6 +66,9 @@ class _Course:
     ) -> None:
         """`facts` are those of models, by name; `imports`: see `verify`."""
         self.root, self.options = options.root, options
+        interpreter = options.interpreter
+        folders = None if interpreter is None else interpreter.packages
+        self._installed = InstalledPackages(options.store, folders)
         self.runs = {run.path: run for run in runs}
         self.imports = functools.partial(imports_of, imports=imports)
         self._includes = {f"{_MODELS}{name}.xml": f.includes for name, f in facts if f is not None}
@@ -84,6 +87,7 @@ class _Course:
         )
         self.imports_of_module = functools.cache(self._read_imports)
         self.read = functools.cache(functools.partial(read_bytes, options.root))
+        self._paths: dict[str, list[str]] = {}
 
     def find_module(self, script: str, name: str) -> CourseModule | None:
         """The module that the script at a path in `examples/` gets by this name."""
@@ -114,6 +118,11 @@ class _Course:
 
     def files_of(self, extraction: Extraction) -> dict[str, bytes]:
         """The models and data that a script reads, by path; if it did not run, what it names."""
+        if extraction.path not in self._paths:
+            self._paths[extraction.path] = self._find_paths(extraction)
+        return {path: self.read(path) for path in self._paths[extraction.path]}
+
+    def _find_paths(self, extraction: Extraction) -> list[str]:
         paths: set[str] = set()
         run = self.runs.get(extraction.path)
         if run is not None and run.trace is not None:
@@ -124,7 +133,7 @@ class _Course:
                 path = f"{_MODELS}{name}.xml"
                 if path in self._models:
                     paths |= {path, *self._includes.get(path, ())}
-        return {path: self.read(path) for path in sorted(paths - {_STYLE, "content/course.toml"})}
+        return sorted(paths - {_STYLE, "content/course.toml"})
 
     @functools.cached_property
     def style(self) -> dict[str, str]:
@@ -141,10 +150,8 @@ class _Course:
 
         A package need not be called as its module is, so that of these it is not known.
         """
-        interpreter = self.options.interpreter
-        folders = None if interpreter is None else interpreter.packages
         names = sorted(set(modules))
-        rows = distributions(self.options.store, names, folders)
+        rows = self._installed.distributions(names)
         lines = {module: f"{name}=={version}" for module, name, version in rows}
         packages = tuple(sorted(set(lines.values()), key=str.lower))
         return packages, tuple(name for name in names if name not in lines)

@@ -44,7 +44,12 @@ from coursebuild.core.scripts.printed_outputs import PrintedOutputs
 from coursebuild.core.text.diagnostics import Diagnostic, diagnose
 from coursebuild.pipeline.held import HeldDocuments
 from coursebuild.pipeline.options import Options, Progress
-from coursebuild.pipeline.recordings import check_drawings, check_recorded_runs, read_recorded
+from coursebuild.pipeline.recordings import (
+    check_drawings,
+    check_recorded_runs,
+    keep_prepared,
+    read_recorded,
+)
 from coursebuild.pipeline.scripts import (
     ExtractedScripts,
     extract_scripts,
@@ -258,7 +263,8 @@ class _ScriptRunner:
         """Return verdicts on recorded outputs, diagnostics of figures, and lines of a report."""
         verdicts = compare_all(self.course, runs, self.addresses)
         read = functools.partial(read_recorded, self.options.root)
-        figure_diagnostics = list(figure_findings(self.course, runs, read))
+        prepare = functools.partial(keep_prepared, self.options.store)
+        figure_diagnostics = list(figure_findings(self.course, runs, read, prepare))
         drifted_figures = [diagnostic.span for diagnostic in figure_diagnostics]
         lines = script_lines(
             self.scripts, runs, verdicts, self.course, drifted_figures, self.left_out

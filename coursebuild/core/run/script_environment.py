@@ -325,10 +325,25 @@ class InstalledPackages:
     """The packages that are installed for the interpreter that runs the scripts."""
 
     def __init__(self, store: Store, folders: Sequence[str] | None = None) -> None:
+        """`folders` are those of another interpreter's packages."""
         self._folders = site_folders() if folders is None else tuple(folders)
         self._distributions = functools.cache(lambda: _map_distributions(store, self._folders))
         self.version = functools.cache(self._version)
         """The version of a module, such as `numpy 2.4.6`; empty where there is no such module."""
+
+    def distributions(self, modules: Iterable[str]) -> tuple[tuple[str, str, str], ...]:
+        """(module, distribution, version) of each top-level module that a package provides.
+
+        Sorted by module. The standard library, `mjcourse` and what is not installed are left out.
+        """
+        names = sorted(set(modules))
+        by_module = self._distributions() if names else {}
+        rows = []
+        for module in names:
+            name, _, version = by_module.get(module, "").split(", ")[0].rpartition(" ")
+            if name:
+                rows.append((module, name, version))
+        return tuple(rows)
 
     def _version(self, module: str) -> str:
         distribution = self._distributions().get(module)
@@ -344,24 +359,6 @@ class InstalledPackages:
                     state = file_state(str(file))
                     digest.update(f"{file.relative_to(top).as_posix()}\0{state}\0".encode())
         return f"files {digest.hexdigest()[:16]}"
-
-
-def distributions(
-    store: Store, modules: Iterable[str], folders: Sequence[str] | None = None
-) -> tuple[tuple[str, str, str], ...]:
-    """(module, distribution, version) of each top-level module that an installed package provides.
-
-    Sorted by module. The standard library, `mjcourse` and what is not installed are left out.
-    `folders` are those of another interpreter's packages.
-    """
-    names = sorted(set(modules))
-    by_module = _map_distributions(store, folders or site_folders()) if names else {}
-    rows = []
-    for module in names:
-        name, _, version = by_module.get(module, "").split(", ")[0].rpartition(" ")
-        if name:
-            rows.append((module, name, version))
-    return tuple(rows)
 
 
 def module_files(name: str, folders: Iterable[Path]) -> tuple[OutputFile, ...]:

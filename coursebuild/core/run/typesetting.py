@@ -67,6 +67,10 @@ class MathEngine:
                 self._isolate.close()
                 self._isolate = None
 
+    def expect_many(self) -> None:
+        """Many formulas come: V8 is worth its start from the first one on."""
+        self._length = _MANY
+
     def typeset(self, formulas: Sequence[Formula]) -> list[str | MathError]:
         """The MathML of each formula, or why there is none; no macro outlives its formula.
 
@@ -107,13 +111,13 @@ class MathEngine:
         return {formula: reply for formula, reply in pairs if isinstance(reply, str)}
 
     def _batch(self, formulas: Sequence[Formula]) -> Iterator[str | MathError]:
-        import quickjs
+        import _quickjs
 
         context = self._context = self._context or _start()
         context.set_time_limit(_BATCH_SECONDS if len(formulas) > 1 else _SINGLE_SECONDS)
         try:
             replies = json.loads(context.eval("typeset")(_jobs(formulas)))
-        except quickjs.JSException as error:  # no formula throws: it is a limit
+        except _quickjs.JSException as error:  # no formula throws: it is a limit
             self._context = None
             if len(formulas) == 1:
                 yield MathError(f"the formula cannot be typeset ({readable(str(error))})", None)
@@ -157,11 +161,11 @@ def _start() -> Any:
         message = f"formulas need a stack of 2 MiB, and this process may have {stack >> 10} KiB"
         raise LackError(message, help="`ulimit -s 8192` raises the limit")
     try:
-        import quickjs
+        import _quickjs  # not `quickjs`, which starts a thread: the process could not be forked
     except ImportError as error:
         message = f"QuickJS cannot be used: {error}"
         raise EffectError(message, help="run `pip install coursebuild` again") from None
-    context = quickjs.Context()
+    context = _quickjs.Context()
     context.set_memory_limit(_MEMORY << 20)
     context.set_max_stack_size(min(_STACK, stack // 2))
     for script in _scripts():

@@ -56,10 +56,12 @@ _PNG_PARTS = frozenset(b"IHDR PLTE IDAT IEND tRNS bKGD cHRM cICP gAMA iCCP pHYs 
 _PNG_END = b"\0\0\0\0IEND"
 
 ReadFile = Callable[[str], bytes | None]
+Prepare = Callable[[str, bytes], bytes | str]
+"""Does as `prepare_figure`."""
 
 
 def figure_findings(
-    course: Course, runs: Sequence[ScriptRun], read: ReadFile
+    course: Course, runs: Sequence[ScriptRun], read: ReadFile, prepare: Prepare
 ) -> Iterator[Diagnostic]:
     """What is wrong with the figures of the scripts that ran."""
     outcomes = (Outcome.OK, Outcome.UNRECORDED)
@@ -76,7 +78,9 @@ def figure_findings(
             run = by_path.get(recorded.script)
             if run is not None and not run.recorded:  # a run that the course keeps drew nothing now
                 record = course.records.get(document.source.path, LessonRecord())
-                yield from compare_figure(recorded, run, read(recorded.path), record, owner.id)
+                yield from compare_figure(
+                    recorded, run, read(recorded.path), record, owner.id, prepare
+                )
 
 
 def compare_figure(
@@ -85,6 +89,7 @@ def compare_figure(
     recorded: bytes | None,
     record: LessonRecord,
     owner: str = "",
+    prepare: Prepare | None = None,
 ) -> Iterator[Diagnostic]:
     """What is wrong with a figure of a run, given the file that is recorded."""
     data = dict(run.figures).get(figure.name)
@@ -93,7 +98,7 @@ def compare_figure(
         help = f'save it under this name, as in `plt.savefig("{figure.name}")`'
         yield diagnose("figure-missing", figure.span, message, help=help)
         return
-    figure_file = b"" if data is None else prepare_figure(figure.name, data)
+    figure_file = b"" if data is None else (prepare or prepare_figure)(figure.name, data)
     if isinstance(figure_file, str):
         help = SVG_HELP if figure_file.startswith("holds") else ""
         message = f"`{figure.name}` {figure_file}"

@@ -7,10 +7,11 @@ import functools
 import warnings
 
 
+@functools.lru_cache(maxsize=1024)
 def find_imports(code: str) -> frozenset[str]:
     """The top-level modules that a Python text imports; none if it does not parse."""
     modules: set[str] = set()
-    for node in python_nodes(code):
+    for node in _statements(code):
         if type(node) is ast.Import:
             modules.update(alias.name.partition(".")[0] for alias in node.names)
         elif type(node) is ast.ImportFrom and node.module and not node.level:
@@ -21,6 +22,16 @@ def find_imports(code: str) -> frozenset[str]:
 def python_nodes(code: str) -> tuple[ast.AST, ...]:
     """All nodes of a Python text, the module first, level by level; none if it does not parse."""
     return _nodes(code.rstrip("\n"))
+
+
+def _statements(code: str) -> list[ast.AST]:
+    """The statements of a Python text and what they consist of, but for expressions."""
+    tree = _tree(code.rstrip("\n"))
+    nodes: list[ast.AST] = [] if tree is None else [tree]
+    for node in nodes:
+        for field in ("body", "orelse", "finalbody", "handlers", "cases"):
+            nodes += getattr(node, field, ())
+    return nodes
 
 
 def bound_name(node: ast.AST) -> str | None:
@@ -41,12 +52,18 @@ def bound_name(node: ast.AST) -> str | None:
 
 @functools.lru_cache(maxsize=8)
 def _nodes(code: str) -> tuple[ast.AST, ...]:
+    tree = _tree(code)
+    return () if tree is None else tuple(ast.walk(tree))
+
+
+@functools.lru_cache(maxsize=8)
+def _tree(code: str) -> ast.Module | None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return tuple(ast.walk(ast.parse(code, "")))
+            return ast.parse(code, "")
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return ()
+        return None
 
 
 @functools.lru_cache(maxsize=64)

@@ -10,7 +10,7 @@ from textwrap import shorten
 
 from coursebuild.api import Edit, Options, Recording, ScriptRun, Span, marks, model, regex
 from coursebuild.core.run.part_marks import FAILURE
-from coursebuild.core.run.script_environment import distributions
+from coursebuild.core.run.script_environment import InstalledPackages
 from coursebuild.core.text.python_code import bound_name
 from coursebuild.features.importer.cells import imported_names
 from coursebuild.features.importer.commands.findings import Rank
@@ -41,7 +41,7 @@ _PACKAGES = {
 def name_package(module: str, options: Options) -> str:
     """Return a sentence on what brings a module that is missing, as far as that is known."""
     top = module.partition(".")[0]
-    installed = [name for _, name, _ in distributions(options.store, [top])]
+    installed = [name for _, name, _ in InstalledPackages(options.store).distributions([top])]
     package = installed[0] if installed else _PACKAGES.get(top)
     if package is None:
         return f"the module `{module}` is missing; which package brings it is not known here"

@@ -212,6 +212,18 @@ def test_copies_of_a_process_that_typesets_do_so_too() -> None:
     assert process.stdout == "True False\nTrue True\n"
 
 
+def test_a_process_that_typesets_can_still_be_copied() -> None:
+    """Else a build would be drawn by one process, however many it may use."""
+    process = run_code(
+        "from coursebuild.core.engine.page_pool import can_fork\n"
+        "from coursebuild.core.model.results import Formula\n"
+        "from coursebuild.core.run.typesetting import MathEngine\n"
+        "(html,) = MathEngine().typeset([Formula('x', False)])\n"
+        "print(html[:5], can_fork())\n"
+    )
+    assert (process.stdout, process.stderr) == ("<math True\n", "")
+
+
 def test_threads_share_an_engine_whatever_is_nested_in_their_formulas() -> None:
     engine = MathEngine()
 
