@@ -312,12 +312,14 @@ def _steps(
     The first path is the map, without a title; of others, steps are left out that are the map's.
     """
     map_steps: dict[str, Lesson] = {}
-    paths = [(p.title, p.lessons) for p in library.course.paths if lesson.id in p.lessons]
-    for title, ids in [("", tuple(x.id for x in library.order)), *paths]:
-        position = ids.index(lesson.id)
-        for way, side in ("prev", reversed(ids[:position])), ("next", ids[position + 1 :]):
-            lessons = map(library.lessons.__getitem__, side)
-            step = next((x for x in lessons if x.document is not None), None)
+    paths = [("", library.order, library.positions[lesson.id])]
+    for path in library.course.paths:
+        if lesson.id in path.lessons:
+            lessons = tuple(library.lessons[id] for id in path.lessons)
+            paths.append((path.title, lessons, path.lessons.index(lesson.id)))
+    for title, lessons, position in paths:
+        for way, side in ("prev", lessons[:position][::-1]), ("next", lessons[position + 1 :]):
+            step = next((x for x in side if x.document is not None), None)
             if step is not None and step is not map_steps.get(way):
                 map_steps |= {} if title else {way: step}
                 yield title, way, lesson_link(library, place, step)

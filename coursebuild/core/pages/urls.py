@@ -8,6 +8,7 @@ path of the course's base address instead.
 
 from __future__ import annotations
 
+import functools
 import posixpath
 from urllib.parse import quote, unquote, urlsplit
 
@@ -109,6 +110,16 @@ def quote_anchor(anchor: str) -> str:
     return quote(anchor, safe="-._~:")
 
 
+@functools.lru_cache(maxsize=1 << 14)  # the pages of a folder link to the same ones
+def _relative(path: str, folder: str) -> str:
+    """The address of a site path from the pages of a folder."""
+    ends, starts = path.split("/"), folder.split("/") if folder else []
+    shared = 0
+    while shared < min(len(ends) - 1, len(starts)) and ends[shared] == starts[shared]:
+        shared += 1
+    return encode("/".join([".."] * (len(starts) - shared) + ends[shared:]))
+
+
 class Place(Struct, frozen=True):
     """A page that addresses are relative to."""
 
@@ -123,11 +134,7 @@ class Place(Struct, frozen=True):
             return self.root + encode("" if path == HOME else path) + fragment
         if path == self.path:
             return fragment or encode(posixpath.basename(path))
-        ends, starts = path.split("/"), self.path.split("/")[:-1]
-        shared = 0
-        while shared < min(len(ends) - 1, len(starts)) and ends[shared] == starts[shared]:
-            shared += 1
-        return encode("/".join([".."] * (len(starts) - shared) + ends[shared:])) + fragment
+        return _relative(path, self.path.rpartition("/")[0]) + fragment
 
     def target(self, address: str) -> tuple[str | None, str]:
         """The site path and anchor of an address on the page; `None` if it leads elsewhere."""
