@@ -71,7 +71,7 @@ def rewriting(request: pytest.FixtureRequest) -> bool:
 
 
 NOBODY = 65534
-STORES = ("fonts", "compressed")
+STORES = ("fonts", "compressed", "installed")
 
 
 @pytest.fixture(scope="session")

@@ -399,7 +399,8 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
         names_by_module: dict[str, set[str]] = {}
         seen_names: set[str] = set()
         for distribution in installed_distributions(folders):
-            name = distribution.metadata["Name"] or ""
+            metadata = distribution.metadata  # which is read anew at each look
+            name = metadata["Name"] or ""
             if name in seen_names or name == _TOOL_PACKAGE:  # the first on the path counts
                 continue
             seen_names.add(name)
@@ -412,7 +413,7 @@ def _map_distributions(store: Store, folders: Sequence[str]) -> Mapping[str, str
                 elif len(file.parts) == 1 and file.suffix in (".py", ".so", ".pyd"):
                     modules.add(first.split(".")[0])
             for module in modules:
-                names_by_module.setdefault(module, set()).add(f"{name} {distribution.version}")
+                names_by_module.setdefault(module, set()).add(f"{name} {metadata['Version']}")
         names = {module: ", ".join(sorted(names)) for module, names in names_by_module.items()}
         store.put_value("installed", key, names)
     return names
