@@ -15,6 +15,16 @@ from coursebuild.features.importer.source_files import find_group, value_at
 
 WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
 """Words in a formula that hold a formula themselves."""
+_SIGN = r"(?<!(?<!\\)\\)\$"
+_PLAIN_SIGN = rf"(?P<price>{_SIGN})"
+# A formula holds no beginning of another, so that each character is looked at a few times only.
+FORMULAS = {
+    "$": rf"(?P<digits>{_SIGN}(?P<tex>(?!\\\$)[^$\s](?:[^$\n]*[^$\s\\])?)\$"
+    rf"(?P<number>\d[\d.,]*\d|\d))|(?P<math>{_SIGN}\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)",
+    "$$": rf"(?P<math>{_SIGN}\$(?>(?:{WORDS}|[^$\n])+)\$\$)|{_PLAIN_SIGN}",
+    "": _PLAIN_SIGN,
+}
+"""Formulas in a line, by what begins one (see `SourceFiles.dollars`)."""
 _CODE = r"(?<!(?<!\\)`)(?P<ticks>`++)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"
 _PRICE = r"(?<!\$)\$(?=(?:[^$\\\n]|\\.|\$(?!\$))+\$\$)"
 """A dollar sign in a displayed formula, which ends in its line; MathJax shows it as it stands."""

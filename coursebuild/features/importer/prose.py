@@ -20,7 +20,7 @@ from coursebuild.features.importer.anchors import (
     write_target,
 )
 from coursebuild.features.importer.context import PROOF_LABELS, LessonContext, to_anchor
-from coursebuild.features.importer.displays import WORDS, normalize_formulas, read_escapes
+from coursebuild.features.importer.displays import FORMULAS, normalize_formulas, read_escapes
 from coursebuild.features.importer.pandoc_tables import (
     MEANING,
     cut_rows,
@@ -60,17 +60,14 @@ _KEY = r"\w(?:[\w.:/+-]*\w)?"
 _PLACE = r"(?:<[^<>\n]+>|(?:[^()\s<]|\([^()\s]*\))(?:[^()\s]|\([^()\s]*\))*)"
 _ALT = regex(r"\balt=(['\"])(.*?)\1")
 _LINK_TITLE = r"[ \t]+(?:\"[^\"\n]*\"|'[^'\n]*')"
-_DOLLAR = r"(?<!(?<!\\)\\)\$"
-# A formula holds no beginning of another, so that each character is looked at a few times only.
-_LINE = regex(
+_LINE = (
     r"(?P<role>\{(?P<name>[a-z][\w:+.-]*)\}`(?P<body>[^`\n]+)`)"
     r"|(?P<code>(?P<ticks>`+)(?!`).+?(?<!`)(?P=ticks)(?!`)(?:\{=\w+\})?)"
     rf"|(?P<image>!\[(?P<alt>[^\]\n]*)\]\((?P<source>{_PLACE})(?P<hover>{_LINK_TITLE})?[ \t]*\)"
     r"(?P<dressing>\{[^{}\n]*\})?)"
     r"|(?P<link>\[(?P<text>(?:[^\[\]\n`]|`[^`\n]+`|(?<!!)\[[^\[\]\n`]*\](?!\())*)\]"
     rf"\((?P<address>(?:@ref[ ]+)?{_PLACE})(?P<title>{_LINK_TITLE})?[ \t]*\))"
-    rf"|(?P<digits>{_DOLLAR}(?P<tex>(?!\\\$)[^$\s](?:[^$\n]*[^$\s\\])?)\$(?P<number>\d[\d.,]*\d|\d))"
-    rf"|(?P<math>{_DOLLAR}\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)"
+    r"|FORMULAS"
     r"|(?P<paren>\\{1,2}\((?P<inner>(?>(?:(?!\\{1,2}[()])[^\n])+))\\{1,2}\))"
     r"|(?P<square>\\{2}\[(?P<shown_tex>(?>(?:(?!\\{2}[\[\]])[^\n])+))\\{2}\])"
     r"|(?P<anchor>(?<!!)\[(?P<bare>(?:[^\[\]\n`]|!\[[^\[\]\n]*\]\([^()\n]*\))*)\]\(\)(?:\{[^{}\n]*\})?)"
@@ -107,6 +104,7 @@ _LINE = regex(
     r"|(?<=[a-z\d])--(?=[A-Za-z\d])|(?<=[\w,.;:!?)\"'*_`])---(?=[\w(\"'*_`]))"
     rf"|(?P<span>(?<!\])\[(?P<words>[^\[\]\n`]*)\]{_ATTRIBUTES})"
 )
+_LINES = {begin: regex(_LINE.replace("FORMULAS", text)) for begin, text in FORMULAS.items()}
 GONE = "gone:"
 """The address of a link by reference to what is not in the folder."""
 _FIELDS = regex(
@@ -163,6 +161,7 @@ _KINDS = {
     "image": ("picture", "its file is in content/files"),
     "digits": ("formula", "the digits behind it are in it"),
     "math": ("formula", "without blanks at its ends"),
+    "price": ("dollar sign", "with a backslash, as no formula begins there"),
     "paren": ("formula", "between dollar signs"),
     "square": ("formula", "between dollar signs"),
     "anchor": ("link", "dropped: it has no text and no address"),
@@ -211,7 +210,7 @@ def rewrite_prose(text: str, context: LessonContext) -> str:
     if context.path.endswith(".ipynb"):  # MathJax takes the second of two backslashes
         text = re.sub(r"\\\\\$(?=\d)", r"\\$", text)
     text = read_escapes(text) if context.path.endswith(".md") else text
-    if context.files.dollars != "\n":
+    if context.files.dollars:
         text = normalize_formulas(text)
     text = _TAG_OVER_LINES.sub(lambda tag: convert_tag(tag[0], context), join_broken_lines(text))
     text = rewrite_html_links(text, context)
@@ -287,7 +286,7 @@ def _rewrite_line(line: str, context: LessonContext) -> str:
             kind, change, match[0], lambda: _rewrite_match(match, context)
         )
 
-    return _LINE.sub(rewrite, line)
+    return _LINES[context.files.dollars].sub(rewrite, line)
 
 
 def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
@@ -334,8 +333,8 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if match["path"] is not None:
                 return write_link(words, context.resolve_anchor(to_anchor(match["path"])))
             return words if re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called) else whole
-        case "math" | "digits" if not whole.startswith(context.files.dollars):
-            return r"\$".join(_rewrite_line(part, context) for part in whole.split("$"))
+        case "price":
+            return r"\$"
         case "digits" if _WORD.search(match["tex"]):  # two prices
             return "$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if context.files.dollars == "$":

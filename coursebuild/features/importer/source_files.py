@@ -254,14 +254,14 @@ class SourceFiles:
 
     @cached_property
     def dollars(self) -> str:
-        """What begins a formula: two dollars in GitBook, none where settings name no extension."""
+        """What begins a formula: two dollars in GitBook; empty where settings name no extension."""
         if (self.folder / ".gitbook.yaml").is_file():
             return "$$"
         names = ("mkdocs.yml", "book.toml", self.docusaurus, "book.json" * ("SUMMARY.md" in self))
         path = next(filter(None, map(self.find_settings, names)), "")
         pattern = "[Mm]ath|arithmatex|[Kk]a[Tt]e[Xx]|INHERIT"
         if path and not re.search(pattern, self.read_text(path)):
-            return "\n"  # no formula begins with the end of a line
+            return ""
         return "$$" if path == "book.json" else "$"
 
     @cached_property
