@@ -21,7 +21,8 @@ from coursebuild.core.model.results import Formula
 from support.built_sites import BuiltCourses, course_copy
 from support.edited_course import EDITS, LESSON, NORUN, QUIZ, WORDS, Course, Edit, drawn_pages
 from support.live_course import TRIALS, differences
-from support.scratch_course import ROOT, Folder
+from support.run_code import program, run_code
+from support.scratch_course import ROOT, Folder, Make
 
 UNSHARED_KINDS = ("compressed", "fonts", "mjb", "parts", "pictures", "published", "unchanged")
 """Kinds of entries that hold bytes of the site, or that are not shared."""
@@ -249,6 +250,12 @@ def test_copies_of_the_process_give_what_one_gives(tmp_path: Path, stores: Path)
         assert (result.status, result.out, result.err) == (0, "", "")
         sites.append(course.folder.tree("public"))
     assert differences(*sites) == []
+
+
+def test_many_texts_are_read_by_as_many_processes_as_there_may_be(make: Make) -> None:
+    folder = make(*(f"## One\n\nThen $x_{n} > 0$.\n" for n in range(8)))
+    process = run_code(program("count_workers"), folder.root)
+    assert (process.stdout, process.stderr, process.returncode) == ("2\n", "", 0)
 
 
 FULL = ROOT / "tests/courses/full/course"
