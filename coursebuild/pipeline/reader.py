@@ -391,8 +391,6 @@ class Reader:
             self._engine.close()
         if self._workers is None and is_worth_it and can_fork():
             count = min(self._jobs, -(-2 * len(first) // _MIN_PARALLEL))
-            if self._engine is not None:
-                self._engine.expect_many()
             self._workers = Workers(self._answer, count)
         if not first:
             return

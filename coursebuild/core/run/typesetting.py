@@ -67,10 +67,6 @@ class MathEngine:
                 self._isolate.close()
                 self._isolate = None
 
-    def expect_many(self) -> None:
-        """Many formulas come: V8 is worth its start from the first one on."""
-        self._length = _MANY
-
     def typeset(self, formulas: Sequence[Formula]) -> list[str | MathError]:
         """The MathML of each formula, or why there is none; no macro outlives its formula.
 
