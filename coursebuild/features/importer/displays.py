@@ -15,14 +15,14 @@ from coursebuild.features.importer.source_files import find_group, value_at
 
 WORDS = r"\\(?:text\w*|[hm]box)\{[^{}$]*\$(?:[^{}]|\{[^{}]*\})*\}"
 """Words in a formula that hold a formula themselves."""
-_SIGN = r"(?<!(?<!\\)\\)\$"
-_PLAIN_SIGN = rf"(?P<price>{_SIGN})"
+_DOLLAR = r"(?<!(?<!\\)\\)\$"
+_NO_FORMULA = rf"(?P<kept><(?:https?|ftp):[^\s<>]*>)|(?P<dollar>{_DOLLAR})"
 # A formula holds no beginning of another, so that each character is looked at a few times only.
 FORMULAS = {
-    "$": rf"(?P<digits>{_SIGN}(?P<tex>(?!\\\$)[^$\s](?:[^$\n]*[^$\s\\])?)\$"
-    rf"(?P<number>\d[\d.,]*\d|\d))|(?P<math>{_SIGN}\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)",
-    "$$": rf"(?P<math>{_SIGN}\$(?>(?:{WORDS}|[^$\n])+)\$\$)|{_PLAIN_SIGN}",
-    "": _PLAIN_SIGN,
+    "$": rf"(?P<digits>{_DOLLAR}(?P<tex>(?!\\\$)[^$\s](?:[^$\n]*[^$\s\\])?)\$"
+    rf"(?P<number>\d[\d.,]*\d|\d))|(?P<math>{_DOLLAR}\$?(?>(?:{WORDS}|[^$\n])+)\$\$?)",
+    "$$": rf"(?P<math>{_DOLLAR}\$(?>(?:{WORDS}|[^$\n])+)\$\$)|{_NO_FORMULA}",
+    "": _NO_FORMULA,
 }
 """Formulas in a line, by what begins one (see `SourceFiles.dollars`)."""
 _CODE = r"(?<!(?<!\\)`)(?P<ticks>`++)(?:(?!\n[ \t]*\n).)+?(?<!`)(?P=ticks)(?!`)"

@@ -161,7 +161,7 @@ _KINDS = {
     "image": ("picture", "its file is in content/files"),
     "digits": ("formula", "the digits behind it are in it"),
     "math": ("formula", "without blanks at its ends"),
-    "price": ("dollar sign", "with a backslash, as no formula begins there"),
+    "dollar": ("dollar sign", "with a backslash, as no formula begins there"),
     "paren": ("formula", "between dollar signs"),
     "square": ("formula", "between dollar signs"),
     "anchor": ("link", "dropped: it has no text and no address"),
@@ -333,8 +333,9 @@ def _rewrite_match(match: re.Match[str], context: LessonContext) -> str:
             if match["path"] is not None:
                 return write_link(words, context.resolve_anchor(to_anchor(match["path"])))
             return words if re.fullmatch(r"`?[A-Za-z_]\w*(?:\.\w+)+`?", called) else whole
-        case "price":
-            return r"\$"
+        case "dollar":
+            # An indented line may be code, in which one alone is a prompt.
+            return whole if re.match(r"(?: {4}|\t)[^$]*\$[^$]*\Z", match.string) else r"\$"
         case "digits" if _WORD.search(match["tex"]):  # two prices
             return "$".join(_rewrite_line(part, context) for part in whole.split("$"))
         case "paren" if context.files.dollars == "$":
